@@ -1,0 +1,57 @@
+# make studies   every study: datasets, figures and results/report.html     make test      the fast tests
+# make quick     the same on coarse grids, into results/quick               make test-all  all tests
+# make bench     kernels against C                                          make lint      ruff and mypy
+# Each target sets up .venv first; the second time that takes no time.
+
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/.ready
+STUDIES := $(patsubst studies/%.py,%,$(wildcard studies/[!_]*.py))
+
+.DEFAULT_GOAL := help
+.PHONY: help setup studies quick report test test-all lint bench clean
+
+help:
+	@sed -n '1,4s/^# //p' Makefile
+
+setup: $(READY)
+
+$(READY): pyproject.toml constraints.txt
+	@echo "symtop: making .venv with $$($(PYTHON) --version) and installing the pinned packages (a minute or two, once)"
+	@$(PYTHON) -m venv .venv
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --upgrade pip
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable . --group dev
+	@touch $(READY)
+
+studies: $(READY)
+	@echo "symtop: running every study; what is on disk and unchanged is not computed again"
+	@$(BIN)/symtop study --all
+	@$(BIN)/symtop report
+
+quick: $(READY)
+	@echo "symtop: a quick pass of every study into results/quick"
+	@$(BIN)/symtop study --all --quick
+	@$(BIN)/symtop report --results results/quick
+
+report: $(READY)
+	@$(BIN)/symtop report
+
+test: $(READY)
+	@echo "symtop: running the tests (make test-all runs the slow ones too)"
+	@$(BIN)/python -m pytest -m "not slow"
+
+test-all: $(READY)
+	@echo "symtop: running all tests"
+	@$(BIN)/python -m pytest
+
+lint: $(READY)
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+
+bench: $(READY)
+	@echo "symtop: timing the kernels against C (needs gcc)"
+	@$(BIN)/python benchmarks/kernels.py
+
+clean:
+	rm -rf .venv .pytest_cache .ruff_cache .mypy_cache benchmarks/build results/cases results/quick results/*.nc results/*.json

@@ -1,0 +1,134 @@
+"""At what rate does the error fall with the step?"""
+
+import numpy as np
+import xarray as xr
+
+from symtop.integrators.registry import integrator, integrators
+from symtop.measure.accuracy import error_table, step_ladder
+from symtop.measure.errors import QUANTITIES
+from symtop.measure.order import Fit, order
+from symtop.report import figures, style
+from symtop.scenes import added_scenes, scene
+from symtop.study.study import Case, Picture, Study, Table
+
+SCENES = ["spheroid", "goldstein", "loop", "hairer-lubich-wanner"]
+JUDGED = ("attitude", "theta", "energy")
+
+
+def cases(quick: bool) -> list[Case]:
+    """Every fixed-step method on every scene, ten steps a nutation down to round-off."""
+    grid = []
+    for name in [*(SCENES[:2] if quick else SCENES), *added_scenes()]:
+        where = scene(name)
+        horizon = min(where.horizon, 8.0 * where.nutation_period) if name != "spheroid" else where.horizon
+        for method in integrators().values():
+            if method.knob == "step_size":
+                steps = step_ladder(method, where, horizon, quick)
+                grid.append(Case(name, method.name, {"horizon": horizon, "step_sizes": steps}))
+    return grid
+
+
+def measure(case: Case) -> xr.Dataset:
+    """The error table of one method on one scene."""
+    where, method = scene(case.scene), integrator(case.integrator)
+    return error_table(where, method, case.settings["step_sizes"], case.settings["horizon"], observe="attitude")
+
+
+def fits(data: xr.Dataset, quantity: str) -> dict[tuple[str, str], Fit]:
+    """The fitted order of every method on every scene."""
+    found = {}
+    for name in data["scene"].values:
+        omega = 2.0 * np.pi / scene(str(name)).nutation_period
+        for method in data["integrator"].values:
+            cell = data.sel(scene=name, integrator=method)
+            found[str(name), str(method)] = order(
+                cell["step_size"].values, cell[quantity].values, cell[f"{quantity}_bound"].values, omega
+            )
+    return found
+
+
+def pictures(data: xr.Dataset) -> list[Picture]:
+    """Attitude and energy error against the step."""
+    scenes = [str(name) for name in data["scene"].values]
+    drawn = []
+    for quantity in ("attitude", "energy"):
+        orders = fits(data, quantity)
+        figure, axes = figures.error_curves(
+            data, scenes, "step_size", quantity, ("step size (s)", f"largest {QUANTITIES[quantity]}"),
+            {key: fit.used for key, fit in orders.items()},
+        )  # fmt: skip
+        for axis, name in zip(axes.flat, scenes, strict=False):
+            steps = data["step_size"].sel(scene=name).values
+            span = (float(np.nanmin(steps)), float(np.nanmax(steps)))
+            style.slope_guide(axis, 2.0, (span[0], span[1]), float(np.nanmin(data[quantity].sel(scene=name))) * 3.0, "$h^2$")
+        judged = [fit.slope for fit in orders.values() if np.isfinite(fit.slope)]
+        drawn.append(
+            Picture(
+                quantity,
+                figure,
+                f"Largest {quantity} error over the run against the step. Filled points enter the fit, hollow ones do "
+                f"not: too large, or within ten times of the reference's own error (grey band). "
+                f"Fitted orders lie between {min(judged):.3f} and {max(judged):.3f}.",
+                f"Log-log plots of {quantity} error against step size for {len(scenes)} scenes: straight lines of slope 2.",
+            )
+        )
+    return drawn
+
+
+def tables(data: xr.Dataset) -> list[Table]:
+    """Fitted orders, declared beside measured, and the error constants."""
+    declared = integrators()
+    rows = []
+    by_quantity = {quantity: fits(data, quantity) for quantity in JUDGED}
+    ends = fits(data.assign(attitude=data["attitude_end"]), "attitude")
+    for name in data["scene"].values:
+        for method in data["integrator"].values:
+            key = (str(name), str(method))
+            shown = [str(by_quantity[quantity][key]) for quantity in JUDGED]
+            claim = declared[key[1]].order if key[1] in declared else None
+            constant = ends[key].constant
+            rows.append([*key, str(claim or "unknown"), *shown, f"{constant:.4g}" if np.isfinite(constant) else ""])
+    header = ["scene", "integrator", "declared", *(f"order in {q}" for q in JUDGED), "C in attitude error C h^p at the end"]
+    return [Table("Fitted orders with 95 % intervals", header, rows)]
+
+
+def verdict(data: xr.Dataset) -> list[str]:
+    """Whether every declared order was measured."""
+    declared, sentences, wrong = integrators(), [], []
+    found = fits(data, "attitude")
+    judged = {key: fit for key, fit in found.items() if np.isfinite(fit.slope)}
+    for (name, method), fit in judged.items():
+        claim = declared[method].order if method in declared else None
+        if claim is not None and abs(fit.slope - claim) > max(0.05, 0.03 * claim):
+            wrong.append(f"{method} on {name} shows order {fit} where {claim} is declared")
+    sentences.append(
+        f"{len(judged)} of {len(found)} pairs of method and scene could be judged; "
+        + ("every one of them shows the order it declares." if not wrong else "; ".join(wrong) + ".")
+    )
+    for method in data["integrator"].values:
+        worst = data["attitude_end"].sel(integrator=method)
+        if "spheroid" in data["scene"].values:
+            fit = fits(data.assign(attitude=data["attitude_end"]), "attitude").get(("spheroid", str(method)))
+            if fit is not None and np.isfinite(fit.constant):
+                sentences.append(
+                    f"On spheroid at t = 8 the attitude error of {method} is {fit.constant:.4g} h^{fit.slope:.2f} "
+                    f"(smallest found: {float(np.nanmin(worst.sel(scene='spheroid'))):.1e} rad)."
+                )
+    return sentences
+
+
+STUDY = Study(
+    name="convergence",
+    title="Convergence",
+    question="At what rate does the error fall with the step?",
+    how_to_read=(
+        "Both axes are logarithmic, so a method of order p is a straight line of slope p. A line that bends at the "
+        "top is not yet asymptotic; one that flattens at the bottom has met rounding or the grey band, below "
+        "which the reference cannot judge."
+    ),
+    cases=cases,
+    measure=measure,
+    pictures=pictures,
+    tables=tables,
+    verdict=verdict,
+)

@@ -1,0 +1,128 @@
+"""The three charts of the top, the maps between them, and distances that no chart can distort.
+
+    angles    theta, p_theta, phi, psi; p_phi and p_psi are parameters    singular at theta = 0, pi
+    axis      e (3), L (3), space frame                                   singular nowhere
+    attitude  q (4), L (3), space frame                                   singular nowhere
+
+``q = (w, x, y, z)`` turns body vectors into space vectors, ``q = exp(phi k/2) exp(theta i/2) exp(psi k/2)``:
+
+    q = (cos x cos s, sin x cos d, sin x sin d, cos x sin s),   x = theta/2, s = (phi+psi)/2, d = (phi-psi)/2
+
+and ``e = q k q*``. In the space frame, with n = (cos phi, sin phi, 0) the line of nodes,
+``L = I1 theta' n + I1 phi' sin theta (e x n) + I3 w3 e``; then ``p_psi = L.e``, ``p_phi = L_z``,
+``p_theta = L.n``. Source: Marsden and Ratiu, Introduction to Mechanics and Symmetry, chapter 15.
+
+Distances are the angles of the smallest rotation, accurate for small angles: ``atan2(|a x b|, a.b)`` for
+axes, ``4 asin(|q - q'|/2)`` with the nearer sign for attitudes (2 acos has a floor of 1e-8).
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop.top import Angles, SymmetricTop
+
+Array = NDArray[np.float64]
+
+CHARTS = ("angles", "axis", "attitude")
+
+
+def axis_from_angles(theta: Any, phi: Any) -> Array:
+    """Unit vector along the top's axis, shape (..., 3)."""
+    sine = np.sin(theta)
+    return np.stack([sine * np.sin(phi), -sine * np.cos(phi), np.cos(theta) + 0.0 * phi], axis=-1)
+
+
+def quaternion_from_angles(theta: Any, phi: Any, psi: Any) -> Array:
+    """Unit quaternion (w, x, y, z) from body to space, shape (..., 4)."""
+    half, total, difference = 0.5 * theta, 0.5 * (phi + psi), 0.5 * (phi - psi)
+    cosine, sine = np.cos(half), np.sin(half)
+    return np.stack(
+        [cosine * np.cos(total), sine * np.cos(difference), sine * np.sin(difference), cosine * np.sin(total)], axis=-1
+    )
+
+
+def axis_from_quaternion(quaternion: Array) -> Array:
+    """The third column of the rotation matrix, shape (..., 3)."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    right, back = x * z + w * y, y * z - w * x  # doubled by addition: quadruple precision has no 2.0
+    return np.stack([right + right, back + back, w * w - x * x - y * y + z * z], axis=-1)
+
+
+def theta_from_axis(axis: Array) -> Array:
+    """Inclination in [0, pi], accurate at both poles and for axes that are not quite of length one."""
+    return np.arctan2(np.sqrt(axis[..., 0] ** 2 + axis[..., 1] ** 2), axis[..., 2])
+
+
+def phi_from_axis(axis: Array) -> Array:
+    """Precession angle in (-pi, pi]; undefined (zero) at a pole."""
+    return np.arctan2(axis[..., 0], -axis[..., 1])
+
+
+def angles_from_quaternion(quaternion: Array) -> tuple[Array, Array, Array]:
+    """theta in [0, pi], phi and psi modulo 2 pi. At a pole only phi + psi (or phi - psi) has meaning."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    half = np.arctan2(np.sqrt(x * x + y * y), np.sqrt(w * w + z * z))
+    total, difference = np.arctan2(z, w), np.arctan2(y, x)
+    return half + half, total + difference, total - difference
+
+
+def onto_branch(angle: Array, near: Array) -> Array:
+    """Add the multiple of 2 pi that brings each `angle` closest to `near`."""
+    return angle + 2.0 * np.pi * np.rint((near - angle) / (2.0 * np.pi))
+
+
+def momentum_from_angles(top: SymmetricTop, theta: Any, phi: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any) -> Array:
+    """Angular momentum in the space frame, shape (..., 3): the three terms are along n, e x n and e."""
+    s, c, sin_phi, cos_phi = np.sin(theta), np.cos(theta), np.sin(phi), np.cos(phi)
+    nod, swing, spin = top.I1 * theta_dot, top.I1 * phi_dot * s, top.I3 * (psi_dot + phi_dot * c)
+    return np.stack(
+        [
+            nod * cos_phi + (spin * s - swing * c) * sin_phi,
+            nod * sin_phi - (spin * s - swing * c) * cos_phi,
+            swing * s + spin * c,
+        ],
+        axis=-1,
+    )
+
+
+def rates_from_momentum(top: SymmetricTop, axis: Array, phi: Any, momentum: Array) -> tuple[Any, Any, Any]:
+    """theta', phi', psi' of states given by axis, precession angle and space-frame L; not at a pole."""
+    node = np.stack([np.cos(phi), np.sin(phi), 0.0 * np.asarray(phi)], axis=-1)
+    sine_squared = axis[..., 0] ** 2 + axis[..., 1] ** 2
+    p_psi = np.sum(momentum * axis, axis=-1)
+    theta_dot = np.sum(momentum * node, axis=-1) / top.I1
+    # L_z - p_psi e_z = L_h.(horizontal part) - needs no difference of large numbers near a pole
+    horizontal = momentum[..., 0] * axis[..., 0] + momentum[..., 1] * axis[..., 1]
+    phi_dot = (momentum[..., 2] - axis[..., 2] * horizontal / sine_squared) / top.I1
+    return theta_dot, phi_dot, p_psi / top.I3 - phi_dot * axis[..., 2]
+
+
+def space_state(chart: str, top: SymmetricTop, at: Angles) -> Array:
+    """State (e, L) or (q, L) of a start in one of the space-frame charts."""
+    place = (
+        axis_from_angles(at.theta, at.phi) if chart == "axis" else quaternion_from_angles(at.theta, at.phi, at.psi)
+    )
+    return np.concatenate([place, momentum_from_angles(top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)])
+
+
+def angles_from_attitude(top: SymmetricTop, state: Array) -> Angles:
+    """Angles and rates of an attitude state; phi and psi modulo 2 pi, not at a pole."""
+    quaternion, momentum = state[:4], state[4:]
+    theta, phi, psi = angles_from_quaternion(quaternion)
+    rates = rates_from_momentum(top, axis_from_quaternion(quaternion), phi, momentum)
+    return Angles(*(float(value) for value in (theta, phi, psi, *rates)))
+
+
+def axis_distance(first: Array, second: Array) -> Array:
+    """Angle between two axes in radians, shape (...), to 1e-16 however small."""
+    cross = np.cross(first, second)
+    return np.arctan2(np.sqrt(np.sum(cross * cross, axis=-1)), np.sum(first * second, axis=-1))
+
+
+def attitude_distance(first: Array, second: Array) -> Array:
+    """Angle of the rotation between two orientations in radians, shape (...)."""
+    nearer = np.where(np.sum(first * second, axis=-1, keepdims=True) < 0.0, -second, second)
+    gap = np.sqrt(np.sum((first - nearer) ** 2, axis=-1))
+    return 4.0 * np.arcsin(np.minimum(1.0, 0.5 * gap))

@@ -1,0 +1,62 @@
+"""Bad input, said in one sentence: what was given, its value, and what is allowed."""
+
+import difflib
+import math
+from collections.abc import Iterable
+
+
+class SymtopError(ValueError):
+    """An argument that symtop cannot use.
+
+    The message is one sentence that names the argument, the value it had and what is allowed.
+    The command line prints it without a traceback and exits with code 2.
+    """
+
+
+class SymtopWarning(UserWarning):
+    """A result that is valid but probably not what its user wants."""
+
+
+def finite(name: str, value: object) -> float:
+    """Return `value` as a float; refuse anything that is not one finite real number."""
+    if isinstance(value, bool):
+        msg = f"{name} must be a finite number, not {value!r}"
+        raise SymtopError(msg)
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        msg = f"{name} must be a finite number, not {value!r}"
+        raise SymtopError(msg) from None
+    if not math.isfinite(number):
+        msg = f"{name} must be a finite number, not {number!r}"
+        raise SymtopError(msg)
+    return number
+
+
+def positive(name: str, value: object) -> float:
+    """Return `value` as a float; refuse anything that is not finite and above zero."""
+    number = finite(name, value)
+    if number <= 0.0:
+        msg = f"{name} must be above zero, not {number!r}"
+        raise SymtopError(msg)
+    return number
+
+
+def whole(name: str, value: object, least: int) -> int:
+    """Return `value` as an int; refuse anything that is not a whole number of at least `least`."""
+    number = finite(name, value)
+    if number != int(number) or number < least:
+        msg = f"{name} must be a whole number of at least {least}, not {value!r}"
+        raise SymtopError(msg)
+    return int(number)
+
+
+def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
+    """Return `value` if it is one of `allowed`; otherwise name the nearest of them."""
+    known = list(allowed)
+    if isinstance(value, str) and value in known:
+        return value
+    near = difflib.get_close_matches(str(value), known, n=3, cutoff=0.5)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known)}"
+    msg = f"{name} {value!r} is unknown; {hint}"
+    raise SymtopError(msg)

@@ -1,0 +1,144 @@
+"""The registry: an integrator is a record of claims and a solver for each chart it works in.
+
+Traits are data. They are *claims* until measured; `None` means that nobody has claimed anything. A record is
+made by a family (`discrete_lagrangian`, `composition`, ...) from a table of numbers, or by hand around any
+function ``solve(top, start, plan) -> Run``.
+"""
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop.checks import SymtopError, finite, one_of, positive
+from symtop.top import Angles, SymmetricTop
+
+Array = NDArray[np.float64]
+
+
+class Plan(NamedTuple):
+    """What a solver is asked for: the sample times, and the step or the tolerance to reach them with."""
+
+    times: Array  # increasing, the first may be 0
+    horizon: float
+    step_size: float  # horizon / steps exactly; nan for an adaptive method
+    marks: NDArray[np.int64]  # times / step_size; empty for an adaptive method
+    tolerance: float  # nan for a fixed-step method
+
+
+class Run(NamedTuple):
+    """What a solver returns: states of its chart at the sample times, NaN after a failure."""
+
+    states: Array  # (samples, dimension of the chart)
+    p_phi: Array  # (samples,) recomputed from the trajectory
+    p_psi: Array
+    steps: int
+    force_evaluations: int
+    newton_iterations: int
+    outcome: str
+    reached: float
+
+
+Solver = Callable[[SymmetricTop, Angles, Plan], Run]
+
+FAMILIES = ("discrete-lagrangian", "splitting", "runge-kutta", "taylor", "library", "exact", "other")
+TIERS = ("compiled", "python")
+KNOBS = ("step_size", "tolerance", None)
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """One integrator: its name, its claims, and how to run it.
+
+    `solvers` maps a chart (angles, axis, attitude) to a function. `knob` is what a user turns: ``step_size``,
+    ``tolerance`` or nothing. `tier` says what executes the inner loop, so that languages are never ranked
+    against each other unsaid. `force_evaluations` is the cost of one step where it is constant.
+    """
+
+    name: str
+    family: str
+    summary: str
+    solvers: Mapping[str, Solver] = field(repr=False)
+    knob: str | None = "step_size"
+    tier: str = "compiled"
+    order: int | None = None
+    explicit: bool | None = None
+    symplectic: bool | None = None
+    symmetric: bool | None = None
+    conserves: frozenset[str] | None = None
+    least_tolerance: float = 0.0
+    default_tolerance: float | None = None
+    reference: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name or self.name != self.name.strip():
+            msg = f"name must be a non-empty string without blanks around it, not {self.name!r}"
+            raise SymtopError(msg)
+        one_of("family", self.family, FAMILIES)
+        one_of("tier", self.tier, TIERS)
+        if self.knob not in KNOBS:
+            msg = f"knob must be 'step_size', 'tolerance' or None, not {self.knob!r}"
+            raise SymtopError(msg)
+        if not self.solvers or not set(self.solvers) <= {"angles", "axis", "attitude"}:
+            msg = f"solvers must map one of angles, axis, attitude to a function, not {dict(self.solvers)!r}"
+            raise SymtopError(msg)
+        object.__setattr__(self, "solvers", MappingProxyType(dict(self.solvers)))
+
+    def check_tolerance(self, tolerance: object) -> float:
+        """The tolerance to use, refused where the arithmetic cannot reach it."""
+        value = self.default_tolerance if tolerance is None else positive("tolerance", tolerance)
+        if value is None:
+            msg = f"{self.name} is adaptive and needs a tolerance"
+            raise SymtopError(msg)
+        if value < self.least_tolerance or value >= 1.0:
+            msg = f"tolerance of {self.name} must be at least {self.least_tolerance:.3g} and below 1, not {value!r}"
+            raise SymtopError(msg)
+        return finite("tolerance", value)
+
+    def charts(self) -> tuple[str, ...]:
+        """The charts this integrator works in."""
+        return tuple(self.solvers)
+
+
+_BUILT_IN = ("discrete_lagrangian", "splitting", "scipy_ivp", "taylor")
+_registry: dict[str, Integrator] = {}
+_loaded: list[str] = []
+
+
+def _load() -> None:
+    while len(_loaded) < len(_BUILT_IN):
+        module = importlib.import_module(f"symtop.integrators.{_BUILT_IN[len(_loaded)]}")
+        _loaded.append(module.__name__)
+        for entry in module.built_in():
+            _registry.setdefault(entry.name, entry)
+
+
+def register(entry: Integrator, *, replace: bool = False) -> Integrator:
+    """Add an integrator to the registry; a name that is taken is refused unless `replace` is true."""
+    if not isinstance(entry, Integrator):
+        msg = f"register needs an Integrator, not {entry!r}"
+        raise SymtopError(msg)
+    _load()
+    if entry.name in _registry and not replace:
+        msg = f"integrator {entry.name!r} is already registered; choose another name or pass replace=True"
+        raise SymtopError(msg)
+    _registry[entry.name] = entry
+    return entry
+
+
+def integrators() -> dict[str, Integrator]:
+    """All registered integrators, by name, in order of registration."""
+    _load()
+    return dict(_registry)
+
+
+def integrator(name: "str | Integrator") -> Integrator:
+    """The integrator of that name; an Integrator is returned as it is."""
+    if isinstance(name, Integrator):
+        return name
+    _load()
+    return _registry[one_of("integrator", name, _registry)]

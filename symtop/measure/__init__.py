@@ -1,0 +1,1 @@
+"""Measures of a run: errors against the truth, orders, conservation, growth, time."""

@@ -1,0 +1,90 @@
+"""Error against step or tolerance: the table that convergence and work-precision studies are made of."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from symtop.integrators.registry import Integrator
+from symtop.measure.errors import QUANTITIES, energy_scale, errors, momentum_scale
+from symtop.reference import reference
+from symtop.scenes import Scene
+from symtop.simulate import simulate
+
+SAMPLES = 331
+EPSILON = float(np.finfo(float).eps)
+
+
+def step_ladder(method: Integrator, scene: Scene, horizon: float, quick: bool = False) -> list[float]:
+    """Steps from ten a nutation down to where the method meets round-off or `MOST` steps, evenly in the logarithm.
+
+    The finest step of a method of order p resolves a nutation about 10 * 10^(11/p) times.
+    """
+    period = scene.nutation_period if math.isfinite(scene.nutation_period) else horizon / 8.0
+    decades = min(4.5, 11.0 / (method.order or 2))
+    most = 4e5 if quick else 1.2e7  # steps
+    decades = min(decades, max(math.log10(most * period / horizon / 10.0), 0.5))
+    count = 9 if quick else 17
+    # 10.37 a nutation: nothing here may be commensurate with it
+    return [period / (10.37 * 10.0 ** (decades * k / (count - 1))) for k in range(count)]
+
+
+def tolerance_ladder(method: Integrator, quick: bool = False) -> list[float]:
+    """Tolerances from 1e-2 down to what the method's arithmetic allows."""
+    least = max(method.least_tolerance, 1e-18)
+    decades = -2.0 - math.log10(least)
+    count = 5 if quick else 12
+    return [10.0 ** (-2.0 - 0.999 * decades * k / (count - 1)) for k in range(count)]
+
+
+def ladder(method: Integrator, scene: Scene, horizon: float, quick: bool = False) -> list[float]:
+    """The settings of a method's one knob, coarse to fine."""
+    if method.knob == "step_size":
+        return step_ladder(method, scene, horizon, quick)
+    return tolerance_ladder(method, quick) if method.knob == "tolerance" else [math.nan]
+
+
+def knob(method: Integrator, setting: float) -> dict[str, float]:
+    """The argument of `simulate` that a setting stands for."""
+    return {} if method.knob is None else {str(method.knob): setting}
+
+
+def error_table(
+    scene: Scene, method: Integrator, settings: Sequence[float], horizon: float, observe: str | None = None
+) -> xr.Dataset:
+    """Largest and final error of every quantity at each setting, with the work it took and how it ended.
+
+    Dimension ``setting``. ``axis`` ... hold the maximum over the run, ``axis_end`` ... the error at the horizon,
+    ``axis_bound`` ... the least error that the reference can judge (its own bound plus rounding).
+    """
+    rows = []
+    for setting in settings:
+        run = simulate(scene, method, horizon=horizon, samples=SAMPLES, observe=observe, **knob(method, setting))
+        truth = reference(scene, run["time"].values, precision="closed-form")
+        found = errors(scene, run, truth)
+        row: dict[str, float | str] = {name: run.attrs[name] for name in _COUNTS}
+        failed = run.attrs["outcome"] != "ok"
+        for name in QUANTITIES:
+            values = found[name].values if name in found else np.array([math.nan])
+            row[name] = math.nan if failed else float(np.max(values))
+            row[f"{name}_end"] = math.nan if failed else float(values[-1])
+            row[f"{name}_bound"] = judge_limit(scene, truth, name)
+        rows.append(row)
+    return xr.Dataset({name: ("setting", [row[name] for row in rows]) for name in rows[0]})
+
+
+_COUNTS = (
+    "step_size", "tolerance", "steps", "force_evaluations", "newton_iterations", "outcome", "reached_time", "tier",
+)  # fmt: skip
+
+
+def judge_limit(scene: Scene, truth: xr.Dataset, quantity: str) -> float:
+    """The reference's largest bound on a quantity over the run, plus the rounding of the compared doubles."""
+    if quantity in ("energy", "p_phi", "p_psi"):
+        scale = energy_scale(scene) if quantity == "energy" else momentum_scale(scene)
+        return 4.0 * EPSILON * max(1.0, float(np.max(np.abs(truth[quantity].values))) / scale)
+    bound = float(np.max(truth[f"{quantity}_error_bound"].values))
+    if quantity == "attitude":  # phi and psi come as doubles; their rounding is an angle
+        bound += EPSILON * float(np.max(np.abs(truth["phi"].values)) + np.max(np.abs(truth["psi"].values)))
+    return bound + EPSILON

@@ -1,0 +1,74 @@
+"""What a run does to the constants of the motion: residuals, and whether they have a trend.
+
+A trend is the slope of the least-squares line of a residual over time, with Student's 95 % interval. Samples are
+never commensurate with the nutation, so that an oscillating energy error has no slope beyond its interval, while
+a drift of a few rounding units does.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from symtop.measure.errors import energy_scale, momentum_scale
+from symtop.measure.order import Fit, power_law
+from symtop.scenes import Scene
+
+CONSTANTS = ("energy", "p_phi", "p_psi")
+BLOCKS = 24
+
+
+class Trend(NamedTuple):
+    """A linear trend of a residual."""
+
+    slope: float  # per unit time
+    interval: float  # half-width, 95 %
+    rise: float  # slope times the length of the run
+
+    @property
+    def significant(self) -> bool:
+        """Does the interval exclude zero?"""
+        return bool(abs(self.slope) > self.interval)
+
+
+def residuals(scene: Scene, run: xr.Dataset) -> dict[str, np.ndarray]:
+    """Relative change of energy, p_phi and p_psi since the start, signed."""
+    scales = {"energy": energy_scale(scene), "p_phi": momentum_scale(scene), "p_psi": momentum_scale(scene)}
+    return {name: (run[name].values - run[name].values[0]) / scales[name] for name in CONSTANTS}
+
+
+def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
+    """The linear trend of a residual, from the means of `BLOCKS` equal stretches of the run.
+
+    Neighbouring samples of an oscillation are correlated; block means are not, so that the interval is honest.
+    """
+    from scipy.stats import t as student  # noqa: PLC0415  (0.5 s to import)
+
+    t, r = np.asarray(time, float), np.asarray(residual, float)
+    good = np.isfinite(r)
+    t, r = t[good], r[good]
+    if t.size < 2 * BLOCKS:
+        return Trend(math.nan, math.nan, math.nan)
+    t_mean = np.array([part.mean() for part in np.array_split(t, BLOCKS)])
+    r_mean = np.array([part.mean() for part in np.array_split(r, BLOCKS)])
+    dt, dr = t_mean - t_mean.mean(), r_mean - r_mean.mean()
+    spread = float(dt @ dt)
+    slope = float(dt @ dr) / spread
+    rest = dr - slope * dt
+    error = math.sqrt(float(rest @ rest) / (BLOCKS - 2) / spread)
+    return Trend(slope, float(student.ppf(0.975, BLOCKS - 2)) * error, slope * float(t[-1] - t[0]))
+
+
+def growth(time: ArrayLike, residual: ArrayLike) -> Fit:
+    """The exponent of |residual| ~ t^exponent from the largest values in windows that double in length."""
+    t, r = np.asarray(time, float), np.abs(np.asarray(residual, float))
+    edges = np.geomspace(max(t[t > 0.0].min(), t[-1] * 1e-4), t[-1], 13)
+    middles, tops = [], []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        inside = (t > low) & (t <= high) & np.isfinite(r)
+        if inside.any():
+            middles.append(math.sqrt(low * high))
+            tops.append(float(r[inside].max()))
+    return power_law(middles, tops)

@@ -1,0 +1,62 @@
+"""Errors of a run against the truth, in quantities that no chart can distort.
+
+    axis       angle between the axes, rad                   attitude   angle of the rotation between, rad
+    theta      |theta - theta_ref|, rad                      energy     |E - E_ref| / (E_ref + |mgl|)
+    p_phi      |p_phi - ref| / max(|p_phi|, |p_psi|)         p_psi      likewise
+
+The energy is measured from the lowest potential energy there is, so that the scale is a kinetic energy and
+never zero by accident; both momenta share one scale because one of them may vanish. Radians and momenta
+never share a norm.
+"""
+
+import numpy as np
+import xarray as xr
+
+from symtop import charts
+from symtop.scenes import Scene
+
+QUANTITIES: dict[str, str] = {
+    "axis": "angle between axes (rad)",
+    "attitude": "angle between attitudes (rad)",
+    "theta": "error of theta (rad)",
+    "energy": "relative error of energy",
+    "p_phi": "relative error of p_phi",
+    "p_psi": "relative error of p_psi",
+}
+
+
+def energy_scale(scene: Scene) -> float:
+    """E0 - min(mgl cos theta): what energy errors are divided by."""
+    return max(scene.top.energy(scene.start) + abs(scene.top.mgl), np.finfo(float).tiny)
+
+
+def momentum_scale(scene: Scene) -> float:
+    """The larger of the two conserved momenta: what both momentum errors are divided by."""
+    momenta = scene.top.momenta(scene.start)
+    return max(abs(momenta.p_phi), abs(momenta.p_psi), np.finfo(float).tiny)
+
+
+def errors(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Dataset:
+    """Error of every quantity the run shows at every sample; NaN where the run had failed.
+
+    `truth` holds `axis`, `theta`, `quaternion`, `energy`, `p_phi`, `p_psi` at the same times (see `reference`).
+    """
+    found = {
+        "axis": charts.axis_distance(run["axis"].values, truth["axis"].values),
+        "theta": np.abs(run["theta"].values - truth["theta"].values),
+        "energy": np.abs(run["energy"].values - truth["energy"].values) / energy_scale(scene),
+        "p_phi": np.abs(run["p_phi"].values - truth["p_phi"].values) / momentum_scale(scene),
+        "p_psi": np.abs(run["p_psi"].values - truth["p_psi"].values) / momentum_scale(scene),
+    }
+    attitude = _quaternion(run)
+    if attitude is not None:
+        found["attitude"] = charts.attitude_distance(attitude, truth["quaternion"].values)
+    return xr.Dataset({name: ("time", values) for name, values in found.items()}, coords={"time": run["time"]})
+
+
+def _quaternion(run: xr.Dataset) -> charts.Array | None:
+    if "quaternion" in run:
+        return run["quaternion"].values
+    if "psi" in run:
+        return charts.quaternion_from_angles(run["theta"].values, run["phi"].values, run["psi"].values)
+    return None

@@ -1,0 +1,365 @@
+"""Certified truth: two independent methods, and their disagreement as an error bound.
+
+`reference` integrates the space-frame equations with heyoka in double, long double or quadruple precision (never in
+angles, which lose digits near a pole), at a tolerance of a hundredth of the rounding unit, from a start that is built
+in 60 digits. The closed form, evaluated in `DIGITS` digits at `CHECKS` times, shows the error of that run. The error of an
+integration grows, so the bound at a time t is `SAFETY` times the largest error seen at any check up to the next one after
+t, plus the rounding of what is stored. With ``precision="closed-form"`` the roles are exchanged: the values are the closed
+form in double, which does not lose digits with time, and the long double integration is what checks it.
+
+Values beyond double are stored as pairs, ``theta + theta_lo``. A result is cached on disk under a hash of the top, the
+start, the times, the precision and the sources; a damaged cache file is noticed, said and computed again.
+"""
+
+import functools
+import hashlib
+import math
+import warnings
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from symtop import charts, datasets
+from symtop.checks import SymtopError, SymtopWarning, one_of
+from symtop.scenes import Scene, closed_form
+from symtop.scenes import scene as find_scene
+
+PRECISIONS = ("closed-form", "double", "longdouble", "quad")
+CHECKS = 24
+DIGITS = 40
+SAFETY = 8.0
+EPSILON = float(np.finfo(np.float64).eps)
+OVERLAP = 100.0  # time over which the closed form is compared with an integration each time it is used
+SUSPICIOUS = 1e-12  # a disagreement beyond this is an error of one of them, not rounding
+MOST_CACHED = 200_000  # times; larger results are not kept on disk
+
+
+class _Working(NamedTuple):
+    """An arithmetic that heyoka offers."""
+
+    kind: Any  # converts a decimal string
+    epsilon: float
+    compact: bool  # unrolled code for quadruple precision takes 20 times longer to build and runs no faster
+
+
+class Checks(NamedTuple):
+    """Largest errors seen up to each check time (running maxima), by quantity."""
+
+    times: charts.Array
+    attitude: charts.Array
+    axis: charts.Array
+    phi: charts.Array
+    psi: charts.Array
+
+
+def _working(precision: str) -> _Working:
+    if precision == "double":
+        return _Working(float, EPSILON, compact=False)
+    if precision == "longdouble":
+        return _Working(np.longdouble, float(np.finfo(np.longdouble).eps), compact=True)
+    import heyoka as hy  # noqa: PLC0415
+
+    return _Working(hy.real128, 2.0**-112, compact=True)
+
+
+@functools.lru_cache(maxsize=32)
+def _stepper(chart: str, precision: str) -> Any:
+    import heyoka as hy  # noqa: PLC0415
+
+    from symtop.integrators.taylor import equations  # noqa: PLC0415
+
+    system, working = equations(chart), _working(precision)
+    zero = [working.kind("0")] * len(system)
+    tolerance = working.kind(repr(working.epsilon / 100.0))
+    fp_type = np.float64 if precision == "double" else working.kind
+    return hy.taylor_adaptive(system, zero, tol=tolerance, fp_type=fp_type, compact_mode=working.compact)
+
+
+def _start_digits(chart: str, scene: Scene) -> tuple[list[str], list[str]]:
+    """State and parameters of a chart as decimal strings of 50 digits, from the exact doubles of the scene."""
+    from mpmath import mp, workdps  # noqa: PLC0415
+
+    with workdps(60):
+        at, top = scene.start, scene.top
+        theta, phi, psi, theta_dot, phi_dot, psi_dot = (
+            mp.mpf(getattr(at, name)) for name in ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
+        )
+        s, c, sin_phi, cos_phi = mp.sin(theta), mp.cos(theta), mp.sin(phi), mp.cos(phi)
+        half, total, difference = theta / 2, (phi + psi) / 2, (phi - psi) / 2
+        nod, swing = top.I1 * theta_dot, top.I1 * phi_dot * s
+        spin = top.I3 * (psi_dot + phi_dot * c)
+        attitude = [
+            mp.cos(half) * mp.cos(total),
+            mp.sin(half) * mp.cos(difference),
+            mp.sin(half) * mp.sin(difference),
+            mp.cos(half) * mp.sin(total),
+        ]
+        axis = [s * sin_phi, -s * cos_phi, c]
+        momentum = [
+            nod * cos_phi + (spin * s - swing * c) * sin_phi,
+            nod * sin_phi - (spin * s - swing * c) * cos_phi,
+            swing * s + spin * c,
+        ]
+        state = [*(axis if chart == "axis" else attitude), *momentum]
+        twist = spin * (1 / mp.mpf(top.I3) - 1 / mp.mpf(top.I1))
+        parameters = [1 / mp.mpf(top.I1), mp.mpf(top.mgl), twist]
+        return [mp.nstr(value, 50) for value in state], [mp.nstr(value, 50) for value in parameters]
+
+
+def integrate(scene: Scene, times: charts.Array, precision: str, chart: str = "attitude") -> tuple[Any, int]:
+    """heyoka's states at increasing times, in the working precision, and the number of steps it took."""
+    stepper, working = _stepper(chart, precision), _working(precision)
+    state, parameters = _start_digits(chart, scene)
+    stepper.time = working.kind("0")
+    stepper.state[:] = [working.kind(value) for value in state]
+    stepper.pars[:] = [working.kind(value) for value in parameters[: len(stepper.pars)]]
+    grid = times if times[0] == 0.0 else np.concatenate([[0.0], times])
+    numbers = grid if precision == "double" else np.array([working.kind(float(t)) for t in grid])
+    _, _, _, steps, *_, states = stepper.propagate_grid(numbers)
+    return states[grid.size - times.size :], int(steps)
+
+
+def have_heyoka() -> bool:
+    """heyoka has wheels for Linux only."""
+    try:
+        import heyoka  # noqa: F401, PLC0415
+    except ImportError:
+        return False
+    return True
+
+
+def check_times(horizon: float) -> charts.Array:
+    """Times of the checks: denser towards the start, the last one at the horizon."""
+    return horizon * (np.arange(1, CHECKS + 1) / CHECKS) ** 2
+
+
+def _seen(scene: Scene, times: charts.Array, quaternions: Any, phis: Any, psis: Any) -> Checks:
+    """Running maxima of the errors of given attitudes and angles, against the closed form in `DIGITS` digits."""
+    from mpmath import mp, workdps  # noqa: PLC0415
+
+    from symtop.exact_mp import PreciseForm  # noqa: PLC0415
+
+    precise = PreciseForm(scene.top, scene.start, DIGITS)
+    rows = []
+    with workdps(DIGITS + 10):
+        for t, *found, phi, psi in zip(times, *quaternions.T, phis, psis, strict=True):
+            true, motion = precise.quaternion(float(t)), precise(float(t))
+            attitude = [_mpf(value) for value in found]
+            if sum(a * b for a, b in zip(attitude, true, strict=True)) < 0:
+                attitude = [-value for value in attitude]
+            turn = 2.0 * float(mp.norm([a - b for a, b in zip(attitude, true, strict=True)]))
+            tilt = float(mp.norm([a - b for a, b in zip(_axis(attitude), _axis(true), strict=True)]))
+            rows.append((turn, tilt, _turn(_mpf(phi), motion.phi), _turn(_mpf(psi), motion.psi)))
+    table = np.maximum.accumulate(np.array(rows), axis=0)
+    return Checks(times, *table.T)
+
+
+def _mpf(value: Any) -> Any:
+    from mpmath import mpf  # noqa: PLC0415
+
+    return mpf(float(value)) if isinstance(value, float) else mpf(str(value))
+
+
+def _axis(quaternion: Any) -> tuple[Any, Any, Any]:
+    w, x, y, z = quaternion
+    return 2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z
+
+
+def _turn(angle: Any, true: Any) -> float:
+    """Distance of two angles modulo a full turn."""
+    from mpmath import mp  # noqa: PLC0415
+
+    gap = (angle - true) / (2 * mp.pi)
+    return abs(float((gap - mp.nint(gap)) * 2 * mp.pi))
+
+
+def _envelope(checks: Checks, name: str, times: charts.Array) -> charts.Array:
+    """SAFETY times the largest error at any check up to the first one that is not before t."""
+    values: charts.Array = getattr(checks, name)
+    after = np.minimum(np.searchsorted(checks.times, times, side="left"), values.size - 1)
+    return SAFETY * values[after]
+
+
+def _split(values: Any) -> tuple[charts.Array, charts.Array]:
+    """High and low halves, each a double."""
+    high = values.astype(np.float64)
+    if values.dtype == np.float64:
+        return high, np.zeros_like(high)
+    return high, (values - high.astype(values.dtype)).astype(np.float64)
+
+
+def _unwrapped(angle: Any, near: charts.Array) -> Any:
+    """`angle` on the branch nearest `near`, without rounding 2 pi to double."""
+    turns = np.rint((near - angle.astype(np.float64)) / (2.0 * math.pi))
+    if angle.dtype == np.float64:
+        return angle + turns * (2.0 * math.pi)
+    kind = angle.dtype.type
+    return angle + turns.astype(angle.dtype) * kind("6.283185307179586476925286766559005768394")
+
+
+def _closed_values(scene: Scene, times: charts.Array) -> dict[str, Any]:
+    closed = closed_form(scene)
+    motion = closed(times)
+    return {
+        "theta": motion.theta,
+        "phi": motion.phi,
+        "psi": motion.psi,
+        "axis": closed.axis(times),
+        "quaternion": closed.quaternion(times),
+    }
+
+
+@functools.lru_cache(maxsize=256)
+def _closed_checks(scene: Scene, horizon: float) -> tuple[Checks, float]:
+    """Rounding errors of the closed form in double, and its distance from an integration over `OVERLAP` at most."""
+    times = check_times(horizon)
+    found = _closed_values(scene, times)
+    checks = _seen(scene, times, found["quaternion"], found["phi"], found["psi"])
+    if not have_heyoka():
+        return checks, math.nan
+    overlap = check_times(min(horizon, OVERLAP))
+    integrated, _ = integrate(scene, overlap, "longdouble")
+    gap = charts.attitude_distance(_closed_values(scene, overlap)["quaternion"], integrated[:, :4].astype(float))
+    return checks, float(np.max(gap))
+
+
+def _integrated(scene: Scene, times: charts.Array, precision: str) -> tuple[dict[str, Any], Checks]:
+    """heyoka's quantities at the times, and their errors at the check times, from one run."""
+    check = check_times(float(times[-1]))
+    grid, place = np.unique(np.concatenate([times, check]), return_inverse=True)
+    states, _ = integrate(scene, grid, precision)
+    attitude = states[:, :4]
+    theta, phi, psi = charts.angles_from_quaternion(attitude)
+    motion = closed_form(scene)(grid)
+    found = {
+        "theta": theta,
+        "phi": _unwrapped(phi, motion.phi),
+        "psi": _unwrapped(psi, motion.psi),
+        "axis": charts.axis_from_quaternion(attitude),
+        "quaternion": attitude,
+    }
+    here, there = place[: times.size], place[times.size :]
+    checks = _seen(scene, check, attitude[there], found["phi"][there], found["psi"][there])
+    return {name: values[here] for name, values in found.items()}, checks
+
+
+def _compute(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
+    """Values, low halves and bounds at increasing, distinct times."""
+    overlap = math.nan
+    if precision == "closed-form":
+        found = _closed_values(scene, times)
+        checks, overlap = _closed_checks(scene, float(times[-1]))
+        grain = 4.0 * EPSILON
+    else:
+        found, checks = _integrated(scene, times, precision)
+        grain = 8.0 * max(_working(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
+    data = xr.Dataset(coords={"time": times, "component": ["x", "y", "z"], "part": ["w", "x", "y", "z"]})
+    for name, values in found.items():
+        dims = ("time", {"axis": "component", "quaternion": "part"}[name]) if values.ndim > 1 else ("time",)
+        high, low = _split(values)
+        data[name] = (dims, high)
+        if precision != "closed-form":
+            data[f"{name}_lo"] = (dims, low)
+    for name, bound in _bounds(data, checks, grain, overlap).items():
+        data[f"{name}_error_bound"] = ("time", bound)
+    for name, value in _constants(scene).items():
+        data[name] = ("time", np.full(times.size, value))
+    data.attrs["overlap_with_integration"] = overlap
+    return data
+
+
+def _bounds(data: xr.Dataset, checks: Checks, grain: float, overlap: float) -> dict[str, charts.Array]:
+    """Error bounds from the checks; `overlap` counts in full if the closed form and an integration disagree."""
+    times = data["time"].values
+    doubt = overlap if overlap > SUSPICIOUS else 0.0
+    sine = np.maximum(np.sin(data["theta"].values), np.finfo(float).tiny)
+    axis = _envelope(checks, "axis", times) + grain + doubt
+    attitude = _envelope(checks, "attitude", times) + grain + doubt
+    # an error of the axis turns phi by 1/sin(theta) of it, and psi by the rest of the attitude's error
+    turn = np.maximum(_envelope(checks, "phi", times), axis / sine) + grain * np.abs(data["phi"].values)
+    spin = np.maximum(_envelope(checks, "psi", times), attitude + axis / sine) + grain * np.abs(data["psi"].values)
+    return {"axis": axis, "attitude": attitude, "theta": axis, "phi": turn, "psi": spin}
+
+
+def _constants(scene: Scene) -> dict[str, float]:
+    from symtop.exact_mp import PreciseForm  # noqa: PLC0415
+
+    precise = PreciseForm(scene.top, scene.start, DIGITS)
+    return {"energy": float(precise.energy), "p_phi": float(precise.p_phi), "p_psi": float(precise.p_psi)}
+
+
+def reference(scene: "str | Scene", times: ArrayLike, precision: str = "longdouble") -> xr.Dataset:
+    """The true motion at the given times, each value with a bound on its error.
+
+    Variables as `simulate` (``theta``, ``phi``, ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ``p_psi``), the low
+    halves ``theta_lo`` ... of what is known beyond double, and ``axis_error_bound``, ``attitude_error_bound``,
+    ``theta_error_bound``, ``phi_error_bound``, ``psi_error_bound`` in radians, for the sum of both halves. `precision`
+    is "longdouble" (default), "double" or "quad" for heyoka in that arithmetic, or "closed-form".
+
+    Raises SymtopError for times that are negative, not finite or none at all.
+    """
+    chosen = find_scene(scene)
+    wanted = np.asarray(times, dtype=float)
+    if wanted.ndim != 1 or wanted.size == 0 or not np.isfinite(wanted).all() or wanted.min() < 0.0:
+        msg = f"times must be a row of finite numbers of at least 0, not {times!r}"
+        raise SymtopError(msg)
+    one_of("precision", precision, PRECISIONS)
+    source = precision if have_heyoka() else "closed-form"
+    distinct, place = np.unique(wanted, return_inverse=True)
+    data = _cached(chosen, distinct, source)
+    if wanted.size != distinct.size or not np.array_equal(wanted, distinct):
+        data = data.isel(time=place)
+    return datasets.describe(
+        data, f"reference motion of {chosen.name}", scene=chosen.name, precision=source, asked_for=precision
+    )
+
+
+def _cached(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
+    if times.size > MOST_CACHED or precision == "closed-form":  # a microsecond a time, not worth a file
+        return _compute(scene, times, precision)
+    path = _cache_path(scene, times, precision)
+    if path.is_file():
+        try:
+            found = datasets.read(path)
+            if found.attrs.pop("content", "") == _content(found):
+                return found
+        except SymtopError:
+            pass
+        warnings.warn(f"the cached reference {path.name} is damaged and is computed again", SymtopWarning, stacklevel=3)
+    data = _compute(scene, times, precision)
+    try:
+        datasets.write(data.assign_attrs(content=_content(data)), path)
+    except SymtopError as error:
+        warnings.warn(f"the reference is not kept: {error}", SymtopWarning, stacklevel=3)
+    return data
+
+
+def _content(data: xr.Dataset) -> str:
+    """Hash of all values, so that a damaged file cannot pass for a good one."""
+    digest = hashlib.sha256()
+    for name in sorted(str(name) for name in data.data_vars):
+        digest.update(name.encode())
+        digest.update(np.ascontiguousarray(data[name].values).tobytes())
+    return digest.hexdigest()
+
+
+def _cache_path(scene: Scene, times: charts.Array, precision: str) -> Path:
+    from symtop.integrators.compiled import cache_root  # noqa: PLC0415
+
+    digest = hashlib.sha256(_sources().encode())
+    digest.update(repr((scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY)).encode())
+    digest.update(times.tobytes())
+    return cache_root() / "reference" / f"{digest.hexdigest()[:32]}.nc"
+
+
+@functools.lru_cache(maxsize=1)
+def _sources() -> str:
+    """Hash of the sources that a reference depends on."""
+    here = Path(__file__).resolve().parent
+    digest = hashlib.sha256()
+    for name in ("reference.py", "exact.py", "exact_mp.py", "charts.py", "top.py", "integrators/taylor.py"):
+        digest.update((here / name).read_bytes())
+    return digest.hexdigest()

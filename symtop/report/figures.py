@@ -1,0 +1,145 @@
+"""The drawings that studies share: error against a knob, residuals against time, outcome maps."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.report.style import GREY, OUTCOME_COLORS, OUTCOME_HATCHES, Look, legend_below, look, panels
+
+
+def error_curves(
+    data: xr.Dataset, scenes: Sequence[str], x: str, quantity: str, labels: tuple[str, str], judged: Mapping[Any, Any]
+) -> tuple[Any, Any]:
+    """Error of `quantity` against the variable `x`, one panel a scene, one curve an integrator.
+
+    Points listed as True in ``judged[scene, integrator]`` are filled, the others hollow; the reference's own bound is a
+    band at the bottom.
+    """
+    columns = min(2, len(scenes))
+    rows = -(-len(scenes) // columns)
+    figure, axes = panels(rows, columns)
+    for axis, scene in zip(axes.flat, scenes, strict=False):
+        floor = _band(axis, data, scene, quantity)
+        for name in data["integrator"].values:
+            cell = data.sel(scene=scene, integrator=name)
+            xs, ys = cell[x].values, np.maximum(cell[quantity].values, 0.3 * floor)
+            if not np.isfinite(ys).any():
+                continue
+            _curve(axis, xs, ys, judged.get((scene, name)), look(name), str(name), _dashed(cell))
+        axis.set(xscale="log", yscale="log", title=scene)
+        axis.grid(visible=True, which="major")
+    for axis in axes.flat[len(scenes) :]:
+        axis.set_visible(False)
+    for axis in axes[-1]:
+        axis.set_xlabel(labels[0])
+    for axis in axes[:, 0]:
+        axis.set_ylabel(labels[1])
+    legend_below(figure, axes)
+    return figure, axes
+
+
+def _dashed(cell: xr.Dataset) -> bool:
+    return "tier" in cell and "python" in cell["tier"].values
+
+
+def _band(axis: Any, data: xr.Dataset, scene: str, quantity: str) -> float:
+    bounds = data[f"{quantity}_bound"].sel(scene=scene).values
+    level = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else 1e-16
+    axis.axhspan(level * 1e-3, level, color="#BBBBBB", alpha=0.45, lw=0, label="error bound of the reference")
+    return level
+
+
+def _curve(axis: Any, xs: Any, ys: Any, judged: Any, style: Look, name: str, dashed: bool) -> None:  # noqa: FBT001
+    order = np.argsort(xs)
+    order = order[np.isfinite(xs[order]) & np.isfinite(ys[order])]
+    line = (0, (4, 2)) if dashed else "-"
+    axis.plot(xs[order], ys[order], color=style.color, ls=line, lw=1.1, zorder=2)
+    filled = np.ones(xs.size, bool) if judged is None else np.asarray(judged, bool)
+    for mask, face in ((filled, style.color), (~filled, "white")):
+        pick = order[mask[order]]
+        axis.plot(xs[pick], ys[pick], style.marker, ls="none", color=style.color, mfc=face, ms=5, zorder=3)
+    axis.plot([], [], style.marker, color=style.color, ls=line, lw=1.1, label=name)  # one entry in the legend
+
+
+def residual_history(data: xr.Dataset, scenes: Sequence[str], rows: Sequence[tuple[str, str]]) -> Any:
+    """|residual| against time, one row a conserved quantity, one column a scene: envelopes over faint samples."""
+    figure, axes = panels(len(rows), len(scenes), height=2.7, sharex="col", sharey="row")
+    for (quantity, label), line in zip(rows, axes, strict=True):
+        for axis, scene in zip(line, scenes, strict=True):
+            for name in data["integrator"].values:
+                cell = data.sel(scene=scene, integrator=name)
+                t, r = cell["sample_time"].values, np.abs(cell[f"{quantity}_residual"].values)
+                good = np.isfinite(r) & np.isfinite(t) & (t > 0.0)
+                if not good.any():
+                    continue
+                t, r = t[good], np.maximum(r[good], 1e-17)
+                style = look(str(name))
+                axis.plot(t, r, ",", color=style.color, alpha=0.5, zorder=2)
+                axis.plot(*envelope(t, r), style.marker + "-", ms=4, color=style.color, label=str(name), zorder=3)
+            axis.set(xscale="log", yscale="log")
+            if quantity == rows[0][0]:
+                axis.set_title(scene)
+        line[0].set_ylabel(label)
+    for axis in axes[-1]:
+        axis.set_xlabel("time (s)")
+    legend_below(figure, axes)
+    return figure
+
+
+def envelope(t: Any, r: Any, windows: int = 18) -> tuple[Any, Any]:
+    """Largest value in logarithmic windows of time."""
+    edges = np.geomspace(t[0] * 0.999, t[-1], windows + 1)
+    place = np.clip(np.searchsorted(edges, t, side="left") - 1, 0, windows - 1)
+    kept = np.unique(place)
+    return np.sqrt(edges[kept] * edges[kept + 1]), np.array([r[place == k].max() for k in kept])
+
+
+def outcome_strips(data: xr.Dataset, scenes: Sequence[str], verdicts: Sequence[str]) -> Any:
+    """One strip an integrator, coloured and hatched by what became of each run, against the step in nutations."""
+    names = [str(name) for name in data["integrator"].values]
+    figure, axes = panels(len(scenes), 1, height=0.55 + 0.34 * len(names), sharex=True)
+    used: set[str] = set()
+    for axis, scene in zip(axes[:, 0], scenes, strict=True):
+        for row, name in enumerate(names):
+            cell = data.sel(scene=scene, integrator=name)
+            used |= _strip(axis, row, cell["relative_step"].values, cell["verdict"].values)
+        axis.set(xscale="log", ylim=(len(names) - 0.5, -0.5), yticks=range(len(names)), yticklabels=names, title=scene)
+        axis.grid(visible=False)
+        axis.tick_params(axis="y", length=0)
+    axes[-1, 0].set_xlabel("step (nutation periods; the mean step of an adaptive method)")
+    handles = [
+        _patch(verdict) for verdict in verdicts if verdict in used
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    return figure
+
+
+def _patch(verdict: str) -> Any:
+    from matplotlib.patches import Patch  # noqa: PLC0415
+
+    return Patch(
+        facecolor=OUTCOME_COLORS[verdict], hatch=OUTCOME_HATCHES.get(verdict), edgecolor=GREY, lw=0.4,
+        label=verdict.replace("_", " "),
+    )  # fmt: skip
+
+
+def _strip(axis: Any, row: int, steps: Any, verdicts: Any) -> set[str]:
+    good = np.isfinite(steps) & (steps > 0.0) & (verdicts != "")
+    if not good.any():
+        return set()
+    order = np.argsort(steps[good])
+    x, words = steps[good][order], verdicts[good][order]
+    middle = np.sqrt(x[1:] * x[:-1])
+    ratio = middle[0] / x[0] if x.size > 1 else 1.1
+    edges = np.concatenate([[x[0] / ratio], middle, [x[-1] * ratio]])
+    start = 0
+    for k in range(1, x.size + 1):
+        if k == x.size or words[k] != words[start]:
+            axis.fill_between(
+                [edges[start], edges[k]], row - 0.38, row + 0.38, facecolor=OUTCOME_COLORS[str(words[start])],
+                hatch=OUTCOME_HATCHES.get(str(words[start])), edgecolor=GREY, lw=0.3,
+            )  # fmt: skip
+            start = k
+    return {str(word) for word in words}

@@ -1,0 +1,104 @@
+"""The report: one self-contained page from the findings that the studies left in the results folder."""
+
+import base64
+import datetime
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from symtop.checks import SymtopError
+from symtop.integrators.registry import integrators
+from symtop.scenes import scenes
+from symtop.study import run as runner
+from symtop.study import store
+
+
+def _claim(value: bool | int | None) -> str:
+    if value is None:
+        return "unknown"
+    return str(value) if not isinstance(value, bool) else "yes" if value else "no"
+
+
+def integrator_table() -> tuple[list[str], list[list[str]]]:
+    """Header and rows of the table of integrators, from the registry."""
+    header = ["name", "family", "order", "explicit", "symplectic", "symmetric", "conserves", "charts", "knob", "tier", "summary"]
+    rows = [
+        [
+            entry.name,
+            entry.family,
+            _claim(entry.order),
+            _claim(entry.explicit),
+            _claim(entry.symplectic),
+            _claim(entry.symmetric),
+            "unknown" if entry.conserves is None else ", ".join(sorted(entry.conserves)) or "nothing",
+            ", ".join(entry.charts()),
+            entry.knob or "none",
+            entry.tier,
+            entry.summary,
+        ]
+        for entry in integrators().values()
+    ]
+    return header, rows
+
+
+def scene_table() -> tuple[list[str], list[list[str]]]:
+    """Header and rows of the table of scenes."""
+    rows = []
+    for entry in scenes().values():
+        period = entry.nutation_period
+        shown = f"{period:.6g}" if math.isfinite(period) else "infinite"
+        rows.append([entry.name, f"{entry.horizon:g}", shown, entry.observes, entry.purpose])
+    return ["name", "horizon (s)", "nutation period (s)", "observes", "purpose"], rows
+
+
+def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A GitHub-flavoured table."""
+    lines = ["| " + " | ".join(row) + " |" for row in [header, *rows]]
+    return "\n".join([lines[0], "|" + "---|" * len(header), *lines[1:]])
+
+
+def _embedded(path: Path) -> str:
+    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
+
+
+def gather(results: Path) -> list[dict[str, Any]]:
+    """The findings of all studies that were run, in the order of the report, with their pictures."""
+    found = []
+    for name in runner.names():
+        findings = store.read_json(results / f"{name}.json")
+        if findings is None:
+            continue
+        for picture in findings["pictures"]:
+            picture["data"] = _embedded(results / "figures" / picture["file"])
+        findings["dataset"] = f"{name}.nc" if (results / f"{name}.nc").is_file() else ""
+        found.append(findings)
+    if not found:
+        msg = f"no study has left findings in {results}; run one first, for example: symtop study --all"
+        raise SymtopError(msg)
+    return found
+
+
+def write(results: Path) -> Path:
+    """Write ``report.html`` into the results folder and return its path."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415
+
+    environment = Environment(loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined)
+    studies = gather(results)
+    provenance = studies[-1]["provenance"]
+    text = environment.get_template("report.html").render(
+        studies=studies,
+        integrators=integrator_table(),
+        scenes=scene_table(),
+        provenance={**provenance, "dependencies": _plain(provenance["dependencies"])},
+        quick=any(study["quick"] for study in studies),
+        date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
+    )
+    target = results / "report.html"
+    store.write_text(target, text)
+    return target
+
+
+def _plain(dependencies: str) -> str:
+    return ", ".join(f"{name} {version}" for name, version in json.loads(dependencies).items())

@@ -1,0 +1,115 @@
+"""One look for every figure: an integrator has the same colour, marker and line everywhere.
+
+Colours are those of Okabe and Ito, told apart by readers with any common colour blindness; every series also has a
+marker or a line style of its own, and methods that run in plain Python are dashed wherever cost is drawn.
+"""
+
+import zlib
+from typing import Any, NamedTuple
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+
+BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
+    "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
+)  # fmt: skip
+
+
+class Look(NamedTuple):
+    """How an integrator is drawn."""
+
+    color: str
+    marker: str
+
+
+_LOOKS = {
+    "midpoint": Look(BLUE, "o"),
+    "trapezoidal": Look(SKY, "s"),
+    "stormer-verlet": Look(GREEN, "^"),
+    "rk45": Look(VERMILLION, "D"),
+    "taylor": Look(BLACK, "*"),
+    "exact": Look(GREY, "x"),
+}
+_FAMILY_COLORS = {
+    "discrete-lagrangian": BLUE,
+    "splitting": GREEN,
+    "runge-kutta": ORANGE,
+    "taylor": BLACK,
+    "library": VERMILLION,
+    "exact": GREY,
+    "other": PURPLE,
+}
+_MARKERS = "osv^<>DPXph8dH"
+
+OUTCOME_COLORS = {
+    "accurate": GREEN,
+    "bounded_but_wrong": YELLOW,
+    "drifting": ORANGE,
+    "wrong_regime": PURPLE,
+    "left_chart": VERMILLION,
+    "not_converged": BLUE,
+    "not_finite": BLACK,
+    "step_too_small": GREY,
+    "out_of_budget": SKY,
+}
+OUTCOME_HATCHES = {"wrong_regime": "\\\\\\", "left_chart": "///", "not_converged": "xxx", "step_too_small": "..."}
+
+
+def look(name: str) -> Look:
+    """Colour and marker of an integrator: a fixed one, or its family's colour and a marker from its name."""
+    if name in _LOOKS:
+        return _LOOKS[name]
+    from symtop.integrators.registry import integrators  # noqa: PLC0415
+
+    known = integrators()
+    family = known[name].family if name in known else "other"
+    return Look(_FAMILY_COLORS[family], _MARKERS[zlib.crc32(name.encode()) % len(_MARKERS)])
+
+
+def use() -> None:
+    """Set matplotlib up for the report: no display, legible at half the page's width, reproducible bytes."""
+    mpl.use("Agg")
+    plt.rcParams.update(
+        {
+            "figure.dpi": 110,
+            "savefig.dpi": 110,
+            "figure.constrained_layout.use": True,
+            "font.size": 10.0,
+            "axes.titlesize": 10.5,
+            "axes.labelsize": 10.0,
+            "legend.fontsize": 9.0,
+            "axes.grid": True,
+            "grid.color": "#DDDDDD",
+            "grid.linewidth": 0.6,
+            "axes.axisbelow": True,
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "lines.linewidth": 1.3,
+            "lines.markersize": 5.0,
+            "hatch.linewidth": 0.5,
+            "svg.hashsalt": "symtop",
+        }
+    )
+
+
+def panels(rows: int, columns: int, width: float = 9.6, height: float = 3.4, **options: Any) -> Any:
+    """A grid of axes, always two-dimensional."""
+    use()
+    return plt.subplots(rows, columns, figsize=(width, height * rows), squeeze=False, **options)
+
+
+def legend_below(figure: Any, axes: Any, columns: int = 6) -> None:
+    """One legend for the whole figure, under it."""
+    seen: dict[str, Any] = {}
+    for axis in np.ravel(axes):
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+            seen.setdefault(label, handle)
+    figure.legend(list(seen.values()), list(seen), loc="outside lower center", ncols=columns, frameon=False)
+
+
+def slope_guide(axis: Any, power: float, x: tuple[float, float], y: float, label: str) -> None:
+    """A thin reference line y ~ x^power from (x[0], y)."""
+    ends = np.array(x)
+    axis.plot(ends, y * (ends / ends[0]) ** power, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
+    axis.annotate(label, (ends[1], y * (ends[1] / ends[0]) ** power), color="#444444", fontsize=8.5, ha="right", va="bottom")
