@@ -60,7 +60,9 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         for axis, name in zip(axes.flat, scenes, strict=False):
             steps = data["step_size"].sel(scene=name).values
             span = (float(np.nanmin(steps)), float(np.nanmax(steps)))
-            style.slope_guide(axis, 2.0, (span[0], span[1]), float(np.nanmin(data[quantity].sel(scene=name))) * 3.0, "$h^2$")
+            style.slope_guide(
+                axis, 2.0, (span[0], span[1]), float(np.nanmin(data[quantity].sel(scene=name))) * 3.0, "$h^2$"
+            )
         judged = [fit.slope for fit in orders.values() if np.isfinite(fit.slope)]
         drawn.append(
             Picture(
@@ -88,7 +90,13 @@ def tables(data: xr.Dataset) -> list[Table]:
             claim = declared[key[1]].order if key[1] in declared else None
             constant = ends[key].constant
             rows.append([*key, str(claim or "unknown"), *shown, f"{constant:.4g}" if np.isfinite(constant) else ""])
-    header = ["scene", "integrator", "declared", *(f"order in {q}" for q in JUDGED), "C in attitude error C h^p at the end"]
+    header = [
+        "scene",
+        "integrator",
+        "declared",
+        *(f"order in {q}" for q in JUDGED),
+        "C in attitude error C h^p at the end",
+    ]
     return [Table("Fitted orders with 95 % intervals", header, rows)]
 
 

@@ -101,9 +101,7 @@ def rates_from_momentum(top: SymmetricTop, axis: Array, phi: Any, momentum: Arra
 
 def space_state(chart: str, top: SymmetricTop, at: Angles) -> Array:
     """State (e, L) or (q, L) of a start in one of the space-frame charts."""
-    place = (
-        axis_from_angles(at.theta, at.phi) if chart == "axis" else quaternion_from_angles(at.theta, at.phi, at.psi)
-    )
+    place = axis_from_angles(at.theta, at.phi) if chart == "axis" else quaternion_from_angles(at.theta, at.phi, at.psi)
     return np.concatenate([place, momentum_from_angles(top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)])
 
 

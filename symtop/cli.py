@@ -15,7 +15,11 @@ from symtop import __version__
 from symtop.checks import SymtopError
 
 plugin_option = click.option(
-    "--plugin", "plugin_files", multiple=True, metavar="FILE", help="A Python file that registers integrators or scenes."
+    "--plugin",
+    "plugin_files",
+    multiple=True,
+    metavar="FILE",
+    help="A Python file that registers integrators or scenes.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 
@@ -52,7 +56,10 @@ def _load_plugins(files: tuple[str, ...]) -> None:
 
 def _table(header: list[str], rows: list[list[str]]) -> str:
     widths = [max(len(row[k]) for row in [header, *rows]) for k in range(len(header))]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in [header, *rows]]
+    lines = [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in [header, *rows]
+    ]
     return "\n".join([lines[0], "  ".join("-" * width for width in widths), *lines[1:]])
 
 
@@ -81,7 +88,9 @@ def scenes(plugin_files: tuple[str, ...], as_json: bool) -> None:  # noqa: FBT00
 
     _load_plugins(plugin_files)
     header, rows = page.scene_table()
-    click.echo(json.dumps([dict(zip(header, row, strict=True)) for row in rows], indent=1) if as_json else _table(header, rows))
+    click.echo(
+        json.dumps([dict(zip(header, row, strict=True)) for row in rows], indent=1) if as_json else _table(header, rows)
+    )
 
 
 @main.command()
@@ -160,7 +169,9 @@ def study(
     failed = False
     for study_ in [runner.load(name) for name in chosen]:
         found = runner.run(study_, folder, quick=quick, fresh=fresh, jobs=jobs)
-        click.echo(f"{study_.name}: {found['computed']} of {found['cases']} cases computed, {len(found['pictures'])} figures")
+        click.echo(
+            f"{study_.name}: {found['computed']} of {found['cases']} cases computed, {len(found['pictures'])} figures"
+        )
         for failure in found["failures"]:
             click.echo(f"  {failure}", err=True)
             failed = True

@@ -210,7 +210,9 @@ class ClosedForm:
         parts = np.empty((5, times.size))
         for number, frame in enumerate(self._frames):
             pick = quarter % 2 == number
-            near, far, near_lag, far_lag, nod = self._about(frame, offset[pick], self._twists[number], self._twists[1 - number])
+            near, far, near_lag, far_lag, nod = self._about(
+                frame, offset[pick], self._twists[number], self._twists[1 - number]
+            )
             swap = (near, far, near_lag, far_lag) if number == 0 else (far, near, far_lag, near_lag)
             parts[:, pick] = (*swap, nod)
         if self._frames[0].through:  # sn changes sign at every other multiple of K, cn in between

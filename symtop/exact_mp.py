@@ -199,7 +199,9 @@ class PreciseForm:
         """How far phi + psi and phi - psi are ahead of their mean growth at time 0, counted from u = u1 at rest."""
         poles = zip(self.curve[:2], self._begun, self._complete, strict=True)
         floor, crown = (
-            pole.twist / pole.low * (begun - self.tau0 / self.K * complete) / self.Omega if pole.twist and self.Omega else 0
+            pole.twist / pole.low * (begun - self.tau0 / self.K * complete) / self.Omega
+            if pole.twist and self.Omega
+            else 0
             for pole, begun, complete in poles
         )
         return floor, crown
@@ -284,10 +286,12 @@ class PreciseForm:
         sn, cn, dn = self._jacobi(tau - 2 * turns * self.K)
         side = -1 if turns % 2 else 1
         angles, halves, ratios = [], [], []
-        for i, (pole, angle, drift, wave, sign, least, most) in enumerate((
-            (curve.floor, total, self.drift, sn, side * self.floor_sign, curve.floor.low, curve.floor.high),
-            (curve.crown, difference, -self.drift, cn, side, curve.crown.high, curve.crown.low),
-        )):
+        for i, (pole, angle, drift, wave, sign, least, most) in enumerate(
+            (
+                (curve.floor, total, self.drift, sn, side * self.floor_sign, curve.floor.low, curve.floor.high),
+                (curve.crown, difference, -self.drift, cn, side, curve.crown.high, curve.crown.low),
+            )
+        ):
             gained = 2 * turns * self._complete[i] + self._integral(pole, sn, cn) - self._begun[i]
             angles.append(angle + drift * elapsed + (pole.twist / pole.low * gained / self.Omega if pole.twist else 0))
             if least == 0:
@@ -335,7 +339,9 @@ class PreciseForm:
         return self.ctx.mpf(value.numerator) / value.denominator
 
 
-def _rationals(top: SymmetricTop | Sequence[Any], start: Angles | Sequence[Any]) -> tuple[list[Fraction], list[Fraction]]:
+def _rationals(
+    top: SymmetricTop | Sequence[Any], start: Angles | Sequence[Any]
+) -> tuple[list[Fraction], list[Fraction]]:
     """All inputs as exact fractions, checked against the model."""
     body = [top.I1, top.I3, top.mgl] if isinstance(top, SymmetricTop) else list(top)
     state = [getattr(start, name) for name in _NAMES[3:]] if isinstance(start, Angles) else list(start)

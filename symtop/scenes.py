@@ -107,8 +107,12 @@ def _catalogue() -> dict[str, Scene]:
             "the notebook's first top: violent nutation from 23 to 99 degrees",
         ),
         _goldstein("goldstein", 0.0, "the notebook's second top, released at rest (alpha = 1.4981)"),
-        _goldstein("goldstein-falling", -_ALPHA_RATE, "the second top with the printed alpha = 1.6, theta falling at first"),
-        _goldstein("goldstein-rising", _ALPHA_RATE, "the second top with the printed alpha = 1.6, theta rising at first"),
+        _goldstein(
+            "goldstein-falling", -_ALPHA_RATE, "the second top with the printed alpha = 1.6, theta falling at first"
+        ),
+        _goldstein(
+            "goldstein-rising", _ALPHA_RATE, "the second top with the printed alpha = 1.6, theta rising at first"
+        ),
         _fast_nutation("cusp", 0.0, "released from rest: the axis comes to rest again at each cusp"),
         _fast_nutation("loop", -0.3, "started against its precession: the axis draws loops"),
         _fast_nutation("wave", 0.1, "started along its precession: the axis draws a wave"),

@@ -4,16 +4,13 @@ The chart ends at theta = 0 and pi. p_phi and p_psi enter as parameters, so ever
 show them again from the increments that it produced (`observe` in `drive`).
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.checks import SymtopError
 from symtop.integrators.compiled import register_jitable
-from symtop.integrators.drive import March
-from symtop.integrators.outcomes import LEFT_CHART, NOT_FINITE, OK, OUTCOMES
-from symtop.integrators.registry import Plan, Run
+from symtop.integrators.outcomes import LEFT_CHART, NOT_FINITE, OK
 from symtop.top import Angles, SymmetricTop
 
 
@@ -51,27 +48,3 @@ def reduced(top: SymmetricTop, at: Angles) -> tuple[ReducedTop, tuple[float, ...
     momenta = top.momenta(at)
     par = ReducedTop(top.I1, top.I3, top.mgl, momenta.p_psi, momenta.north, momenta.south)
     return par, (at.theta, top.I1 * at.theta_dot, at.phi, at.psi)
-
-
-def fixed_step(
-    march: Callable[..., March], rule: Any, evaluations: int, *, implicit: bool
-) -> Callable[[SymmetricTop, Angles, Plan], Run]:
-    """Adapt a compiled loop to the registry; `evaluations` is the cost of one unit of the kernel's work."""
-
-    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        par, state = reduced(top, start)
-        done = march(par, rule, state, plan.step_size, plan.marks)
-        momenta = done.momenta
-        momenta[plan.marks == 0] = top.momenta(start)[:2]
-        return Run(
-            states=done.states,
-            p_phi=momenta[:, 0],
-            p_psi=momenta[:, 1],
-            steps=done.steps,
-            force_evaluations=done.work * evaluations,
-            newton_iterations=done.work if implicit else 0,
-            outcome=OUTCOMES[done.outcome],
-            reached=done.steps * plan.step_size,
-        )
-
-    return solve

@@ -31,8 +31,9 @@ import numpy as np
 
 from symtop.integrators.compiled import register_jitable
 from symtop.checks import SymtopError, finite
-from symtop.integrators.angles import chart_outcome, fixed_step
+from symtop.integrators.angles import chart_outcome, reduced
 from symtop.integrators.drive import driver
+from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.outcomes import NOT_CONVERGED
 from symtop.integrators.registry import Integrator
 
@@ -229,7 +230,7 @@ def discrete_lagrangian(
         name=name,
         family="discrete-lagrangian",
         summary=summary or f"discrete Lagrangian with nodes {points} and weights {shares}",
-        solvers={"angles": fixed_step(march, Quadrature(points, shares), fresh, implicit=True)},
+        solvers={"angles": fixed_step(march, Quadrature(points, shares), reduced, fresh, implicit=True)},
         order=order,
         explicit=False,
         symplectic=True,
@@ -243,5 +244,7 @@ def built_in() -> list[Integrator]:
     """The rules that ship with symtop."""
     return [
         discrete_lagrangian("midpoint", (0.5,), (1.0,), order=2, summary="discrete Lagrangian, midpoint rule"),
-        discrete_lagrangian("trapezoidal", (0.0, 1.0), (0.5, 0.5), order=2, summary="discrete Lagrangian, trapezoidal rule"),
+        discrete_lagrangian(
+            "trapezoidal", (0.0, 1.0), (0.5, 0.5), order=2, summary="discrete Lagrangian, trapezoidal rule"
+        ),
     ]

@@ -52,7 +52,9 @@ def _accumulate(state: Any, low: Any, dstate: Any) -> Any:
     return state, low
 
 
-def driver(begin: Callable[..., Any], increment: Callable[..., Any], observe: Callable[..., Any]) -> Callable[..., March]:
+def driver(
+    begin: Callable[..., Any], increment: Callable[..., Any], observe: Callable[..., Any]
+) -> Callable[..., March]:
     """Compile the loop around one kernel family.
 
     The returned function runs ``march(par, rule, state, h, marks)`` and records the state after

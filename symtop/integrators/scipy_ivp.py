@@ -57,9 +57,7 @@ def solver(method: str) -> Callable[[SymmetricTop, Angles, Plan], Run]:
         outcome = "ok"
         with np.errstate(all="ignore"):
             method_class = getattr(integrate, method)
-            stepper = method_class(
-                euler_lagrange(top), 0.0, y0, plan.horizon, rtol=plan.tolerance, atol=plan.tolerance
-            )
+            stepper = method_class(euler_lagrange(top), 0.0, y0, plan.horizon, rtol=plan.tolerance, atol=plan.tolerance)
             while stepper.status == "running" and outcome == "ok":
                 try:
                     stepper.step()

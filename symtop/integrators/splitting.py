@@ -25,8 +25,9 @@ from numba.cpython.unsafe.tuple import tuple_setitem
 from symtop import top as model
 from symtop.integrators.compiled import register_jitable
 from symtop.checks import SymtopError, finite
-from symtop.integrators.angles import chart_outcome, fixed_step
+from symtop.integrators.angles import chart_outcome, reduced
 from symtop.integrators.drive import driver
+from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.registry import Integrator
 
 
@@ -151,7 +152,7 @@ def composition(
         name=name,
         family="splitting",
         summary=summary or f"splitting with {len(drifts)} drifts",
-        solvers={"angles": fixed_step(march, rule, 1, implicit=False)},
+        solvers={"angles": fixed_step(march, rule, reduced, 1, implicit=False)},
         order=order,
         explicit=True,
         symplectic=True,

@@ -44,7 +44,9 @@ def _batch(function: Callable[[], object], calls: int) -> float:
     return time.perf_counter() - start
 
 
-def timings(functions: Sequence[Callable[[], object]], batches: int = 5, batch: float = BATCH, seed: int = 0) -> list[Timing]:
+def timings(
+    functions: Sequence[Callable[[], object]], batches: int = 5, batch: float = BATCH, seed: int = 0
+) -> list[Timing]:
     """Time several functions against each other."""
     firsts, calls = [], []
     for function in functions:

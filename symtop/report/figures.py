@@ -109,9 +109,7 @@ def outcome_strips(data: xr.Dataset, scenes: Sequence[str], verdicts: Sequence[s
         axis.grid(visible=False)
         axis.tick_params(axis="y", length=0)
     axes[-1, 0].set_xlabel("step (nutation periods; the mean step of an adaptive method)")
-    handles = [
-        _patch(verdict) for verdict in verdicts if verdict in used
-    ]
+    handles = [_patch(verdict) for verdict in verdicts if verdict in used]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
     return figure
 

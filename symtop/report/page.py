@@ -23,7 +23,19 @@ def _claim(value: bool | int | None) -> str:
 
 def integrator_table() -> tuple[list[str], list[list[str]]]:
     """Header and rows of the table of integrators, from the registry."""
-    header = ["name", "family", "order", "explicit", "symplectic", "symmetric", "conserves", "charts", "knob", "tier", "summary"]
+    header = [
+        "name",
+        "family",
+        "order",
+        "explicit",
+        "symplectic",
+        "symmetric",
+        "conserves",
+        "charts",
+        "knob",
+        "tier",
+        "summary",
+    ]
     rows = [
         [
             entry.name,
@@ -84,7 +96,9 @@ def write(results: Path) -> Path:
     """Write ``report.html`` into the results folder and return its path."""
     from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415
 
-    environment = Environment(loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined)
+    environment = Environment(
+        loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined
+    )
     studies = gather(results)
     provenance = studies[-1]["provenance"]
     text = environment.get_template("report.html").render(

@@ -112,4 +112,6 @@ def slope_guide(axis: Any, power: float, x: tuple[float, float], y: float, label
     """A thin reference line y ~ x^power from (x[0], y)."""
     ends = np.array(x)
     axis.plot(ends, y * (ends / ends[0]) ** power, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
-    axis.annotate(label, (ends[1], y * (ends[1] / ends[0]) ** power), color="#444444", fontsize=8.5, ha="right", va="bottom")
+    axis.annotate(
+        label, (ends[1], y * (ends[1] / ends[0]) ** power), color="#444444", fontsize=8.5, ha="right", va="bottom"
+    )

@@ -1,9 +1,9 @@
 """Where a study's results live: one file a case, one dataset a study, written whole or not at all.
 
-    results/cases/STUDY/SCENE--INTEGRATOR--DIGEST.nc     what one case measured
-    results/STUDY.nc                                     all of them, with labelled dimensions
-    results/STUDY.json                                   verdict, tables and captions for the report
-    results/figures/STUDY-NAME.png
+results/cases/STUDY/SCENE--INTEGRATOR--DIGEST.nc     what one case measured
+results/STUDY.nc                                     all of them, with labelled dimensions
+results/STUDY.json                                   verdict, tables and captions for the report
+results/figures/STUDY-NAME.png
 """
 
 import json

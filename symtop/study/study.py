@@ -17,7 +17,16 @@ import xarray as xr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NUMERICS = ("top.py", "charts.py", "scenes.py", "exact*.py", "reference.py", "simulate.py", "integrators/*.py", "measure/*.py")
+NUMERICS = (
+    "top.py",
+    "charts.py",
+    "scenes.py",
+    "exact*.py",
+    "reference.py",
+    "simulate.py",
+    "integrators/*.py",
+    "measure/*.py",
+)
 
 
 class Picture(NamedTuple):
