@@ -21,14 +21,15 @@ class Look(NamedTuple):
 
     color: str
     marker: str
+    size: float = 5.0
 
 
 _LOOKS = {
-    "midpoint": Look(BLUE, "o"),
+    "midpoint": Look(BLUE, "o", 8.0),
     "trapezoidal": Look(SKY, "s"),
     "stormer-verlet": Look(GREEN, "^"),
     "rk45": Look(VERMILLION, "D"),
-    "taylor": Look(BLACK, "*"),
+    "taylor": Look(BLACK, "*", 8.0),
     "exact": Look(GREY, "x"),
 }
 _FAMILY_COLORS = {
