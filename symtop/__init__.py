@@ -36,7 +36,8 @@ _HOME = {
     "ClosedForm": "exact",
 }
 
-__all__ = ["__version__", *sorted(_HOME)]
+__all__ = ["__version__"]
+__all__ += sorted(_HOME)
 
 
 class _Package(ModuleType):

@@ -21,8 +21,8 @@ relatively accurate at both turning points, however closely the axis grazes a po
 
 The phase and the secular angles are products of t with rates of two doubles, so that the error of theta does not grow
 with time, and that of phi and psi only as their last digit does. Cost: 0.2 microseconds a time; no special functions.
-Sources: Klein and Sommerfeld, Theory of the Top, chapter 6; Whittaker and Watson, A Course of Modern Analysis,
-chapter 21. Not to be confused with the small-nutation approximation: nothing is expanded in the amplitude.
+Not to be confused with the small-nutation approximation: nothing is expanded in the amplitude. Sources: Klein and
+Sommerfeld, Theory of the Top, chapter 6; Whittaker and Watson, A Course of Modern Analysis, chapter 21.
 """
 
 from collections.abc import Iterable
@@ -91,7 +91,8 @@ class ClosedForm:
 
     Construction takes 15 ms (constants in 40 digits), evaluation 0.2 microseconds a time. Errors, measured against 50
     digits for times up to 1e6: theta 1e-15; phi and psi one unit in the last place plus 1e-15; axis and quaternion
-    1e-15. Methods take times of any shape and raise `SymtopError` for any that is not finite.
+    1e-15. Methods take times of any shape and raise `SymtopError` for any that is not finite; so does construction
+    if the axis comes within 1e-145 of a pole without meeting it.
 
     `nutation_period` is that of small nutations for a steady precession, and infinite where the axis stands on an
     unstable pole; `phi_per_period`, `psi_per_period` are the mean growth over it (0 if the mean rate is 0) and
@@ -118,8 +119,10 @@ class ClosedForm:
             self._signs = tuple(float(ctx.sign(pole.twist)) for pole in curve[:2])
             self._floor_sign = float(form.floor_sign)
             self._twists = tuple(float(ctx.sqrt(abs(pole.twist)) / 2) for pole in curve[:2])
-            least = min(curve.floor.low, curve.crown.high)
-            self._may_stop = self._signs[0] * self._signs[1] < 0.0 and least > 1e-100
+            self._may_stop = self._signs[0] * self._signs[1] < 0.0  # phi' can vanish
+            if any(0 < gap < 1e-290 for gap in (curve.floor.low, curve.crown.high, curve.m1)):
+                msg = f"the axis must stay 1e-145 away from poles it does not meet (use PreciseForm), not as {start!r}"
+                raise SymtopError(msg)
             self._quarters = (_pair(form.Omega / form.K), _pair(form.tau0 / form.K))
             self._hyperbolic, self._scale, self._bend, self._frames = _expand(form)
 
@@ -192,8 +195,8 @@ class ClosedForm:
         nearest = np.rint(high)
         quarter = np.mod(nearest, 4.0).astype(np.intp)
         offset = (high - nearest) + low
-        parts = np.empty((6, times.size))
-        for number, order in enumerate(((0, 1, 2, 3, 4, 5), (1, 0, 3, 2, 4, 5))):
+        parts = np.empty((7, times.size))
+        for number, order in enumerate(((0, 1, 2, 3, 4, 5, 6), (1, 0, 3, 2, 4, 5, 6))):
             pick = quarter % 2 == number
             about = self._about(number, offset[pick])
             parts[:, pick] = [about[i] for i in order]
@@ -202,21 +205,22 @@ class ClosedForm:
                 sign = np.array(signs)[quarter] * (1.0 if number else self._floor_sign)
                 parts[number] *= sign
                 parts[4] *= sign
-        parts[5] = self._precession(*parts[[0, 1, 5]])
-        return _Wave(*parts)
+        return _Wave(*parts[:5], self._precession(*parts[:2], *parts[5:]))
 
-    def _precession(self, down: Array, up: Array, lean: Array) -> Array:
-        """phi' = (b - a u)/(1 - u^2), or its two fractions if they have the same sign, which holds up near a pole."""
-        if self._may_stop:
-            return lean / (2.0 * down * up) ** 2
-        rate = np.zeros_like(down)
+    def _precession(self, down: Array, up: Array, lean: Array, size: Array) -> Array:
+        """phi' as the sum of its two fractions, or as (b - a u)/(1 - u^2) where these cancel; `size` is that of b, a u."""
+        rate, fractions = np.zeros_like(down), np.zeros_like(down)
         for half, twist, sign in zip((down, up), self._twists, self._signs, strict=True):
             if sign:
-                rate += sign * (twist / np.where(half == 0.0, 1.0, half)) ** 2
+                fraction = (twist / half) ** 2
+                rate, fractions = rate + sign * fraction, fractions + fraction
+        if self._may_stop:
+            sine2 = (2.0 * down * up) ** 2
+            rate = np.where(size < fractions * sine2, lean / sine2, rate)
         return rate
 
     def _about(self, number: int, offset: Array) -> tuple[Array, ...]:
-        """Moduli and lags of the near and far half, theta' and b - a u, `offset` quarter periods from u1 or u2."""
+        """Moduli and lags of near and far half, theta', b - a u and its size, `offset` quarter periods from u1 or u2."""
         frame, angle = self._frames[number], self._scale * offset
         near, far = frame.near, frame.far
         if self._hyperbolic:
@@ -234,10 +238,11 @@ class ClosedForm:
         per_near = 1.0 / near_odd if frame.through else odd / near_size
         square = near_size * near_size + far_size * far_size  # theta_4(z)^2
         nod = frame.steepness * even * per_near * _cubic(self._bend, 2.0 * twice * twice - 1.0) / (far_size * square)
-        lean = frame.lean[0] + frame.lean[1] * (odd * _cubic(self._bend, twice)) ** 2 / square
+        leaning = frame.lean[1] * (odd * _cubic(self._bend, twice)) ** 2 / square
+        lean, size = frame.lean[0] + leaning, abs(frame.lean[0]) + np.abs(leaning)
         near_lag = self._signs[number] * (np.arctan2(near_imag, near_real) - near.growth * offset)
         far_lag = self._signs[1 - number] * (np.arctan2(far_imag, far_real) - far.growth * offset)
-        return near_size / np.sqrt(square), far_size / np.sqrt(square), near_lag, far_lag, nod, lean
+        return near_size / np.sqrt(square), far_size / np.sqrt(square), near_lag, far_lag, nod, lean, size
 
 
 def _expand(form: PreciseForm) -> tuple[bool, float, Cubic, tuple[_Frame, ...]]:

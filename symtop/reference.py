@@ -1,11 +1,12 @@
 """Certified truth: two independent methods, and their disagreement as an error bound.
 
 `reference` integrates the space-frame equations with heyoka in double, long double or quadruple precision (never in
-angles, which lose digits near a pole), at a tolerance of a hundredth of the rounding unit, from a start that is built
-in 60 digits. The closed form, evaluated in `DIGITS` digits at `CHECKS` times, shows the error of that run. The error of an
-integration grows, so the bound at a time t is `SAFETY` times the largest error seen at any check up to the next one after
-t, plus the rounding of what is stored. With ``precision="closed-form"`` the roles are exchanged: the values are the closed
-form in double, which does not lose digits with time, and the long double integration is what checks it.
+angles, which lose digits near a pole), at a tolerance of a hundredth of the rounding unit, from a start that is
+built in 60 digits. The closed form, evaluated in `DIGITS` digits at `CHECKS` times, shows the error of that run. The
+error of an integration grows, so the bound at a time t is `SAFETY` times the largest error seen at any check up to the
+next one after t, plus the rounding of what is stored. With ``precision="closed-form"`` the values are the closed form in
+double, which does not lose digits with time: its rounding is checked in the same way, and its mathematics against
+the long double integration.
 
 Values beyond double are stored as pairs, ``theta + theta_lo``. A result is cached on disk under a hash of the top, the
 start, the times, the precision and the sources; a damaged cache file is noticed, said and computed again.
@@ -328,7 +329,8 @@ def _cached(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
                 return found
         except SymtopError:
             pass
-        warnings.warn(f"the cached reference {path.name} is damaged and is computed again", SymtopWarning, stacklevel=3)
+        said = f"the cached reference {path.name} is damaged and is computed again"
+        warnings.warn(said, SymtopWarning, stacklevel=3)
     data = _compute(scene, times, precision)
     try:
         datasets.write(data.assign_attrs(content=_content(data)), path)

@@ -29,9 +29,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.integrators.compiled import register_jitable
 from symtop.checks import SymtopError, finite
 from symtop.integrators.angles import chart_outcome, reduced
+from symtop.integrators.compiled import register_jitable
 from symtop.integrators.drive import driver
 from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.outcomes import NOT_CONVERGED

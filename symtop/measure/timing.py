@@ -93,4 +93,3 @@ def time_settings(
             "reliable": ("setting", [float(timing.reliable) for timing in found]),
         }
     )
-

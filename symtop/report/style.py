@@ -95,9 +95,9 @@ def use() -> None:
 
 
 def panels(rows: int, columns: int, width: float = 9.6, height: float = 3.4, **options: Any) -> Any:
-    """A grid of axes, always two-dimensional."""
+    """A grid of axes, always two-dimensional, with room for a legend below."""
     use()
-    return plt.subplots(rows, columns, figsize=(width, height * rows), squeeze=False, **options)
+    return plt.subplots(rows, columns, figsize=(width, height * rows + 0.8), squeeze=False, **options)
 
 
 def legend_below(figure: Any, axes: Any, columns: int = 6) -> None:

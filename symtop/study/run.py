@@ -89,9 +89,9 @@ def _measure_all(study: Study, missing: dict[Path, Case], jobs: int, quiet: bool
                 for path, case in missing.items()
             }
             for future in as_completed(futures):
-                error = future.exception()
-                if error is not None:
-                    failures.append(_failure(futures[future], error))
+                problem = future.exception()
+                if problem is not None:
+                    failures.append(_failure(futures[future], problem))
                 bar.update()
     return failures
 
