@@ -135,8 +135,8 @@ STUDY = Study(
     question="Where does each method fail as its step grows, and how?",
     how_to_read=(
         "Each strip is one method; from left to right the step grows. Green is accurate. Yellow looks healthy and is "
-        "wrong: energy bounded, phase lost. The hatched colours are runs that ended early or went where the true motion never "
-        "goes. Adaptive methods, on the right, are shown against their tolerance."
+        "wrong: energy bounded, phase lost. Hatched runs ended early or went where the true motion "
+        "never goes. Adaptive methods, on the right, are shown against their tolerance."
     ),
     cases=cases,
     measure=measure,

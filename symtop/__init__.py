@@ -36,8 +36,7 @@ _HOME = {
     "ClosedForm": "exact",
 }
 
-__all__ = ["__version__"]
-__all__ += sorted(_HOME)
+__all__ = ["__version__", *_HOME]  # noqa: PLE0604  (strings all)
 
 
 class _Package(ModuleType):

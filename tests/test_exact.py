@@ -559,6 +559,14 @@ def test_values_outside_the_model_are_refused(body, state, words):
         PreciseForm(body, state)
 
 
+def test_poles_missed_by_less_than_double_precision_can_hold_are_left_to_the_precise_form():
+    top, start = SymmetricTop(1.0, 0.5, 1.0), Angles(1e-160, 0.0, 0.0, 0.3, 0.4, 0.5)
+    with pytest.raises(SymtopError, match="must meet a pole or miss it by 1e-145"):
+        ClosedForm(top, start)
+    assert PreciseForm(top, start).theta_range[0] > 0
+    assert ClosedForm(top, dataclasses.replace(start, theta=1e-60)).theta_range[0] < 1e-119
+
+
 def test_kinds_of_numbers_that_mean_the_same_give_the_same():
     mixed = PreciseForm((mp.mpf(2), 1, "26.5"), ("0.5", 0.125, mp.mpf("0.25"), "0", 10, -0.5))
     floats = PreciseForm(SymmetricTop(2.0, 1.0, 26.5), Angles(0.5, 0.125, 0.25, 0.0, 10.0, -0.5))

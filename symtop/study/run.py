@@ -37,7 +37,7 @@ def folder() -> Path:
 
 def names() -> list[str]:
     """Names of all studies, in the order of the report."""
-    order = ["convergence", "work_precision", "drift", "stability"]
+    order = ["truth", "convergence", "work_precision", "drift", "stability", "reduction"]
     found = sorted(path.stem for path in folder().glob("*.py") if not path.stem.startswith("_"))
     return [name for name in order if name in found] + [name for name in found if name not in order]
 
