@@ -324,7 +324,7 @@ def _constants(scene: Scene) -> dict[str, float]:
 def reference(scene: "str | Scene", times: ArrayLike, precision: str = "longdouble") -> xr.Dataset:
     """The true motion at the given times, each value with a bound on its error.
 
-    Variables as `simulate` (``theta``, ``phi``, ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ``p_psi``), the
+    Variables as `simulate` (``theta``, ``phi``, ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ...), the
     low halves ``theta_lo`` ... of what is known beyond double, and ``axis_error_bound``, ``attitude_error_bound``,
     ``theta_error_bound``, ``phi_error_bound``, ``psi_error_bound`` in radians, for the sum of both halves. `precision`
     is "longdouble" (default), "double" or "quad" for heyoka in that arithmetic, or "closed-form".

@@ -1,6 +1,7 @@
 """How far each source of truth can be trusted: its error and its cost against the horizon."""
 
 import time
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -51,16 +52,16 @@ def source_errors(scene: Scene, source: str, horizons: list[float]) -> xr.Datase
     return data
 
 
-def _axes(scene: Scene, times: charts.Array, precision: str, chart: str) -> object:
+def _axes(scene: Scene, times: charts.Array, precision: str, chart: str) -> Any:
     if precision == "closed-form":
         return closed_form(scene).axis(times)
     states, _ = integrate(scene, times, precision, chart)
     return states[:, :3] if chart == "axis" else charts.axis_from_quaternion(states[:, :4])
 
 
-def _distance(found: object, true: tuple[object, ...]) -> float:
+def _distance(found: Any, true: Any) -> float:
     """Length of the difference of two axes, one in any arithmetic and one in 45 digits."""
     from mpmath import mp, mpf, workdps  # noqa: PLC0415
 
     with workdps(50):
-        return float(mp.norm([mpf(str(a)) - b for a, b in zip(found, true, strict=True)]))  # type: ignore[call-overload]
+        return float(mp.norm([mpf(str(a)) - b for a, b in zip(found, true, strict=True)]))
