@@ -32,14 +32,15 @@ _LOOKS = {
     "taylor": Look(BLACK, "*", 8.0),
     "exact": Look(GREY, "x"),
 }
-_FAMILY_COLORS = {
-    "discrete-lagrangian": BLUE,
-    "splitting": GREEN,
-    "runge-kutta": ORANGE,
-    "taylor": BLACK,
-    "library": VERMILLION,
-    "exact": GREY,
-    "other": PURPLE,
+# Shades of a family: light enough to tell apart, of one hue so that families stay together.
+_SHADES = {
+    "discrete-lagrangian": (BLUE, "#7B9FD1", "#1B3A6B"),
+    "splitting": (GREEN, "#7CC9A8", "#00563F"),
+    "runge-kutta": (ORANGE, "#B37400", "#F5C766"),
+    "taylor": (BLACK, "#555555", "#999999"),
+    "library": (VERMILLION, "#F09A66", "#8A3C00"),
+    "exact": (GREY,),
+    "other": (PURPLE, "#8C4A73", "#E6B8D2"),
 }
 _MARKERS = "osv^<>DPXph8dH"
 
@@ -58,14 +59,17 @@ OUTCOME_HATCHES = {"wrong_regime": "\\\\\\", "left_chart": "///", "not_converged
 
 
 def look(name: str) -> Look:
-    """Colour and marker of an integrator: a fixed one, or its family's colour and a marker from its name."""
+    """Colour and marker of an integrator: a fixed one, or a shade of its family and a marker by its place in it."""
     if name in _LOOKS:
         return _LOOKS[name]
     from symtop.integrators.registry import integrators  # noqa: PLC0415
 
     known = integrators()
     family = known[name].family if name in known else "other"
-    return Look(_FAMILY_COLORS[family], _MARKERS[zlib.crc32(name.encode()) % len(_MARKERS)])
+    peers = [entry.name for entry in known.values() if entry.family == family and entry.name not in _LOOKS]
+    place = peers.index(name) if name in peers else zlib.crc32(name.encode())
+    shades = _SHADES[family]
+    return Look(shades[place % len(shades)], _MARKERS[place % len(_MARKERS)])
 
 
 def use() -> None:
