@@ -114,8 +114,8 @@ def verdict(data: xr.Dataset) -> list[str]:
         last = closed.sel(horizon=known.max())
         sentences.append(
             f"On spheroid the closed form in double has an axis error of {float(last['axis']):.1e} rad at t = "
-            f"{float(known.max()):g}. This is known from the same formula in 45 digits, whose rounding cannot "
-            "reach the sixteenth digit, and the formula itself from the quadruple-precision integration, which agrees with it to "
+            f"{float(known.max()):g}. This is known from the same formula in 45 digits, whose rounding cannot reach "
+            "the sixteenth digit, and the formula from the quadruple-precision integration, which agrees with it to "
             f"{float(data['axis'].sel(scene='spheroid', integrator='quadruple, attitude').max()):.0e}."
         )
     return sentences

@@ -203,8 +203,8 @@ def _excess(top, start, precise, times):
         theta, phi, psi = (abs(ours[i] - exact) for ours, exact in zip(motion[:3], true[:3], strict=True))
         worst = np.maximum(worst, [
             float(theta) / (1e-15 if true.theta < 2.0 else 2.0 * math.ulp(math.pi)),
-            float(phi / (2.0 * EPS * abs(true.phi) + 1e-15)),
-            float(psi / (2.0 * EPS * abs(true.psi) + 1e-15)),
+            float(phi / (EPS * abs(true.phi) + 1e-15)),
+            float(psi / (EPS * abs(true.psi) + 1e-15)),
             float(max(abs(x - y) for x, y in zip(attitude[i], precise.quaternion(time), strict=True))) / 1e-15,
             float(max(abs(x - y) for x, y in zip(axis[i], precise.axis(time), strict=True))) / 1e-15,
         ])  # fmt: skip
