@@ -48,33 +48,42 @@ def fits(data: xr.Dataset, quantity: str) -> dict[tuple[str, str], Fit]:
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
-    """Attitude and energy error against the step."""
-    scenes = [str(name) for name in data["scene"].values]
-    drawn = []
-    for quantity in ("attitude", "energy"):
-        orders = fits(data, quantity)
-        figure, axes = figures.error_curves(
-            data, scenes, "step_size", quantity, ("step size (s)", f"largest {QUANTITIES[quantity]}"),
-            {key: fit.used for key, fit in orders.items()},
-        )  # fmt: skip
-        for axis, name in zip(axes.flat, scenes, strict=False):
-            steps = data["step_size"].sel(scene=name).values
-            span = (float(np.nanmin(steps)), float(np.nanmax(steps)))
-            style.slope_guide(
-                axis, 2.0, (span[0], span[1]), float(np.nanmin(data[quantity].sel(scene=name))) * 0.2, "$h^2$"
-            )
-        judged = [fit.slope for fit in orders.values() if np.isfinite(fit.slope)]
-        drawn.append(
-            Picture(
-                quantity,
-                figure,
-                f"Largest {quantity} error over the run against the step. Filled points enter the fit, hollow ones do "
-                f"not: too large, or within ten times of the reference's own error (grey band). "
-                f"Fitted orders lie between {min(judged):.3f} and {max(judged):.3f}.",
-                f"Log-log plots of {quantity} error against step size, {len(scenes)} scenes: straight lines.",
-            )
-        )
+    """Attitude error against the step, a figure for each declared order; energy error of second-order methods."""
+    declared = integrators()
+    groups: dict[int, list[str]] = {}
+    for name in data["integrator"].values:
+        claim = declared[str(name)].order if str(name) in declared else None
+        groups.setdefault(claim or 0, []).append(str(name))
+    drawn = [_picture(data.sel(integrator=names), "attitude", power) for power, names in sorted(groups.items())]
+    if 2 in groups:
+        drawn.append(_picture(data.sel(integrator=groups[2]), "energy", 2))
     return drawn
+
+
+def _picture(data: xr.Dataset, quantity: str, power: int) -> Picture:
+    scenes = [str(name) for name in data["scene"].values]
+    orders = fits(data, quantity)
+    labels = ("step size (s)", f"largest {QUANTITIES[quantity]}")
+    judged = {key: fit.used for key, fit in orders.items()}
+    figure, axes = figures.error_curves(data, scenes, "step_size", quantity, labels, judged)
+    for axis, name in zip(axes.flat, scenes, strict=False):
+        steps, errors = data["step_size"].sel(scene=name).values, data[quantity].sel(scene=name).values
+        if power and np.isfinite(errors).any():
+            coarse = float(np.nanmax(steps))
+            span = (coarse * (1e-12 / np.nanmax(errors)) ** (1.0 / power), coarse)
+            style.slope_guide(axis, power, span, 0.2 * 1e-12, f"$h^{{{power}}}$")
+    slopes = [fit.slope for fit in orders.values() if np.isfinite(fit.slope)]
+    range_ = (
+        f"Fitted orders lie between {min(slopes):.3f} and {max(slopes):.3f}." if slopes else "None could be fitted."
+    )
+    title = f"methods of order {power}" if power else "methods of unknown order"
+    return Picture(
+        f"{quantity}-order-{power}",
+        figure,
+        f"Largest {quantity} error over the run against the step, {title}. Filled points enter the fit, hollow ones do "
+        f"not: too large, or within ten times of the reference's own error (grey band). {range_}",
+        f"Log-log plots of {quantity} error against step size, {title}: straight lines parallel to the guide.",
+    )
 
 
 def tables(data: xr.Dataset) -> list[Table]:

@@ -35,10 +35,10 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from symtop.checks import SymtopError, whole
+from symtop.exact_numbers import rational, rationals, real_roots
 from symtop.top import Angles, SymmetricTop
 
 GUARD_DIGITS, MOST_DIGITS = 30, 20_000  # the latter resolves relative gaps between roots down to 1e-5000
-_NAMES = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
 
 
 class PreciseMotion(NamedTuple):
@@ -93,7 +93,7 @@ class PreciseForm:
 
         self.digits = whole("digits", digits, 1)
         self.ctx: Any = MPContext()  # private: the precision of the caller's mpmath is neither used nor changed
-        body, state = _rationals(top, start)
+        body, state = rationals(top, start)
         self.facing = -1 if body[2] < 0 else 1
         self.ctx.dps = 4 * (self.digits + GUARD_DIGITS)
         while not self._resolve(body, state):
@@ -125,7 +125,7 @@ class PreciseForm:
         lead = facing * self.beta
         curvature = 2 * self.beta * cosine - kinetic - self.a**2
         slope = facing * (sine2 * torque - 2 * cosine * real(theta_dot**2))
-        x1, x2, x3 = _real_roots(ctx, sine2 * real(theta_dot**2), slope, curvature, lead)  # of u'^2 in u - u(0)
+        x1, x2, x3 = real_roots(ctx, sine2 * real(theta_dot**2), slope, curvature, lead)  # of u'^2 in u - u(0)
         up, down, twist_up, twist_down = (above, below, north, south) if facing > 0 else (below, above, south, north)
         rests = x1 == x2
         if twist_down == 0 and not rests:
@@ -237,7 +237,7 @@ class PreciseForm:
         ctx, (floor, crown, *_, start_sn2, start_cn2) = self.ctx, self.curve
         scale, quarter, heights = ctx.pi / (2 * self.K), ctx.pi / 2, self.zero_heights()
         nome = ctx.exp(-ctx.pi * self.K1 / self.K) if self.m else ctx.zero
-        passed = self.Omega * self._real(_rational("time", time))
+        passed = self.Omega * self._real(rational("time", time))
         start, now = scale * self.tau0, scale * (self.tau0 + passed)
         halves = []
         for pole, height, angle, drift, distance, far, on_pole in (
@@ -258,7 +258,7 @@ class PreciseForm:
     def _state(self, time: Any) -> tuple[Any, Any, Any, Any, Any]:
         """sqrt((1 + u)/2) and sqrt((1 - u)/2), signed, phi + psi, phi - psi and theta', all in the upright picture."""
         ctx, curve = self.ctx, self.curve
-        elapsed = self._real(_rational("time", time))
+        elapsed = self._real(rational("time", time))
         if curve.swing == 0:
             angles = [angle + rate * elapsed for angle, rate in zip(self.angles0, self.mean_rates, strict=True)]
             return ctx.sqrt(curve.floor.low / 2), ctx.sqrt(curve.crown.low / 2), angles[0], angles[1], ctx.zero
@@ -320,67 +320,11 @@ class PreciseForm:
         return self.ctx.mpf(value.numerator) / value.denominator
 
 
-def _rationals(top: SymmetricTop | Sequence[Any], start: Angles | Sequence[Any]) -> list[list[Fraction]]:
-    """Parameters and start as exact fractions, checked against the model."""
-    body = [top.I1, top.I3, top.mgl] if isinstance(top, SymmetricTop) else list(top)
-    state = [getattr(start, name) for name in _NAMES[3:]] if isinstance(start, Angles) else list(start)
-    if len(body) != 3 or len(state) != 6:
-        msg = f"the closed form takes (I1, I3, mgl) and six angles and rates, not {len(body)} and {len(state)} numbers"
-        raise SymtopError(msg)
-    values = [_rational(name, value) for name, value in zip(_NAMES, [*body, *state], strict=True)]
-    SymmetricTop(*map(float, values[:3]))
-    Angles(*map(float, values[3:]))
-    return [values[:3], values[3:]]
-
-
-def _rational(name: str, value: Any) -> Fraction:
-    """The exact value of a float, integer, fraction, decimal string or mpf."""
-    from mpmath.libmp import to_rational  # noqa: PLC0415
-
-    try:
-        if hasattr(value, "_mpf_"):
-            return Fraction(*map(int, to_rational(value._mpf_)))
-        return Fraction(value if isinstance(value, str | int | Fraction) else float(value))
-    except (TypeError, ValueError, OverflowError, ZeroDivisionError):
-        msg = f"{name} must be a finite number or a decimal string, not {value!r}"
-        raise SymtopError(msg) from None
-
-
 def _plain(value: Any) -> Any:
     """The same number as an ordinary `mpmath.mpf`."""
     from mpmath import mp  # noqa: PLC0415
 
     return mp.make_mpf(value._mpf_)
-
-
-def _real_roots(ctx: Any, c0: Any, c1: Any, c2: Any, c3: Any) -> tuple[Any, ...]:
-    """Roots of c0 + c1 x + c2 x^2 + c3 x^3, all real, x1 <= 0 <= x2 <= x3; c0, c3 >= 0. Infinite x3 if c3 = 0.
-
-    A double root at 0 is returned as x1 = x2 = 0 wherever the third lies.
-    """
-    if c0 == 0 and c1 == 0:
-        return ctx.zero, ctx.zero, -c2 / c3 if c3 else ctx.inf
-    if c3 == 0:
-        return *_quadratic_roots(ctx, c0, c1, c2), ctx.inf
-    if c0 == 0:
-        return tuple(sorted([ctx.zero, *_quadratic_roots(ctx, c1, c2, c3)]))
-    shift = c2 / (3 * c3)
-    p, q = c1 / c3 - 3 * shift**2, 2 * shift**3 - shift * c1 / c3 + c0 / c3
-    radius = ctx.sqrt(max(-p / 3, 0))
-    angle = ctx.acos(min(max(1.5 * q / (p * radius), -1), 1)) / 3 if radius else ctx.zero
-    roots = [2 * radius * ctx.cos(angle - 2 * ctx.pi * k / 3) - shift for k in range(3)]
-    for _ in range(5):  # Newton: near a double or triple root the cosines keep only a half or a quarter of the digits
-        slopes = [c1 + x * (2 * c2 + 3 * x * c3) for x in roots]
-        values = [c0 + x * (c1 + x * (c2 + x * c3)) for x in roots]
-        roots = [x - v / s if s else x for x, v, s in zip(roots, values, slopes, strict=True)]
-    return tuple(sorted(roots))
-
-
-def _quadratic_roots(ctx: Any, c0: Any, c1: Any, c2: Any) -> list[Any]:
-    """Real roots of c0 + c1 x + c2 x^2 in order, without cancellation."""
-    root = ctx.sqrt(max(c1 * c1 - 4 * c0 * c2, 0))
-    q = -(c1 + (root if c1 > 0 else -root)) / 2
-    return sorted([q / c2, c0 / q])
 
 
 def _theta_series(ctx: Any, kind: int, z: Any, nome: Any) -> tuple[Any, Any]:

@@ -23,9 +23,9 @@ def step_ladder(method: Integrator, scene: Scene, horizon: float, quick: bool = 
     """
     period = scene.nutation_period if math.isfinite(scene.nutation_period) else horizon / 8.0
     decades = min(4.5, 11.0 / (method.order or 2))
-    most = 4e5 if quick else 1.2e7  # steps
+    most = 2e5 if quick else 4e6  # steps
     decades = min(decades, max(math.log10(most * period / horizon / 10.0), 0.5))
-    count = 9 if quick else 17
+    count = 8 if quick else 13
     # 10.37 a nutation: nothing here may be commensurate with it
     return [period / (10.37 * 10.0 ** (decades * k / (count - 1))) for k in range(count)]
 
@@ -34,7 +34,7 @@ def tolerance_ladder(method: Integrator, quick: bool = False) -> list[float]:
     """Tolerances from 1e-2 down to what the method's arithmetic allows."""
     least = max(method.least_tolerance, 1e-18)
     decades = -2.0 - math.log10(least)
-    count = 5 if quick else 12
+    count = 5 if quick else 10
     return [10.0 ** (-2.0 - 0.999 * decades * k / (count - 1)) for k in range(count)]
 
 

@@ -1,6 +1,6 @@
 """The drawings that studies share: error against a knob, residuals against time, outcome maps."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,12 +10,18 @@ from symtop.report.style import GREY, OUTCOME_COLORS, OUTCOME_HATCHES, Look, leg
 
 
 def error_curves(
-    data: xr.Dataset, scenes: Sequence[str], x: str, quantity: str, labels: tuple[str, str], judged: Mapping[Any, Any]
+    data: xr.Dataset,
+    scenes: Sequence[str],
+    x: str,
+    quantity: str,
+    labels: tuple[str, str],
+    judged: Mapping[Any, Any],
+    faint: Collection[str] = (),
 ) -> tuple[Any, Any]:
     """Error of `quantity` against the variable `x`, one panel a scene, one curve an integrator.
 
     Points listed as True in ``judged[scene, integrator]`` are filled, the others hollow; the reference's own bound is a
-    band at the bottom.
+    band at the bottom. The integrators in `faint` are thin lines without markers, and not in the legend.
     """
     columns = min(2, len(scenes))
     rows = -(-len(scenes) // columns)
@@ -27,7 +33,11 @@ def error_curves(
             xs, ys = cell[x].values, np.maximum(cell[quantity].values, 0.3 * floor)
             if not np.isfinite(ys).any():
                 continue
-            _curve(axis, xs, ys, judged.get((scene, name)), look(name), str(name), _dashed(cell))
+            if str(name) in faint:
+                order = np.argsort(xs)
+                axis.plot(xs[order], ys[order], color=look(str(name)).color, lw=0.7, alpha=0.45, zorder=1)
+            else:
+                _curve(axis, xs, ys, judged.get((scene, name)), look(str(name)), str(name), _dashed(cell))
         axis.set(xscale="log", yscale="log", title=scene)
         axis.grid(visible=True, which="major")
     for axis in axes.flat[len(scenes) :]:
@@ -36,8 +46,54 @@ def error_curves(
         axis.set_xlabel(labels[0])
     for axis in axes[:, 0]:
         axis.set_ylabel(labels[1])
-    legend_below(figure, axes)
+    legend_below(figure, axes, columns=5)
     return figure, axes
+
+
+def pareto(cost: Any, error: Any) -> Any:
+    """Which points no other point beats in both cost and error (boolean, the shape of the arrays)."""
+    shape, cost, error = cost.shape, cost.ravel(), error.ravel()
+    order = np.lexsort((error, np.where(np.isfinite(error), cost, np.inf)))
+    best, front = np.inf, np.zeros(cost.size, bool)
+    for k in order:
+        if np.isfinite(cost[k]) and error[k] < best:
+            best, front[k] = error[k], True
+    return front.reshape(shape)
+
+
+def dots(data: xr.Dataset, scenes: Sequence[str], columns: Sequence[tuple[str, str]], *, log: bool) -> Any:
+    """One row an integrator, one column a variable, one dot a scene: large tables at a glance.
+
+    Each column is ``(variable, label)``; a variable ``NAME`` with a companion ``NAME_interval`` gets a bar.
+    """
+    names = [str(name) for name in data["integrator"].values]
+    figure, axes = panels(1, len(columns), height=0.9 + 0.2 * len(names), sharey=True)
+    shift = np.linspace(-0.22, 0.22, len(scenes)) if len(scenes) > 1 else np.zeros(1)
+    for axis, (variable, label) in zip(axes[0], columns, strict=True):
+        for scene, offset, face in zip(scenes, shift, ("full", "none", "left", "right") * 3, strict=False):
+            for row, name in enumerate(names):
+                cell = data.sel(scene=scene, integrator=name)
+                value, style = float(cell[variable]), look(name)
+                if not np.isfinite(value) or (log and value <= 0.0):
+                    continue
+                bar = float(cell[f"{variable}_interval"]) if f"{variable}_interval" in cell else 0.0
+                axis.errorbar(
+                    value,
+                    row + offset,
+                    xerr=bar,
+                    fmt=style.marker,
+                    fillstyle=face,
+                    color=style.color,
+                    ms=5,
+                    elinewidth=0.8,
+                )
+        for face, scene in zip(("full", "none", "left", "right") * 3, scenes, strict=False):
+            axis.plot([], [], "o", fillstyle=face, color=GREY, label=scene)
+        axis.set(xlabel=label, yticks=range(len(names)), yticklabels=names, ylim=(len(names) - 0.5, -0.5))
+        if log:
+            axis.set_xscale("log")
+    legend_below(figure, axes)
+    return figure
 
 
 def _dashed(cell: xr.Dataset) -> bool:
