@@ -30,9 +30,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.integrators.compiled import register_jitable
 from symtop.checks import SymtopError, finite
 from symtop.integrators.angles import chart_outcome, reduced
+from symtop.integrators.compiled import register_jitable
 from symtop.integrators.drive import driver
 from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.outcomes import NOT_CONVERGED
@@ -143,7 +143,7 @@ def _forces(par: Any, sums: Any) -> Any:
     )
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:  # noqa: ARG001
     """The force sum W0 of a step of length zero, as a flat history for the predictor."""
     sin_start, cos_start = _start_trig(rule, state[0])
     W0 = _forces(par, _node_sums(rule, state[0], 0.0, sin_start, cos_start)).W0

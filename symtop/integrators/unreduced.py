@@ -1,7 +1,7 @@
 """Variational integrators of the heavy top from any quadrature rule, with nothing eliminated.
 
 The same discrete Lagrangian as `discrete_lagrangian`, stepped as a system in all three angles. The unknown is the
-mean rate (w, v, u) = (dtheta, dphi, dpsi)/h; with theta_i = theta + a_i h w (c = cos, s = sin) and the partial derivatives
+mean rate (w, v, u) = (dtheta, dphi, dpsi)/h; with theta_i = theta + a_i h w (c = cos, s = sin) and the derivatives
 
     f = dL/dtheta = s [(I1-I3) v^2 c - I3 u v + mgl],   l = dL/dphi' = (I1 s^2 + I3 c^2) v + I3 c u,   m = I3 (u + c v)
 
@@ -25,7 +25,7 @@ import numpy as np
 
 from symtop.integrators.angles import chart_outcome, require_chart
 from symtop.integrators.compiled import register_jitable
-from symtop.integrators.discrete_lagrangian import RULES, SMALLEST, quadrature, record
+from symtop.integrators.discrete_lagrangian import RULES, quadrature, record
 from symtop.integrators.drive import driver
 from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.outcomes import NOT_CONVERGED
@@ -33,6 +33,7 @@ from symtop.integrators.registry import Integrator, Plan, Run, Solver
 from symtop.top import Angles, SymmetricTop
 
 ANGLES_CHART = (0, 3, 1, 2)  # theta, p_theta, phi, psi among theta, phi, psi, p_theta, p_phi, p_psi
+LEAST = 0.25 * float(np.finfo(float).eps)  # of the rates: a correction that changes nothing
 
 
 class WholeTop(NamedTuple):
@@ -123,7 +124,7 @@ def _rates(par: Any, state: Any) -> Any:
     return state[3] / par.I1, precession, state[5] / par.I3 - precession * c
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:  # noqa: ARG001
     """The rates at the start, as a history for the predictor."""
     rate = _rates(par, state)
     return (rate, rate, rate)
@@ -138,17 +139,24 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     v = 3.0 * (near[1] - far[1]) + farther[1]
     u = 3.0 * (near[2] - far[2]) + farther[2]
     effort = 0
+    last = np.inf
     outcome = NOT_CONVERGED
+    sums = _node_sums(par, rule, theta, (w, v, u), h)
     while effort < rule.iterations:
         effort += 1
-        dw, dv, du = _correction(par, _node_sums(par, rule, theta, (w, v, u), h), (w, v, u), momentum, h)
-        w, v, u = w + dw, v + dv, u + du
-        if abs(dw) + abs(dv) + abs(du) <= rule.tolerance * (abs(w) + abs(v) + abs(u)) + SMALLEST / h:
+        dw, dv, du = _correction(par, sums, (w, v, u), momentum, h)
+        change, size = abs(dw) + abs(dv) + abs(du), abs(w) + abs(v) + abs(u)
+        # To stagnation, and p1 from the very sums whose residual was seen to vanish. Stopping as the reduced kernel
+        # does, after a correction of 1e-8, saves 0.6 evaluations of 3.6 and lets p_phi of `goldstein` walk off
+        # linearly, 2e-12 in 1e6 steps at h = 0.01 against 3e-13.
+        if change <= LEAST * size or 0.5 * last <= change <= rule.tolerance * size:
             outcome = chart_outcome(theta + h * w)
             break
+        last = change
+        w, v, u = w + dw, v + dv, u + du
         if effort == rule.iterations // 2:
             w, v, u = _rates(par, state)  # the prediction may lie outside the basin of the root
-    sums = _node_sums(par, rule, theta, (w, v, u), h)
+        sums = _node_sums(par, rule, theta, (w, v, u), h)
     step = (
         h * w,
         h * v,
@@ -160,7 +168,7 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     return step, ((w, v, u), near, far), effort, outcome
 
 
-def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:  # noqa: ARG001
     """p_phi and p_psi as the step left them."""
     return before[4] + dstate[4], before[5] + dstate[5]
 
