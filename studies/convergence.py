@@ -61,7 +61,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
             steps = data["step_size"].sel(scene=name).values
             span = (float(np.nanmin(steps)), float(np.nanmax(steps)))
             style.slope_guide(
-                axis, 2.0, (span[0], span[1]), float(np.nanmin(data[quantity].sel(scene=name))) * 3.0, "$h^2$"
+                axis, 2.0, (span[0], span[1]), float(np.nanmin(data[quantity].sel(scene=name))) * 0.2, "$h^2$"
             )
         judged = [fit.slope for fit in orders.values() if np.isfinite(fit.slope)]
         drawn.append(

@@ -37,8 +37,7 @@ from typing import Any, NamedTuple
 from symtop.checks import SymtopError, whole
 from symtop.top import Angles, SymmetricTop
 
-GUARD_DIGITS = 30
-MOST_DIGITS = 20_000  # resolves relative gaps between roots down to 1e-5000
+GUARD_DIGITS, MOST_DIGITS = 30, 20_000  # the latter resolves relative gaps between roots down to 1e-5000
 _NAMES = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
 
 
@@ -67,13 +66,13 @@ class Curve(NamedTuple):
     floor: Pole
     crown: Pole
     swing: Any  # u2 - u1
+    third: Any  # u3
     stiffness: Any  # beta (u3 - u1) = 4 Omega^2
     m: Any
     m1: Any  # 1 - m
     beyond: Any  # (u3 - 1)/(u3 - u2)
     start_sn2: Any
     start_cn2: Any
-    third: Any  # u3
 
 
 class PreciseForm:
@@ -84,9 +83,9 @@ class PreciseForm:
     exact decimals) or mpf. Raises `SymtopError` for values outside the model.
 
     Constants: `a`, `b`, `alpha`, `beta`, `energy`, `p_phi`, `p_psi`, `roots` (ascending; a free top has one at
-    infinity), `m`, `K`, `Omega`, `nutation_period` (infinite where no nutation exists), `phi_per_period`,
-    `psi_per_period`, `theta_range`. They are numbers of the private mpmath context `ctx`, whose precision is the
-    working one. For mgl < 0 `curve` describes the picture turned upside down, and `facing` is -1.
+    infinity), `m`, `K`, `Omega`, `nutation_period` (that of small nutations for a steady precession, infinite where
+    none exists), `phi_per_period`, `psi_per_period`, `theta_range`. They are numbers of the private mpmath context
+    `ctx`, whose precision is the working one. For mgl < 0 `curve` is that of the top upside down, and `facing` is -1.
     """
 
     def __init__(self, top: SymmetricTop | Sequence[Any], start: Angles | Sequence[Any], digits: int = 30) -> None:
@@ -103,8 +102,6 @@ class PreciseForm:
                 msg = f"the turning points must be separable with {MOST_DIGITS} digits; these values are too extreme"
                 raise SymtopError(msg)
         self._set_periods(body, state)
-
-    # -------------------------------------------------------------------------------------------------- constants
 
     def _resolve(self, body: list[Fraction], state: list[Fraction]) -> bool:
         """Invariants and turning points; False if the present precision does not tell all gaps from zero."""
@@ -130,31 +127,28 @@ class PreciseForm:
         slope = facing * (sine2 * torque - 2 * cosine * real(theta_dot**2))
         x1, x2, x3 = _real_roots(ctx, sine2 * real(theta_dot**2), slope, curvature, lead)  # of u'^2 in u - u(0)
         up, down, twist_up, twist_down = (above, below, north, south) if facing > 0 else (below, above, south, north)
-        if twist_down == 0:
+        rests = x1 == x2
+        if twist_down == 0 and not rests:
             x1 = -down
-        if twist_up == 0:
+        if twist_up == 0 and not rests:
             x2, x3 = (up, x3) if abs(x2 - up) <= abs(x3 - up) else (x2, up)
-        rigid = x1 == x2 or not lead  # no elliptic function needed
+        rigid = rests or not lead  # no elliptic function needed
         self.curve = Curve(
             floor=Pole(twist_down, down + x1, down + x2),
             crown=Pole(twist_up, up - x1, up - x2),
             swing=x2 - x1,
+            third=facing * cosine + x3,
             stiffness=-curvature if rigid else lead * (x3 - x1),
             m=ctx.zero if rigid else (x2 - x1) / (x3 - x1),
             m1=ctx.one if rigid else (x3 - x2) / (x3 - x1),
             beyond=ctx.one if rigid else (x3 - up) / (x3 - x2),
-            start_sn2=ctx.zero if x1 == x2 else -x1 / (x2 - x1),
-            start_cn2=ctx.one if x1 == x2 else x2 / (x2 - x1),
-            third=facing * cosine + x3,
+            start_sn2=ctx.zero if rests else -x1 / (x2 - x1),
+            start_cn2=ctx.one if rests else x2 / (x2 - x1),
         )
-        return self._choose_precision(1 + (abs(curvature / lead) if lead else 0))
-
-    def _choose_precision(self, span: Any) -> bool:
-        """Set the working precision by the smallest gap; False if rounding errors at this span hide it."""
-        ctx, curve = self.ctx, self.curve
-        gaps = [*curve.floor[1:], *curve.crown[1:], curve.swing, curve.m, curve.m1, curve.beyond, *curve[7:9]]
+        span = 1 + (abs(curvature / lead) if lead else 0)
+        gaps = [*self.curve.floor[1:], *self.curve.crown[1:], self.curve.swing, *self.curve[5:]]
         smallest = min(gap for gap in gaps if gap != 0)
-        if smallest < span * ctx.mpf(10) ** (-ctx.dps // 4):
+        if smallest < span * ctx.mpf(10) ** (-ctx.dps // 4):  # hidden by rounding errors
             return False
         decades = int(0.30103 * (ctx.mag(span) - ctx.mag(smallest))) + 1
         ctx.dps = self.digits + GUARD_DIGITS + 2 * decades
@@ -163,15 +157,16 @@ class PreciseForm:
     def _set_periods(self, body: list[Fraction], state: list[Fraction]) -> None:
         """Complete integrals, the phase of the starting point and the mean rates."""
         ctx, curve = self.ctx, self.curve
-        I1, I3, self.mgl = self.I1, self.I3, _ = [self._real(value) for value in body]
-        self.phi0, self.psi0, theta_dot = (self._real(value) for value in state[1:4])
-        self.p_phi, self.p_psi, self.drift = I1 * self.b, I1 * self.a, self.facing * self.a * (I1 / I3 - 1)
+        self.I1, self.I3, self.mgl = map(self._real, body)
+        phi0, psi0, theta_dot = map(self._real, state[1:4])
+        self.angles0 = (phi0 + self.facing * psi0, phi0 - self.facing * psi0)
+        self.p_phi, self.p_psi = self.I1 * self.b, self.I1 * self.a
+        self.drift = self.facing * self.a * (self.I1 / self.I3 - 1)
         self.m, self.m1 = +curve.m, +curve.m1
         self.K = ctx.elliprf(0, self.m1, 1)
         self.K1 = ctx.elliprf(0, self.m, 1) if self.m else ctx.inf
         self.Omega = ctx.sqrt(curve.stiffness) / 2 if curve.stiffness > 0 else ctx.zero
         self.nutation_period = 2 * self.K / self.Omega if self.Omega else ctx.inf
-        self._ladder = _agm_ladder(ctx, self.m, self.m1)
 
         rising = -1 if self.facing * theta_dot > 0 else 1  # the sign of u'
         sn, cn = rising * ctx.sqrt(curve.start_sn2), ctx.sqrt(curve.start_cn2)
@@ -181,13 +176,15 @@ class PreciseForm:
         # Through a pole the half-angle sine is continued with its sign, positive at the start; cn >= 0 there.
         self.floor_sign = 1 if sn > 0 or (sn == 0 and theta_dot >= 0) else -1
 
-        self.sum_rate, self.difference_rate = self.drift, -self.drift
-        if curve.floor.twist:
-            self.sum_rate += curve.floor.twist / curve.floor.low * self._complete[0] / self.K
-        if curve.crown.twist:
-            self.difference_rate += curve.crown.twist / curve.crown.low * self._complete[1] / self.K
-        self.phi_rate = (self.sum_rate + self.difference_rate) / 2
-        self.psi_rate = self.facing * (self.sum_rate - self.difference_rate) / 2
+        factors = [pole.twist / pole.low if pole.twist else ctx.zero for pole in curve[:2]]
+        growth = [factor * whole_turn / self.K for factor, whole_turn in zip(factors, self._complete, strict=True)]
+        self.mean_rates = (self.drift + growth[0], growth[1] - self.drift)  # of phi + psi and phi - psi
+        self.lags0 = tuple(  # by how much they are ahead of their means at time 0, counted from a moment with u = u1
+            (factor * begun - self.tau0 * mean) / self.Omega if factor and self.Omega else ctx.zero
+            for factor, begun, mean in zip(factors, self._begun, growth, strict=True)
+        )
+        self.phi_rate = (growth[0] + growth[1]) / 2
+        self.psi_rate = self.facing * (self.drift + (growth[0] - growth[1]) / 2)
         self.phi_per_period, self.psi_per_period = (
             rate * self.nutation_period if rate else ctx.zero for rate in (self.phi_rate, self.psi_rate)
         )
@@ -195,27 +192,13 @@ class PreciseForm:
         ends = zip(curve.floor[1:], curve.crown[1:], strict=True)
         self.theta_range = tuple(sorted(self._theta(ctx.sqrt(down), ctx.sqrt(up)) for down, up in ends))
 
-    def start_lags(self) -> tuple[Any, Any]:
-        """How far phi + psi and phi - psi are ahead of their mean growth at time 0, counted from u = u1 at rest."""
-        poles = zip(self.curve[:2], self._begun, self._complete, strict=True)
-        floor, crown = (
-            pole.twist / pole.low * (begun - self.tau0 / self.K * complete) / self.Omega
-            if pole.twist and self.Omega
-            else 0
-            for pole, begun, complete in poles
-        )
-        return floor, crown
-
     def zero_heights(self) -> tuple[Any, Any]:
         """Imaginary parts in [0, K1] of the zeros i w (floor, 1 + u = 0) and K + i w (crown, 1 - u = 0)."""
-        ctx, curve = self.ctx, self.curve
-        floor, crown = curve.floor, curve.crown
-        sn2, cn2 = floor.low / floor.high, curve.swing / floor.high
+        ctx, (floor, crown, swing, *_) = self.ctx, self.curve
+        sn2, cn2 = floor.low / floor.high, swing / floor.high
         lower = ctx.sqrt(sn2) * ctx.elliprf(cn2, cn2 + self.m * sn2, 1)
-        sn2, dn2 = crown.high / (self.m1 * crown.low), curve.swing / crown.low
-        return lower, ctx.sqrt(sn2) * ctx.elliprf(curve.beyond * dn2, dn2, 1)
-
-    # ------------------------------------------------------------------------------------------------- evaluation
+        sn2, dn2 = crown.high / (self.m1 * crown.low), swing / crown.low
+        return lower, ctx.sqrt(sn2) * ctx.elliprf(self.curve.beyond * dn2, dn2, 1)
 
     def __call__(self, time: Any) -> PreciseMotion:
         """Angles and rates at `time` (float, string, fraction or mpf)."""
@@ -245,72 +228,67 @@ class PreciseForm:
     def theta_quaternion(self, time: Any) -> tuple[Any, ...]:
         """Attitude (w, x, y, z) by theta functions, as Klein and Sommerfeld write it: a second, branch-free evaluation.
 
-        With z = pi tau/2K, ``sqrt(d/2) exp(i angle/2) = C exp(i rate tau) theta_k(z - i y)/theta_4(z)``, k = 1 for the
-        floor and 2 for the crown, pi w/2K = +-y for the zero of height w. C and the rate follow from the value and
-        the derivative at the turning point far from the pole. It shares only roots and phase with `quaternion`.
+        With z = pi tau/2K and the pole at z = z0 (floor i y, crown pi/2 + i y; y has the sign of the twist), the halves
+        are ``sqrt(d/2) exp(i angle/2) = C exp(i rate tau) theta_1(z - z0)/theta_4(z)``. C and the rate follow from the
+        value and derivative at the turning point far from the pole. Only roots and phase are shared with `quaternion`.
         """
         if self.curve.swing == 0:
             return self.quaternion(time)
-        ctx, curve = self.ctx, self.curve
-        heights, scale = self.zero_heights(), ctx.pi / (2 * self.K)
+        ctx, (floor, crown, *_, start_sn2, start_cn2) = self.ctx, self.curve
+        scale, quarter, heights = ctx.pi / (2 * self.K), ctx.pi / 2, self.zero_heights()
         nome = ctx.exp(-ctx.pi * self.K1 / self.K) if self.m else ctx.zero
-        tau = self.tau0 + self.Omega * self._real(_rational("time", time))
-        total, difference = self.phi0 + self.facing * self.psi0, self.phi0 - self.facing * self.psi0
+        passed = self.Omega * self._real(_rational("time", time))
+        start, now = scale * self.tau0, scale * (self.tau0 + passed)
         halves = []
-        for kind, pole, distance, far, drift, angle in (
-            (1, curve.floor, curve.floor.high, ctx.pi / 2, self.drift, total),
-            (2, curve.crown, curve.crown.low, ctx.zero, -self.drift, difference),
+        for pole, height, angle, drift, distance, far, on_pole in (
+            (floor, heights[0], self.angles0[0], self.drift, floor.high, quarter, floor.low == start_sn2 == 0),
+            (crown, heights[1], self.angles0[1], -self.drift, crown.low, 0, crown.high == start_cn2 == 0),
         ):
-            height = ctx.mpc(0, (-1 if pole.twist < 0 else 1) * scale * heights[kind - 1])
-            value, derivative = _theta_series(ctx, kind, far - height, nome)
+            zero = ctx.mpc(quarter - far, (-1 if pole.twist < 0 else 1) * scale * height)
+            value, derivative = _theta_series(ctx, 1, far - zero, nome)
             turning = (drift + pole.twist / distance) / (2 * self.Omega) - scale * ctx.im(derivative / value)
             size = ctx.sqrt(distance / 2) * _theta_series(ctx, 4, far, nome)[0] / abs(value)
-            begin = _theta_series(ctx, kind, scale * self.tau0 - height, nome)[0]
-            if pole[3 - kind] == 0 and curve[6 + kind] == 0:  # starts on the pole: continue towards theta'
-                begin = ctx.mpc(self.floor_sign if kind == 1 else 1)
-            now = _theta_series(ctx, kind, scale * tau - height, nome)[0]
-            phase = angle / 2 - ctx.arg(begin) + turning * (tau - self.tau0)
-            halves.append(size * ctx.expj(phase) * now / _theta_series(ctx, 4, scale * tau, nome)[0])
+            begin = _theta_series(ctx, 1, start - zero, nome)[0]
+            if on_pole:  # continue towards theta'
+                begin = ctx.mpc(self.floor_sign if far else -1)
+            wave = _theta_series(ctx, 1, now - zero, nome)[0] / _theta_series(ctx, 4, now, nome)[0]
+            halves.append(size * ctx.expj(angle / 2 - ctx.arg(begin) + turning * passed) * wave)
         return self._quaternion(*halves)
 
     def _state(self, time: Any) -> tuple[Any, Any, Any, Any, Any]:
         """sqrt((1 + u)/2) and sqrt((1 - u)/2), signed, phi + psi, phi - psi and theta', all in the upright picture."""
         ctx, curve = self.ctx, self.curve
         elapsed = self._real(_rational("time", time))
-        total, difference = self.phi0 + self.facing * self.psi0, self.phi0 - self.facing * self.psi0
         if curve.swing == 0:
-            down, up = ctx.sqrt(curve.floor.low / 2), ctx.sqrt(curve.crown.low / 2)
-            return down, up, total + self.sum_rate * elapsed, difference + self.difference_rate * elapsed, ctx.zero
+            angles = [angle + rate * elapsed for angle, rate in zip(self.angles0, self.mean_rates, strict=True)]
+            return ctx.sqrt(curve.floor.low / 2), ctx.sqrt(curve.crown.low / 2), angles[0], angles[1], ctx.zero
         tau = self.tau0 + self.Omega * elapsed
         turns = ctx.nint(tau / (2 * self.K))
         sn, cn, dn = self._jacobi(tau - 2 * turns * self.K)
         side = -1 if turns % 2 else 1
         angles, halves, ratios = [], [], []
-        for i, (pole, angle, drift, wave, sign, least, most) in enumerate(
-            (
-                (curve.floor, total, self.drift, sn, side * self.floor_sign, curve.floor.low, curve.floor.high),
-                (curve.crown, difference, -self.drift, cn, side, curve.crown.high, curve.crown.low),
-            )
-        ):
+        for i, (pole, drift, wave, sign, least, most) in enumerate((
+            (curve.floor, self.drift, sn, side * self.floor_sign, curve.floor.low, curve.floor.high),
+            (curve.crown, -self.drift, cn, side, curve.crown.high, curve.crown.low),
+        )):  # fmt: skip
             gained = 2 * turns * self._complete[i] + self._integral(pole, sn, cn) - self._begun[i]
-            angles.append(angle + drift * elapsed + (pole.twist / pole.low * gained / self.Omega if pole.twist else 0))
-            if least == 0:
-                halves.append(sign * ctx.sqrt(most / 2) * wave)
-                ratios.append(sign / ctx.sqrt(most / 2))
-            else:
-                halves.append(ctx.sqrt((pole.low * cn**2 + pole.high * sn**2) / 2))
-                ratios.append(wave / halves[i])
-        return *halves, *angles, -self.Omega * curve.swing * dn * ratios[0] * ratios[1]  # type: ignore[return-value]
+            turned = pole.twist / pole.low * gained / self.Omega if pole.twist else 0
+            angles.append(self.angles0[i] + drift * elapsed + turned)
+            through = sign * ctx.sqrt(most / 2)
+            half = through * wave if least == 0 else ctx.sqrt((pole.low * cn**2 + pole.high * sn**2) / 2)
+            halves.append(half)
+            ratios.append(1 / through if least == 0 else wave / half)
+        return *halves, *angles, -self.Omega * curve.swing * dn * ratios[0] * ratios[1]
 
     def _integral(self, pole: Pole | None, sn: Any, cn: Any) -> Any:
         """Pi(n; tau) of a pole (0 if its twist is 0), or tau itself, from sn and cn of tau; abs(tau) <= K."""
         ctx, c2 = self.ctx, cn**2
+        if pole is not None and pole.twist == 0:
+            return ctx.zero
         delta = self.m1 + self.m * c2
         first = sn * ctx.elliprf(c2, delta, 1)
         if pole is None:
             return first
-        if pole.twist == 0:
-            return ctx.zero
         near = (pole.low * c2 + pole.high * sn**2) / pole.low
         return first + (1 - pole.high / pole.low) / 3 * sn**3 * ctx.elliprj(c2, delta, 1, near)
 
@@ -318,7 +296,10 @@ class PreciseForm:
         """sn, cn, dn for abs(tau) <= K, from the nearer of 0 and K: cn and dn keep their digits as m -> 1."""
         ctx, short = self.ctx, abs(tau)
         swap = short > self.K / 2
-        mean, ratios = self._ladder
+        mean, other, gap, ratios = ctx.one, ctx.sqrt(self.m1), ctx.sqrt(self.m), []
+        while gap > mean * ctx.eps:  # the arithmetic-geometric mean, and the ratios c/a of its steps
+            mean, other, gap = (mean + other) / 2, ctx.sqrt(mean * other), (mean - other) / 2
+            ratios.append(gap / mean)
         angle = 2 ** len(ratios) * mean * (self.K - short if swap else short)
         for ratio in reversed(ratios):
             angle = (angle + ctx.asin(ratio * ctx.sin(angle))) / 2
@@ -339,24 +320,17 @@ class PreciseForm:
         return self.ctx.mpf(value.numerator) / value.denominator
 
 
-def _rationals(
-    top: SymmetricTop | Sequence[Any], start: Angles | Sequence[Any]
-) -> tuple[list[Fraction], list[Fraction]]:
-    """All inputs as exact fractions, checked against the model."""
+def _rationals(top: SymmetricTop | Sequence[Any], start: Angles | Sequence[Any]) -> list[list[Fraction]]:
+    """Parameters and start as exact fractions, checked against the model."""
     body = [top.I1, top.I3, top.mgl] if isinstance(top, SymmetricTop) else list(top)
     state = [getattr(start, name) for name in _NAMES[3:]] if isinstance(start, Angles) else list(start)
     if len(body) != 3 or len(state) != 6:
         msg = f"the closed form takes (I1, I3, mgl) and six angles and rates, not {len(body)} and {len(state)} numbers"
         raise SymtopError(msg)
     values = [_rational(name, value) for name, value in zip(_NAMES, [*body, *state], strict=True)]
-    I1, I3, theta = values[0], values[1], values[3]
-    if not (I1 > 0 and 0 < I3 <= 2 * I1):
-        msg = f"I1 must be above zero and I3 in (0, 2 I1], not {body[0]!r} and {body[1]!r}"
-        raise SymtopError(msg)
-    if not (theta >= 0 and float(theta) <= 3.141592653589794):
-        msg = f"theta must lie in [0, pi], not {state[0]!r}"
-        raise SymtopError(msg)
-    return values[:3], values[3:]
+    SymmetricTop(*map(float, values[:3]))
+    Angles(*map(float, values[3:]))
+    return [values[:3], values[3:]]
 
 
 def _rational(name: str, value: Any) -> Fraction:
@@ -365,10 +339,10 @@ def _rational(name: str, value: Any) -> Fraction:
 
     try:
         if hasattr(value, "_mpf_"):
-            return Fraction(*map(int, to_rational(value._mpf_)))  # noqa: SLF001  (mpmath's own exchange format)
+            return Fraction(*map(int, to_rational(value._mpf_)))
         return Fraction(value if isinstance(value, str | int | Fraction) else float(value))
     except (TypeError, ValueError, OverflowError, ZeroDivisionError):
-        msg = f"{name} must be a finite number or decimal string, not {value!r}"
+        msg = f"{name} must be a finite number or a decimal string, not {value!r}"
         raise SymtopError(msg) from None
 
 
@@ -376,10 +350,10 @@ def _plain(value: Any) -> Any:
     """The same number as an ordinary `mpmath.mpf`."""
     from mpmath import mp  # noqa: PLC0415
 
-    return mp.make_mpf(value._mpf_)  # noqa: SLF001  (mpmath's own exchange format)
+    return mp.make_mpf(value._mpf_)
 
 
-def _real_roots(ctx: Any, c0: Any, c1: Any, c2: Any, c3: Any) -> tuple[Any, Any, Any]:
+def _real_roots(ctx: Any, c0: Any, c1: Any, c2: Any, c3: Any) -> tuple[Any, ...]:
     """Roots of c0 + c1 x + c2 x^2 + c3 x^3, all real, x1 <= 0 <= x2 <= x3; c0, c3 >= 0. Infinite x3 if c3 = 0.
 
     A double root at 0 is returned as x1 = x2 = 0 wherever the third lies.
@@ -389,50 +363,35 @@ def _real_roots(ctx: Any, c0: Any, c1: Any, c2: Any, c3: Any) -> tuple[Any, Any,
     if c3 == 0:
         return *_quadratic_roots(ctx, c0, c1, c2), ctx.inf
     if c0 == 0:
-        return tuple(sorted([ctx.zero, *_quadratic_roots(ctx, c1, c2, c3)]))  # type: ignore[return-value]
+        return tuple(sorted([ctx.zero, *_quadratic_roots(ctx, c1, c2, c3)]))
     shift = c2 / (3 * c3)
     p, q = c1 / c3 - 3 * shift**2, 2 * shift**3 - shift * c1 / c3 + c0 / c3
     radius = ctx.sqrt(max(-p / 3, 0))
     angle = ctx.acos(min(max(1.5 * q / (p * radius), -1), 1)) / 3 if radius else ctx.zero
-    roots = sorted(2 * radius * ctx.cos(angle - 2 * ctx.pi * k / 3) - shift for k in range(3))
-    for _ in range(5):  # from the half or third of the digits that the cosines keep near a double or triple root
-        roots = [_newton(x, c0, c1, c2, c3) for x in roots]
-    return tuple(sorted(roots))  # type: ignore[return-value]
+    roots = [2 * radius * ctx.cos(angle - 2 * ctx.pi * k / 3) - shift for k in range(3)]
+    for _ in range(5):  # Newton: near a double or triple root the cosines keep only a half or a quarter of the digits
+        slopes = [c1 + x * (2 * c2 + 3 * x * c3) for x in roots]
+        values = [c0 + x * (c1 + x * (c2 + x * c3)) for x in roots]
+        roots = [x - v / s if s else x for x, v, s in zip(roots, values, slopes, strict=True)]
+    return tuple(sorted(roots))
 
 
-def _newton(x: Any, c0: Any, c1: Any, c2: Any, c3: Any) -> Any:
-    slope = c1 + x * (2 * c2 + 3 * x * c3)
-    return x - (c0 + x * (c1 + x * (c2 + x * c3))) / slope if slope else x
-
-
-def _quadratic_roots(ctx: Any, c0: Any, c1: Any, c2: Any) -> tuple[Any, Any]:
+def _quadratic_roots(ctx: Any, c0: Any, c1: Any, c2: Any) -> list[Any]:
+    """Real roots of c0 + c1 x + c2 x^2 in order, without cancellation."""
     root = ctx.sqrt(max(c1 * c1 - 4 * c0 * c2, 0))
     q = -(c1 + (root if c1 > 0 else -root)) / 2
-    low, high = sorted([q / c2, c0 / q])
-    return low, high
-
-
-def _agm_ladder(ctx: Any, m: Any, m1: Any) -> tuple[Any, list[Any]]:
-    """Limit of the arithmetic-geometric mean of 1 and sqrt(m1), and the ratios c/a of its steps."""
-    mean, other, ratios = ctx.one, ctx.sqrt(m1), []
-    gap = ctx.sqrt(m)
-    while gap > mean * ctx.eps:
-        mean, other, gap = (mean + other) / 2, ctx.sqrt(mean * other), (mean - other) / 2
-        ratios.append(gap / mean)
-    return mean, ratios
+    return sorted([q / c2, c0 / q])
 
 
 def _theta_series(ctx: Any, kind: int, z: Any, nome: Any) -> tuple[Any, Any]:
-    """theta_1 and theta_2 without their factor 2 q^(1/4), or theta_4, with the derivative by z; nome in [0, 1)."""
-    value = derivative = ctx.zero
-    growth = 2 * abs(ctx.im(z))
-    for n in range(1_000_000):
-        k, power = (2 * n, n * n) if kind == 4 else (2 * n + 1, n * (n + 1))
-        weight = (nome**power if power else ctx.one) * (-1 if n % 2 and kind != 2 else 1)
-        weight *= 2 if kind == 4 and n else 1
+    """theta_1(z) without its factor 2 q^(1/4), or theta_4(z), and the derivative; nome q in [0, 1)."""
+    value, derivative = (ctx.sin(z), ctx.cos(z)) if kind == 1 else (ctx.one, ctx.zero)
+    growth, n, weight = 2 * abs(ctx.im(z)), 0, ctx.one
+    while abs(weight) * ctx.exp((n + 1) * growth) * (2 * n + 2) > ctx.eps:
+        n += 1
+        weight = (-1) ** n * (nome ** (n * (n + 1)) if kind == 1 else 2 * nome ** (n * n))
+        k = 2 * n + 1 if kind == 1 else 2 * n
         sine, cosine = ctx.sin(k * z), ctx.cos(k * z)
-        first, second = (sine, cosine) if kind == 1 else (cosine, -sine)
-        value, derivative = value + weight * first, derivative + weight * k * second
-        if n and abs(weight) * ctx.exp((n + 1) * growth) * (k + 1) < ctx.eps:
-            break
+        value += weight * (sine if kind == 1 else cosine)
+        derivative += weight * k * (cosine if kind == 1 else -sine)
     return value, derivative

@@ -45,9 +45,9 @@ def ladder(method: Integrator, scene: Scene, horizon: float, quick: bool = False
     return tolerance_ladder(method, quick) if method.knob == "tolerance" else [math.nan]
 
 
-def knob(method: Integrator, setting: float) -> dict[str, float]:
-    """The argument of `simulate` that a setting stands for."""
-    return {} if method.knob is None else {str(method.knob): setting}
+def knobs(method: Integrator, setting: float) -> dict[str, float | None]:
+    """The arguments `step_size` and `tolerance` that a setting of the method's one knob stands for."""
+    return {name: setting if method.knob == name else None for name in ("step_size", "tolerance")}
 
 
 def error_table(
@@ -60,7 +60,7 @@ def error_table(
     """
     rows = []
     for setting in settings:
-        run = simulate(scene, method, horizon=horizon, samples=SAMPLES, observe=observe, **knob(method, setting))
+        run = simulate(scene, method, horizon=horizon, samples=SAMPLES, observe=observe, **knobs(method, setting))
         truth = reference(scene, run["time"].values, precision="closed-form")
         found = errors(scene, run, truth)
         row: dict[str, float | str] = {name: run.attrs[name] for name in _COUNTS}

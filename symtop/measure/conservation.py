@@ -62,9 +62,12 @@ def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
 
 
 def growth(time: ArrayLike, residual: ArrayLike) -> Fit:
-    """The exponent of |residual| ~ t^exponent from the largest values in windows that double in length."""
+    """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last two decades.
+
+    What happens within the first nutations is an oscillation that switches on, not growth.
+    """
     t, r = np.asarray(time, float), np.abs(np.asarray(residual, float))
-    edges = np.geomspace(max(t[t > 0.0].min(), t[-1] * 1e-4), t[-1], 13)
+    edges = np.geomspace(t[-1] / 100.0, t[-1], 13)
     middles, tops = [], []
     for low, high in zip(edges[:-1], edges[1:], strict=True):
         inside = (t > low) & (t <= high) & np.isfinite(r)

@@ -11,6 +11,13 @@ import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import xarray as xr
+
+from symtop.integrators.registry import Integrator
+from symtop.measure.accuracy import knobs
+from symtop.scenes import Scene
+from symtop.simulate import choose_chart, make_plan
+
 BATCH = 0.02  # seconds
 NOISY = 0.25  # relative spread beyond which a timing is not called reliable
 
@@ -61,3 +68,29 @@ def timings(
     for index in order:
         samples[index].append(_batch(functions[index], calls[index]) / calls[index])
     return [Timing(tuple(found), first) for found, first in zip(samples, firsts, strict=True)]
+
+
+def time_settings(
+    scene: Scene, method: Integrator, settings: Sequence[float], horizon: float, observe: str, batches: int = 5
+) -> xr.Dataset:
+    """Seconds of one run at each setting, without any observables: dimension ``setting`` (and ``batch``).
+
+    ``seconds`` is the smallest batch, ``seconds_samples`` are all of them, ``first_call`` the very first run with its
+    compilation or loading, ``reliable`` 1 where the spread allows a verdict.
+    """
+    solve = method.solvers[choose_chart(method, observe)]
+
+    def runner(setting: float) -> Callable[[], object]:
+        plan, _ = make_plan(scene, method, horizon=horizon, samples=2, **knobs(method, setting))
+        return lambda: solve(scene.top, scene.start, plan)
+
+    found = timings([runner(setting) for setting in settings], batches)
+    return xr.Dataset(
+        {
+            "seconds": ("setting", [timing.best for timing in found]),
+            "seconds_samples": (("setting", "batch"), [timing.samples for timing in found]),
+            "first_call": ("setting", [timing.first_call for timing in found]),
+            "reliable": ("setting", [float(timing.reliable) for timing in found]),
+        }
+    )
+

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.report.style import GREY, OUTCOME_COLORS, OUTCOME_HATCHES, Look, legend_below, look, panels
+from symtop.report.style import GREY, OUTCOME_COLORS, OUTCOME_HATCHES, Look, legend_below, look, panels, slope_guide
 
 
 def error_curves(
@@ -59,8 +59,8 @@ def _curve(axis: Any, xs: Any, ys: Any, judged: Any, style: Look, name: str, das
     filled = np.ones(xs.size, bool) if judged is None else np.asarray(judged, bool)
     for mask, face in ((filled, style.color), (~filled, "white")):
         pick = order[mask[order]]
-        axis.plot(xs[pick], ys[pick], style.marker, ls="none", color=style.color, mfc=face, ms=5, zorder=3)
-    axis.plot([], [], style.marker, color=style.color, ls=line, lw=1.1, label=name)  # one entry in the legend
+        axis.plot(xs[pick], ys[pick], style.marker, ls="none", color=style.color, mfc=face, ms=style.size, zorder=3)
+    axis.plot([], [], style.marker, color=style.color, ls=line, ms=style.size, lw=1.1, label=name)  # one entry in the legend
 
 
 def residual_history(data: xr.Dataset, scenes: Sequence[str], rows: Sequence[tuple[str, str]]) -> Any:
@@ -77,11 +77,15 @@ def residual_history(data: xr.Dataset, scenes: Sequence[str], rows: Sequence[tup
                 t, r = t[good], np.maximum(r[good], 1e-17)
                 style = look(str(name))
                 axis.plot(t, r, ",", color=style.color, alpha=0.5, zorder=2)
-                axis.plot(*envelope(t, r), style.marker + "-", ms=4, color=style.color, label=str(name), zorder=3)
+                axis.plot(*envelope(t, r), style.marker + "-", ms=0.8 * style.size, color=style.color, label=str(name), zorder=3)
             axis.set(xscale="log", yscale="log")
             if quantity == rows[0][0]:
                 axis.set_title(scene)
         line[0].set_ylabel(label)
+    for axis in axes[0]:
+        first, last = axis.get_xlim()
+        axis.autoscale(enable=False)
+        slope_guide(axis, 1.0, (first * 2.0, last / 2.0), 1e-8, "$t$")
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
     legend_below(figure, axes)
@@ -97,21 +101,30 @@ def envelope(t: Any, r: Any, windows: int = 18) -> tuple[Any, Any]:
 
 
 def outcome_strips(data: xr.Dataset, scenes: Sequence[str], verdicts: Sequence[str]) -> Any:
-    """One strip an integrator, coloured and hatched by what became of each run, against the step in nutations."""
-    names = [str(name) for name in data["integrator"].values]
-    figure, axes = panels(len(scenes), 1, height=0.55 + 0.34 * len(names), sharex=True)
+    """One strip an integrator, coloured and hatched by what became of each run, against its step or its tolerance."""
+    knobs = data["knob_name"].isel(scene=0).values
+    groups = [[str(n) for n, k in zip(data["integrator"].values, knobs, strict=True) if k == knob] for knob in KNOBS]
+    kept = [(label, names) for label, names in zip(KNOBS.values(), groups, strict=True) if names]
+    tallest = max(len(names) for _, names in kept)
+    figure, axes = panels(len(scenes), len(kept), height=0.6 + 0.34 * tallest, sharex="col")
     used: set[str] = set()
-    for axis, scene in zip(axes[:, 0], scenes, strict=True):
-        for row, name in enumerate(names):
-            cell = data.sel(scene=scene, integrator=name)
-            used |= _strip(axis, row, cell["relative_step"].values, cell["verdict"].values)
-        axis.set(xscale="log", ylim=(len(names) - 0.5, -0.5), yticks=range(len(names)), yticklabels=names, title=scene)
-        axis.grid(visible=False)
-        axis.tick_params(axis="y", length=0)
-    axes[-1, 0].set_xlabel("step (nutation periods; the mean step of an adaptive method)")
+    for line, scene in zip(axes, scenes, strict=True):
+        for axis, (label, names) in zip(line, kept, strict=True):
+            for row, name in enumerate(names):
+                cell = data.sel(scene=scene, integrator=name)
+                used |= _strip(axis, row, cell["knob"].values, cell["verdict"].values)
+            axis.set(xscale="log", ylim=(len(names) - 0.5, -0.5), yticks=range(len(names)), yticklabels=names)
+            axis.set_title(scene)
+            axis.grid(visible=False)
+            axis.tick_params(axis="y", length=0)
+            if scene == scenes[-1]:
+                axis.set_xlabel(label)
     handles = [_patch(verdict) for verdict in verdicts if verdict in used]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False)
     return figure
+
+
+KNOBS = {"step_size": "step size (nutation periods)", "tolerance": "tolerance"}
 
 
 def _patch(verdict: str) -> Any:

@@ -21,16 +21,17 @@ class Look(NamedTuple):
 
     color: str
     marker: str
+    size: float = 5.0
 
 
 _LOOKS = {
-    "midpoint": Look(BLUE, "o"),
+    "midpoint": Look(BLUE, "o", 8.0),
     "trapezoidal": Look(SKY, "s"),
     "simpson-linear": Look(PURPLE, "v"),
     "galerkin-simpson": Look(BLUE, "P"),
     "stormer-verlet": Look(GREEN, "^"),
     "rk45": Look(VERMILLION, "D"),
-    "taylor": Look(BLACK, "*"),
+    "taylor": Look(BLACK, "*", 8.0),
     "exact": Look(GREY, "x"),
 }
 _FAMILY_COLORS = {

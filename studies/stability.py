@@ -1,0 +1,144 @@
+"""Where does each method fail as its step grows, and how?"""
+
+import math
+
+import numpy as np
+import xarray as xr
+
+from symtop.integrators.registry import integrator, integrators
+from symtop.measure.accuracy import knobs
+from symtop.measure.errors import errors
+from symtop.measure.verdicts import ACCURATE, VERDICTS, verdict as judge
+from symtop.reference import reference
+from symtop.report import figures
+from symtop.scenes import added_scenes, scene
+from symtop.simulate import simulate
+from symtop.study.study import Case, Picture, Study, Table
+
+SCENES = ["spheroid", "goldstein", "cusp", "hairer-lubich-wanner"]
+PERIODS = 40.0
+FINEST, COARSEST = 0.002, 2.0  # nutation periods
+
+
+def cases(quick: bool) -> list[Case]:
+    """Steps from 1/500 of a nutation to two of them; tolerances from 1e-10 to 0.5."""
+    count = 24 if quick else 181
+    steps = np.geomspace(FINEST, COARSEST, count).tolist()
+    tolerances = np.geomspace(1e-10, 0.5, max(count // 4, 12)).tolist()
+    grid = []
+    for name in [*(SCENES[:3] if quick else SCENES), *added_scenes()]:
+        for method in integrators().values():
+            ladder = {"step_size": steps, "tolerance": tolerances}.get(method.knob or "", [math.nan])
+            grid.append(Case(name, method.name, {"periods": PERIODS, "ladder": ladder}))
+    return grid
+
+
+def measure(case: Case) -> xr.Dataset:
+    """What became of one run at each setting: outcome, verdict, axis error and the step in nutation periods."""
+    where, method = scene(case.scene), integrator(case.integrator)
+    period = where.nutation_period
+    horizon = case.settings["periods"] * period
+    rows: list[tuple[float, float, float, str, str]] = []
+    for value in case.settings["ladder"]:
+        setting = value * period if method.knob == "step_size" else value
+        run = simulate(where, method, horizon=horizon, samples=241, observe="axis", **knobs(method, setting))
+        error = errors(where, run, reference(where, run["time"].values, "closed-form"))["axis"].values
+        mean_step = run.attrs["reached_time"] / max(run.attrs["steps"], 1) / period
+        relative = value if method.knob == "step_size" else mean_step
+        worst = float(np.max(error)) if run.attrs["outcome"] == "ok" else math.nan
+        rows.append((value, relative, worst, run.attrs["outcome"], judge(where, run, error)))
+    columns = list(zip(*rows, strict=True))
+    names = ("knob", "relative_step", "axis", "outcome", "verdict")
+    table = {name: ("setting", list(column)) for name, column in zip(names, columns, strict=True)}
+    return xr.Dataset({**table, "knob_name": method.knob or "none"})
+
+
+def pictures(data: xr.Dataset) -> list[Picture]:
+    """One strip an integrator and scene."""
+    scenes = [str(name) for name in data["scene"].values]
+    return [
+        Picture(
+            "outcomes",
+            figures.outcome_strips(data, scenes, VERDICTS),
+            f"What became of runs over {PERIODS:g} nutation periods as the step grows. Accurate means an axis error of at "
+            f"most {ACCURATE:g} rad throughout. Failed runs are shown as failures, never left out.",
+            "Coloured and hatched strips, one an integrator: accurate at small steps, then wrong, then failing.",
+        )
+    ]
+
+
+FAILURES = VERDICTS[4:]  # the run ended early
+
+
+def limits(data: xr.Dataset, name: str, method: str) -> tuple[float, float, str]:
+    """Largest knob below which every run is accurate, smallest knob at which a run failed, and how it failed."""
+    cell = data.sel(scene=name, integrator=method)
+    known = cell["verdict"].values != ""
+    knob, words = cell["knob"].values[known], cell["verdict"].values[known]
+    bad, failed = np.flatnonzero(words != "accurate"), np.flatnonzero(np.isin(words, FAILURES))
+    last = (bad[0] if bad.size else knob.size) - 1
+    accurate = float(knob[last]) if last >= 0 else math.nan
+    return accurate, float(knob[failed[0]]) if failed.size else math.nan, str(words[failed[0]]) if failed.size else ""
+
+
+def tables(data: xr.Dataset) -> list[Table]:
+    """Limits of accuracy and of survival."""
+    rows = []
+    for name in data["scene"].values:
+        for method in data["integrator"].values:
+            accurate, failed, how = limits(data, str(name), str(method))
+            words = data["verdict"].sel(scene=name, integrator=method).values
+            counts = {word: int(np.sum(words == word)) for word in VERDICTS}
+            rows.append(
+                [
+                    str(name),
+                    str(method),
+                    _unit(data, str(method)),
+                    f"{accurate:.2g}" if math.isfinite(accurate) else "none",
+                    f"{failed:.2g} ({how.replace('_', ' ')})" if how else "never",
+                    ", ".join(f"{word.replace('_', ' ')} {n}" for word, n in counts.items() if n),
+                ]
+            )
+    header = ["scene", "integrator", "limits in", "accurate up to", "first failure at", "runs by verdict"]
+    return [Table("Limits of accuracy and of survival", header, rows)]
+
+
+def _unit(data: xr.Dataset, method: str) -> str:
+    fixed = data["knob_name"].sel(integrator=method).values[0] == "step_size"
+    return "nutation periods" if fixed else "tolerance"
+
+
+def verdict(data: xr.Dataset) -> list[str]:
+    """Where each method stops being accurate and where it fails."""
+    sentences = []
+    for method in data["integrator"].values:
+        found = {str(name): limits(data, str(name), str(method)) for name in data["scene"].values}
+        worst = min(found, key=lambda name: found[name][0])
+        failed = [(at, name, how) for name, (_, at, how) in found.items() if how]
+        thing = "steps" if _unit(data, str(method)) == "nutation periods" else "tolerances"
+        ending = " of a nutation" if thing == "steps" else ""
+        fate = "it never fails outright"
+        if failed:
+            at, name, how = min(failed)
+            fate = f"it first fails at {at:.2g} ({how.replace('_', ' ')} on {name})"
+        sentences.append(
+            f"{method} is accurate on every scene with {thing} up to {found[worst][0]:.2g}{ending} (least on {worst}); {fate}."
+        )
+    return sentences
+
+
+STUDY = Study(
+    name="stability",
+    title="Stability",
+    question="Where does each method fail as its step grows, and how?",
+    how_to_read=(
+        "Each strip is one method; from left to right the step grows. Green is accurate. Yellow looks healthy and is wrong: "
+        "energy bounded, phase lost. The hatched colours are runs that ended early or went where the true motion never "
+        "goes. Adaptive methods, on the right, are shown against their tolerance."
+    ),
+    cases=cases,
+    measure=measure,
+    pictures=pictures,
+    tables=tables,
+    verdict=verdict,
+)

@@ -1,0 +1,40 @@
+"""Shared fixtures: a cache of the tests' own, random tops, and the 30-digit states."""
+
+import json
+import math
+import os
+import random
+from pathlib import Path
+
+import pytest
+
+os.environ.setdefault("SYMTOP_CACHE", str(Path(__file__).resolve().parent.parent / ".pytest_cache" / "symtop"))
+
+from symtop.scenes import Scene
+from symtop.top import Angles, SymmetricTop
+
+
+@pytest.fixture(scope="session")
+def truth() -> dict:
+    """States of named scenes to 30 digits, from four independent evaluations."""
+    path = Path(__file__).parent / "data" / "truth.json"
+    return {name: entry for name, entry in json.loads(path.read_text()).items() if not name.startswith("_")}
+
+
+def random_scenes(count: int, seed: int) -> list[Scene]:
+    """Ordinary tops in ordinary motion, away from the poles."""
+    draw = random.Random(seed)
+    found = []
+    for k in range(count):
+        I1 = draw.uniform(0.3, 4.0)
+        top = SymmetricTop(I1, draw.uniform(0.2, 1.9) * I1, draw.uniform(-3.0, 6.0))
+        start = Angles(
+            theta=draw.uniform(0.4, 2.6),
+            phi=draw.uniform(-math.pi, math.pi),
+            psi=draw.uniform(-math.pi, math.pi),
+            theta_dot=draw.uniform(-1.0, 1.0),
+            phi_dot=draw.uniform(-2.0, 2.0),
+            psi_dot=draw.uniform(-6.0, 6.0),
+        )
+        found.append(Scene(f"random-{k}", top, start, 5.0))
+    return found
