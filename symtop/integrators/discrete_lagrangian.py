@@ -26,6 +26,7 @@ poles. Source: Marsden and West, Discrete mechanics and variational integrators,
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,7 +37,8 @@ from symtop.integrators.compiled import register_jitable
 from symtop.integrators.drive import driver
 from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.outcomes import NOT_CONVERGED
-from symtop.integrators.registry import Integrator, Solver
+from symtop.integrators.registry import Integrator, Plan, Run, Solver
+from symtop.top import Angles, SymmetricTop
 
 
 class Quadrature(NamedTuple):
@@ -218,6 +220,24 @@ def quadrature(nodes: Sequence[float], weights: Sequence[float]) -> tuple[Quadra
     return Quadrature(points, shares), symmetric
 
 
+@dataclass(frozen=True)
+class StraightLine:
+    """A solver that remembers its rule, so that other ways to step the same rule can be set beside it."""
+
+    rule: Quadrature
+    solve: Solver
+
+    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        """Run the reduced kernel."""
+        return self.solve(top, start, plan)
+
+
+def rule_of(method: Integrator) -> Quadrature | None:
+    """The rule of an integrator that `discrete_lagrangian` made; None for any other."""
+    solver = method.solvers.get("angles")
+    return solver.rule if isinstance(solver, StraightLine) else None
+
+
 def record(
     name: str, rule: Quadrature, solver: Solver, *, order: int | None, symmetric: bool, summary: str, reference: str
 ) -> Integrator:
@@ -251,7 +271,7 @@ def discrete_lagrangian(
     """
     rule, symmetric = quadrature(nodes, weights)
     fresh = sum(node != 0.0 for node in rule.nodes)  # a node at 0 is evaluated once a step, not once an iteration
-    solver = fixed_step(march, rule, reduced, fresh, implicit=True)
+    solver = StraightLine(rule, fixed_step(march, rule, reduced, fresh, implicit=True))
     return record(name, rule, solver, order=order, symmetric=symmetric, summary=summary, reference=reference)
 
 

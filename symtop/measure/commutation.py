@@ -23,8 +23,9 @@ import numpy as np
 import xarray as xr
 
 from symtop.charts import Array
-from symtop.integrators.discrete_lagrangian import RULES
-from symtop.integrators.registry import Plan, integrator
+from symtop.checks import SymtopError
+from symtop.integrators.discrete_lagrangian import Quadrature, rule_of
+from symtop.integrators.registry import Integrator, Plan, integrator
 from symtop.scenes import Scene
 
 NEWTON = 60  # iterations; a handful is used
@@ -38,10 +39,10 @@ class Gap(NamedTuple):
     p_theta: float
 
 
-def routhian_step(scene: Scene, nodes: Sequence[float], weights: Sequence[float]) -> Step:
+def routhian_step(scene: Scene, rule: Quadrature) -> Step:
     """(theta, p_theta, h) -> increments by the discrete Lagrangian of the Routhian of a scene."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
-    a, w = np.array(nodes), np.array(weights)
+    a, w = np.array(rule.nodes), np.array(rule.weights)
 
     def step(theta: float, p_theta: float, h: float) -> tuple[float, float]:
         flight, scale = h * p_theta / top.I1, h * h / top.I1
@@ -107,11 +108,11 @@ def path(scene: Scene, step: Step, h: float, steps: int) -> Array:
     return states
 
 
-def kernel_path(scene: Scene, name: str, h: float, steps: int) -> Array:
-    """The same of a registered fixed-step integrator in the angles chart."""
+def kernel_path(scene: Scene, method: Integrator, h: float, steps: int) -> Array:
+    """The same of a fixed-step integrator in the angles chart."""
     marks = np.arange(steps + 1, dtype=np.int64)
     plan = Plan(marks.astype(np.float64) * h, steps * h, h, marks, np.nan)
-    return integrator(name).solvers["angles"](scene.top, scene.start, plan).states[:, :2]
+    return method.solvers["angles"](scene.top, scene.start, plan).states[:, :2]
 
 
 def gap(first: Array, second: Array) -> Gap:
@@ -120,33 +121,34 @@ def gap(first: Array, second: Array) -> Gap:
     return Gap(float(apart[0]), float(apart[1]))
 
 
-def commutation_gap(scene: Scene, rule: str, h: float, steps: int) -> Gap:
-    """Distance between reducing first and discretising first, for one of the rules of `discrete_lagrangian`."""
-    nodes, weights, _ = RULES[rule]
-    return gap(path(scene, routhian_step(scene, nodes, weights), h, steps), kernel_path(scene, rule, h, steps))
+def commutation_gap(scene: Scene, method: Integrator, h: float, steps: int) -> Gap:
+    """Distance between reducing first and discretising first, for a method made by `discrete_lagrangian`."""
+    rule = rule_of(method)
+    if rule is None:
+        msg = f"method must be made by discrete_lagrangian, not {method.name!r}"
+        raise SymtopError(msg)
+    return gap(path(scene, routhian_step(scene, rule), h, steps), kernel_path(scene, method, h, steps))
 
 
 def midpoint_gap(scene: Scene, h: float, steps: int) -> Gap:
     """Distance between the midpoint discrete Lagrangian and the implicit midpoint rule on (theta, p_theta)."""
-    return gap(path(scene, implicit_midpoint_step(scene), h, steps), kernel_path(scene, "midpoint", h, steps))
+    kernel = kernel_path(scene, integrator("midpoint"), h, steps)
+    return gap(path(scene, implicit_midpoint_step(scene), h, steps), kernel)
 
 
-def commutation_table(scene: Scene, rule: str, horizon: float, counts: Sequence[int]) -> xr.Dataset:
+def commutation_table(scene: Scene, method: Integrator, horizon: float, counts: Sequence[int]) -> xr.Dataset:
     """How far apart the two orders end up at several step sizes; dimension ``commutation_step``.
 
     ``commutation_gap`` is the largest difference in theta (radians) over the run; for the midpoint rule
     ``hamiltonian_gap`` compares with the implicit midpoint rule on (theta, p_theta) as well.
     """
+    steps = [(horizon / count, count) for count in counts]
     data = xr.Dataset(
         {
-            "commutation_step_size": ("commutation_step", [horizon / count for count in counts]),
-            "commutation_gap": (
-                "commutation_step",
-                [commutation_gap(scene, rule, horizon / count, count).theta for count in counts],
-            ),
+            "commutation_step_size": ("commutation_step", [h for h, _ in steps]),
+            "commutation_gap": ("commutation_step", [commutation_gap(scene, method, *step).theta for step in steps]),
         }
     )
-    if rule == "midpoint":
-        gaps = [midpoint_gap(scene, horizon / count, count).theta for count in counts]
-        data["hamiltonian_gap"] = ("commutation_step", gaps)
+    if method.name == "midpoint":
+        data["hamiltonian_gap"] = ("commutation_step", [midpoint_gap(scene, *step).theta for step in steps])
     return data

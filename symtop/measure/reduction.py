@@ -9,7 +9,7 @@ Times are of the bare solver, from start to horizon with two samples, and interl
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,13 +17,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.charts import CHARTS
-from symtop.integrators.registry import Integrator, Run, integrator, integrators
-from symtop.measure.accuracy import error_table, knob
+from symtop.integrators.registry import Integrator, integrator, integrators
+from symtop.measure.accuracy import error_table
 from symtop.measure.errors import momentum_scale
 from symtop.measure.order import LARGEST_ERROR
-from symtop.measure.timing import timings
+from symtop.measure.timing import bare_run, timings
 from symtop.scenes import Scene
-from symtop.simulate import make_plan, simulate
+from symtop.simulate import simulate
 
 TWIN = "-unreduced"
 TIMED = 20_000  # steps of a timed run: a call costs as much as a hundred of them
@@ -46,14 +46,6 @@ def in_chart(method: Integrator, chart: str) -> Integrator:
     return dataclasses.replace(method, solvers={chart: method.solvers[chart]})
 
 
-def bare_run(scene: Scene, method: Integrator, setting: float, horizon: float) -> Callable[[], Run]:
-    """A call of the integrator's first solver with nothing around it."""
-    knobs = {"step_size": None, "tolerance": None, **knob(method, setting)}
-    plan, _ = make_plan(scene, method, knobs["step_size"], knobs["tolerance"], horizon, 2)
-    solve = next(iter(method.solvers.values()))
-    return lambda: solve(scene.top, scene.start, plan)
-
-
 def chart_table(
     scene: Scene, method: Integrator, settings: Sequence[float], horizon: float, batches: int = 5
 ) -> xr.Dataset:
@@ -64,7 +56,7 @@ def chart_table(
     shape = (len(CHARTS), len(settings))
     found = {name: np.full(shape, math.nan) for name in (*SHARED, "axis_bound", "seconds", "spread", "steps")}
     runs = [
-        (CHARTS.index(chart), k, bare_run(scene, in_chart(method, chart), setting, horizon))
+        (CHARTS.index(chart), k, bare_run(scene, method, chart, setting, horizon))
         for chart in method.solvers
         for k, setting in enumerate(settings)
     ]
@@ -130,7 +122,7 @@ def twin_history(scene: Scene, name: str, horizon: float, steps: int, samples: i
 def twin_cost(scene: Scene, name: str, step_sizes: Sequence[float], batches: int = 5) -> xr.Dataset:
     """Seconds and iterations a step of a reduced kernel and its twin; dimensions ``kernel`` and ``twin_step``."""
     labels = (name, name + TWIN)
-    runs = [bare_run(scene, integrator(label), step, TIMED * step) for label in labels for step in step_sizes]
+    runs = [bare_run(scene, integrator(label), "angles", step, TIMED * step) for label in labels for step in step_sizes]
     shape = (2, len(step_sizes))
     steps, iterations = (
         np.array([getattr(run(), count) for run in runs], float).reshape(shape)
