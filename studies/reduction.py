@@ -7,10 +7,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.ticker import LogLocator, NullLocator
 
-from symtop.integrators.discrete_lagrangian import rule_of
 from symtop.integrators.registry import integrator, integrators
 from symtop.measure.accuracy import ladder
-from symtop.measure.commutation import commutation_table
+from symtop.measure.commutation import commutation_table, reduced_first
 from symtop.measure.order import power_law
 from symtop.measure.reduction import chart_ratios, chart_table, several_charts, twin_cost, twin_history, twins
 from symtop.report import style
@@ -52,7 +51,7 @@ def cases(quick: bool) -> list[Case]:
         grid += [
             Case(name, method.name, {"part": "commutation", "horizon": 2.0 * period, "counts": counts})
             for method in integrators().values()
-            if rule_of(method) is not None
+            if reduced_first(scene(name), method)
         ]
     return grid
 
