@@ -115,7 +115,7 @@ def _draw_commutation(data: xr.Dataset) -> Picture:
         f"Reduce, then discretise, against discretise, then reduce: largest difference in theta over two nutations. "
         f"{_orders(data)} Crosses: the midpoint discrete Lagrangian against the implicit midpoint rule on the reduced "
         "Hamiltonian.",
-        "Log-log plots of the difference against the step: two lines of slope 2, and two flat ones at 1e-16.",
+        "Log-log plots of the difference against the step: lines of slope 2 and 4, and flat ones at 1e-16.",
     )
 
 
@@ -263,7 +263,7 @@ STUDY = Study(
         "Three comparisons. A method that works in several charts runs in each of them at the same setting. A reduced "
         "discrete Lagrangian runs beside a twin that eliminates nothing: their distance is rounding or a mistake. And "
         "eliminating phi and psi before discretising is compared with doing so afterwards: a flat line at 1e-16 means "
-        "that the order does not matter, a slope of 2 that the two are different methods of order 2."
+        "that the order does not matter, a slope of p that the two are different methods of order p."
     ),
     cases=cases,
     measure=measure,
