@@ -71,7 +71,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
                 f"Largest {quantity} error over the run against the step. Filled points enter the fit, hollow ones do "
                 f"not: too large, or within ten times of the reference's own error (grey band). "
                 f"Fitted orders lie between {min(judged):.3f} and {max(judged):.3f}.",
-                f"Log-log plots of {quantity} error against step size for {len(scenes)} scenes: straight lines of slope 2.",
+                f"Log-log plots of {quantity} error against step size, {len(scenes)} scenes: straight lines.",
             )
         )
     return drawn

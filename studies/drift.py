@@ -12,6 +12,7 @@ from symtop.study.study import Case, Picture, Study, Table
 
 SCENES = ["spheroid", "goldstein"]
 STEPS_A_NUTATION = 118.02
+PARTS = ("largest", "rise", "interval", "exponent", "exponent_interval")
 LABELS = {"energy": "energy", "p_phi": r"$p_\varphi$", "p_psi": r"$p_\psi$"}
 
 
@@ -58,10 +59,10 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         Picture(
             "residuals",
             figure,
-            "Change of energy and of both momenta since the start: single samples as dots, the largest in each window as "
-            f"a line. Without a trend in energy beyond its 95 % interval on every scene: {', '.join(bounded) or 'none'}. "
-            "The momenta are recomputed from the increments of the trajectory.",
-            "Log-log plots of residuals over time, flat for the discrete methods and rising for the adaptive Runge-Kutta.",
+            "Change of energy and of both momenta since the start: single samples as dots, the largest in each window "
+            "as a line. Without a trend in energy beyond its 95 % interval on every scene: "
+            f"{', '.join(bounded) or 'none'}. The momenta are recomputed from the increments of the trajectory.",
+            "Log-log plots of residuals over time, flat for the discrete methods, rising for adaptive Runge-Kutta.",
         )
     ]
 
@@ -84,12 +85,11 @@ def tables(data: xr.Dataset) -> list[Table]:
             cell = data.sel(scene=name, integrator=method)
             row = [str(name), str(method), str(cell["outcome"].item())]
             for quantity in CONSTANTS:
-                row += [
-                    _number(float(cell[f"{quantity}_largest"])),
-                    f"{_number(float(cell[f'{quantity}_rise']))} +- "
-                    f"{_number(float(cell[f'{quantity}_interval'] * np.nanmax(cell['sample_time'])))}",
-                    f"{float(cell[f'{quantity}_exponent']):.2f} +- {float(cell[f'{quantity}_exponent_interval']):.2f}",
-                ]
+                values = {part: float(cell[f"{quantity}_{part}"]) for part in PARTS}
+                doubt = values["interval"] * float(np.nanmax(cell["sample_time"]))
+                row.append(_number(values["largest"]))
+                row.append(f"{_number(values['rise'])} +- {_number(doubt)}")
+                row.append(f"{values['exponent']:.2f} +- {values['exponent_interval']:.2f}")
             rows.append(row)
     header = ["scene", "integrator", "outcome"]
     for quantity in CONSTANTS:

@@ -8,7 +8,8 @@ import xarray as xr
 from symtop.integrators.registry import integrator, integrators
 from symtop.measure.accuracy import knobs
 from symtop.measure.errors import errors
-from symtop.measure.verdicts import ACCURATE, VERDICTS, verdict as judge
+from symtop.measure.verdicts import ACCURATE, VERDICTS
+from symtop.measure.verdicts import verdict as judge
 from symtop.reference import reference
 from symtop.report import figures
 from symtop.scenes import added_scenes, scene
@@ -60,8 +61,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         Picture(
             "outcomes",
             figures.outcome_strips(data, scenes, VERDICTS),
-            f"What became of runs over {PERIODS:g} nutation periods as the step grows. Accurate means an axis error of at "
-            f"most {ACCURATE:g} rad throughout. Failed runs are shown as failures, never left out.",
+            f"What became of runs over {PERIODS:g} nutation periods as the step grows. Accurate means an axis error of "
+            f"at most {ACCURATE:g} rad throughout. Failed runs are shown as failures, never left out.",
             "Coloured and hatched strips, one an integrator: accurate at small steps, then wrong, then failing.",
         )
     ]
@@ -122,7 +123,8 @@ def verdict(data: xr.Dataset) -> list[str]:
             at, name, how = min(failed)
             fate = f"it first fails at {at:.2g} ({how.replace('_', ' ')} on {name})"
         sentences.append(
-            f"{method} is accurate on every scene with {thing} up to {found[worst][0]:.2g}{ending} (least on {worst}); {fate}."
+            f"{method} is accurate on every scene with {thing} up to {found[worst][0]:.2g}{ending} (least on {worst}); "
+            f"{fate}."
         )
     return sentences
 
@@ -132,9 +134,9 @@ STUDY = Study(
     title="Stability",
     question="Where does each method fail as its step grows, and how?",
     how_to_read=(
-        "Each strip is one method; from left to right the step grows. Green is accurate. Yellow looks healthy and is wrong: "
-        "energy bounded, phase lost. The hatched colours are runs that ended early or went where the true motion never "
-        "goes. Adaptive methods, on the right, are shown against their tolerance."
+        "Each strip is one method; from left to right the step grows. Green is accurate. Yellow looks healthy and is "
+        "wrong: energy bounded, phase lost. Hatched runs ended early or went where the true motion "
+        "never goes. Adaptive methods, on the right, are shown against their tolerance."
     ),
     cases=cases,
     measure=measure,

@@ -94,7 +94,9 @@ def tables(data: xr.Dataset) -> list[Table]:
         for method in data["integrator"].values:
             alone = data.sel(integrator=[method])
             reached = [cheapest(alone, str(name), target) for target in TARGETS]
-            costs.append([str(name), str(method), *(_seconds(best[0][0]) if best else "not reached" for best in reached)])
+            costs.append(
+                [str(name), str(method), *(_seconds(best[0][0]) if best else "not reached" for best in reached)]
+            )
     header = [f"axis error {target:.0e}" for target in TARGETS]
     return [
         Table(f"Fastest method to an axis error over {PERIODS:g} nutation periods", ["scene", *header], winners),
@@ -127,7 +129,9 @@ def verdict(data: xr.Dataset) -> list[str]:
         )
     count = int(np.sum(~np.isnan(data["seconds"].values)))
     doubtful = int(np.sum(data["reliable"].values == 0.0))
-    sentences.append(f"{doubtful} of {count} timings were too noisy to rank by." if doubtful else f"All {count} timings were steady.")
+    sentences.append(
+        f"{doubtful} of {count} timings were too noisy to rank by." if doubtful else f"All {count} timings were steady."
+    )
     return sentences
 
 
@@ -138,8 +142,8 @@ STUDY = Study(
     how_to_read=(
         "Choose the error you can live with on the vertical axis and go right to the first curve. Seconds include the "
         "call of the compiled loop, about twenty microseconds, so all curves bend where runs are that short. A force "
-        "evaluation is one evaluation of the equations of motion: a Newton iteration at one node, a kick, a stage, or one "
-        "derivative of a Taylor series, which costs more the higher it is."
+        "evaluation is one evaluation of the equations of motion: a Newton iteration at one node, a kick, a stage, or "
+        "one derivative of a Taylor series, which costs more the higher it is."
     ),
     cases=cases,
     measure=measure,

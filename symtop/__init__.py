@@ -36,7 +36,7 @@ _HOME = {
     "ClosedForm": "exact",
 }
 
-__all__ = ["__version__", *sorted(_HOME)]
+__all__ = ["__version__", *_HOME]  # noqa: PLE0604  (strings all)
 
 
 class _Package(ModuleType):

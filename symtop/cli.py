@@ -1,6 +1,6 @@
 """The command line: ``symtop integrators | scenes | run | study | report``.
 
-Exit codes: 0 fine, 1 a case or a check failed, 2 bad input, 3 a run ended early by its outcome (its dataset was written).
+Exit codes: 0 fine, 1 a case or a check failed, 2 bad input, 3 a run ended early by its outcome (what it had was kept).
 Heavy packages are imported by the command that needs them.
 """
 
@@ -67,7 +67,7 @@ def _table(header: list[str], rows: list[list[str]]) -> str:
 @plugin_option
 @json_option
 @click.option("--markdown", is_flag=True, help="Print a Markdown table.")
-def integrators(plugin_files: tuple[str, ...], as_json: bool, markdown: bool) -> None:  # noqa: FBT001
+def integrators(plugin_files: tuple[str, ...], as_json: bool, markdown: bool) -> None:
     """List every integrator with what it claims about itself."""
     from symtop.report import page  # noqa: PLC0415
 
@@ -82,7 +82,7 @@ def integrators(plugin_files: tuple[str, ...], as_json: bool, markdown: bool) ->
 @main.command()
 @plugin_option
 @json_option
-def scenes(plugin_files: tuple[str, ...], as_json: bool) -> None:  # noqa: FBT001
+def scenes(plugin_files: tuple[str, ...], as_json: bool) -> None:
     """List every scene: what it is for, what it observes, its nutation period."""
     from symtop.report import page  # noqa: PLC0415
 
@@ -148,7 +148,7 @@ def run(
 @click.option("--results", type=click.Path(file_okay=False), default="results", show_default=True)
 @plugin_option
 def study(
-    names: tuple[str, ...], every: bool, quick: bool, fresh: bool, jobs: int | None, results: str,  # noqa: FBT001
+    names: tuple[str, ...], every: bool, quick: bool, fresh: bool, jobs: int | None, results: str,
     plugin_files: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Run studies by NAME: datasets, figures and findings into the results folder.

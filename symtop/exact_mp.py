@@ -151,7 +151,7 @@ class PreciseForm:
         if smallest < span * ctx.mpf(10) ** (-ctx.dps // 4):  # hidden by rounding errors
             return False
         decades = int(0.30103 * (ctx.mag(span) - ctx.mag(smallest))) + 1
-        ctx.dps = self.digits + GUARD_DIGITS + 2 * decades
+        ctx.dps = self.digits + GUARD_DIGITS + decades
         return True
 
     def _set_periods(self, body: list[Fraction], state: list[Fraction]) -> None:

@@ -1,11 +1,12 @@
 """Certified truth: two independent methods, and their disagreement as an error bound.
 
 `reference` integrates the space-frame equations with heyoka in double, long double or quadruple precision (never in
-angles, which lose digits near a pole), at a tolerance of a hundredth of the rounding unit, from a start that is built
-in 60 digits. The closed form, evaluated in `DIGITS` digits at `CHECKS` times, shows the error of that run. The error of an
-integration grows, so the bound at a time t is `SAFETY` times the largest error seen at any check up to the next one after
-t, plus the rounding of what is stored. With ``precision="closed-form"`` the roles are exchanged: the values are the closed
-form in double, which does not lose digits with time, and the long double integration is what checks it.
+angles, which lose digits near a pole), at a tolerance of a hundredth of the rounding unit, from a start that is
+built in 60 digits. The closed form, evaluated in `DIGITS` digits at `CHECKS` times, shows the error of that run. The
+error of an integration grows, so the bound at a time t is `SAFETY` times the largest error seen at any check up to the
+next one after t, plus the rounding of what is stored. With ``precision="closed-form"`` the values are the closed form
+in double, which does not lose digits with time: its rounding is checked in the same way, and its mathematics
+against the long double integration. An integration that visibly differs from it has that distance as its bound.
 
 Values beyond double are stored as pairs, ``theta + theta_lo``. A result is cached on disk under a hash of the top, the
 start, the times, the precision and the sources; a damaged cache file is noticed, said and computed again.
@@ -28,7 +29,7 @@ from symtop.scenes import Scene, closed_form
 from symtop.scenes import scene as find_scene
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
-CHECKS = 24
+CHECKS = 16
 DIGITS = 40
 SAFETY = 8.0
 EPSILON = float(np.finfo(np.float64).eps)
@@ -131,9 +132,18 @@ def have_heyoka() -> bool:
     return True
 
 
-def check_times(horizon: float) -> charts.Array:
-    """Times of the checks: denser towards the start, the last one at the horizon."""
-    return horizon * (np.arange(1, CHECKS + 1) / CHECKS) ** 2
+def check_times(scene: Scene, horizon: float) -> charts.Array:
+    """Times of the checks: denser towards the start, the last one at the horizon.
+
+    Beside each stands the moment of fastest nutation in the period before it: an error of phase shows there most, and
+    may be thousands of times smaller elsewhere (near a separatrix the top hovers where all errors look small).
+    """
+    even = horizon * (np.arange(1, CHECKS + 1) / CHECKS) ** 2
+    period = min(scene.nutation_period, horizon)
+    around = np.maximum(even[:, None] - period * np.linspace(0.0, 1.0, 64), 0.0)
+    speed = np.nan_to_num(np.abs(closed_form(scene)(around).theta_dot))
+    fastest = around[np.arange(CHECKS), np.argmax(speed, axis=1)]
+    return np.unique(np.concatenate([even, fastest[fastest > 0.0]]))
 
 
 def _seen(scene: Scene, times: charts.Array, quaternions: Any, phis: Any, psis: Any) -> Checks:
@@ -146,13 +156,14 @@ def _seen(scene: Scene, times: charts.Array, quaternions: Any, phis: Any, psis: 
     rows = []
     with workdps(DIGITS + 10):
         for t, *found, phi, psi in zip(times, *quaternions.T, phis, psis, strict=True):
-            true, motion = precise.quaternion(float(t)), precise(float(t))
+            true = w, x, y, z = precise.quaternion(float(t))
             attitude = [_mpf(value) for value in found]
             if sum(a * b for a, b in zip(attitude, true, strict=True)) < 0:
                 attitude = [-value for value in attitude]
             turn = 2.0 * float(mp.norm([a - b for a, b in zip(attitude, true, strict=True)]))
             tilt = float(mp.norm([a - b for a, b in zip(_axis(attitude), _axis(true), strict=True)]))
-            rows.append((turn, tilt, _turn(_mpf(phi), motion.phi), _turn(_mpf(psi), motion.psi)))
+            total, difference = mp.atan2(z, w), mp.atan2(y, x)
+            rows.append((turn, tilt, _turn(_mpf(phi), total + difference), _turn(_mpf(psi), total - difference)))
     table = np.maximum.accumulate(np.array(rows), axis=0)
     return Checks(times, *table.T)
 
@@ -215,12 +226,12 @@ def _closed_values(scene: Scene, times: charts.Array) -> dict[str, Any]:
 @functools.lru_cache(maxsize=256)
 def _closed_checks(scene: Scene, horizon: float) -> tuple[Checks, float]:
     """Rounding errors of the closed form in double, and its distance from an integration over `OVERLAP` at most."""
-    times = check_times(horizon)
+    times = check_times(scene, horizon)
     found = _closed_values(scene, times)
     checks = _seen(scene, times, found["quaternion"], found["phi"], found["psi"])
     if not have_heyoka():
         return checks, math.nan
-    overlap = check_times(min(horizon, OVERLAP))
+    overlap = check_times(scene, min(horizon, OVERLAP))
     integrated, _ = integrate(scene, overlap, "longdouble")
     gap = charts.attitude_distance(_closed_values(scene, overlap)["quaternion"], integrated[:, :4].astype(float))
     return checks, float(np.max(gap))
@@ -228,7 +239,7 @@ def _closed_checks(scene: Scene, horizon: float) -> tuple[Checks, float]:
 
 def _integrated(scene: Scene, times: charts.Array, precision: str) -> tuple[dict[str, Any], Checks]:
     """heyoka's quantities at the times, and their errors at the check times, from one run."""
-    check = check_times(float(times[-1]))
+    check = check_times(scene, float(times[-1]))
     grid, place = np.unique(np.concatenate([times, check]), return_inverse=True)
     states, _ = integrate(scene, grid, precision)
     attitude = states[:, :4]
@@ -263,7 +274,10 @@ def _compute(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
         data[name] = (dims, high)
         if precision != "closed-form":
             data[f"{name}_lo"] = (dims, low)
-    for name, bound in _bounds(data, checks, grain, overlap).items():
+    bounds = _bounds(data, checks, grain, overlap)
+    if precision != "closed-form":
+        _raise_to_distance(bounds, data, _closed_values(scene, times))
+    for name, bound in bounds.items():
         data[f"{name}_error_bound"] = ("time", bound)
     for name, value in _constants(scene).items():
         data[name] = ("time", np.full(times.size, value))
@@ -284,6 +298,22 @@ def _bounds(data: xr.Dataset, checks: Checks, grain: float, overlap: float) -> d
     return {"axis": axis, "attitude": attitude, "theta": axis, "phi": turn, "psi": spin}
 
 
+def _raise_to_distance(bounds: dict[str, charts.Array], data: xr.Dataset, closed: dict[str, Any]) -> None:
+    """Where an integration visibly differs from the closed form in double, that distance is its error at that time."""
+    distances = {
+        "axis": charts.axis_distance(data["axis"].values, closed["axis"]),
+        "attitude": charts.attitude_distance(data["quaternion"].values, closed["quaternion"]),
+        "theta": np.abs(data["theta"].values - closed["theta"]),
+        "phi": np.abs(data["phi"].values - closed["phi"]),
+        "psi": np.abs(data["psi"].values - closed["psi"]),
+    }
+    for name, distance in distances.items():
+        scale = np.abs(data[name].values) if name in ("phi", "psi") else 1.0
+        grain = 4.0 * EPSILON * np.maximum(scale, 1.0)
+        visible = distance > 8.0 * grain
+        bounds[name] = np.where(visible, np.maximum(bounds[name], distance + grain), bounds[name])
+
+
 def _constants(scene: Scene) -> dict[str, float]:
     from symtop.exact_mp import PreciseForm  # noqa: PLC0415
 
@@ -294,8 +324,8 @@ def _constants(scene: Scene) -> dict[str, float]:
 def reference(scene: "str | Scene", times: ArrayLike, precision: str = "longdouble") -> xr.Dataset:
     """The true motion at the given times, each value with a bound on its error.
 
-    Variables as `simulate` (``theta``, ``phi``, ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ``p_psi``), the low
-    halves ``theta_lo`` ... of what is known beyond double, and ``axis_error_bound``, ``attitude_error_bound``,
+    Variables as `simulate` (``theta``, ``phi``, ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ...), the
+    low halves ``theta_lo`` ... of what is known beyond double, and ``axis_error_bound``, ``attitude_error_bound``,
     ``theta_error_bound``, ``phi_error_bound``, ``psi_error_bound`` in radians, for the sum of both halves. `precision`
     is "longdouble" (default), "double" or "quad" for heyoka in that arithmetic, or "closed-form".
 
@@ -328,7 +358,8 @@ def _cached(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
                 return found
         except SymtopError:
             pass
-        warnings.warn(f"the cached reference {path.name} is damaged and is computed again", SymtopWarning, stacklevel=3)
+        said = f"the cached reference {path.name} is damaged and is computed again"
+        warnings.warn(said, SymtopWarning, stacklevel=3)
     data = _compute(scene, times, precision)
     try:
         datasets.write(data.assign_attrs(content=_content(data)), path)

@@ -145,6 +145,13 @@ def _catalogue() -> dict[str, Scene]:
             "a fast top almost upright, the benchmark of structural dynamics",
         ),
         _kinon_betsch(),
+        Scene(
+            "bruls-cardona-arnold",
+            SymmetricTop(15.234375, 0.46875, 147.15),
+            Angles(theta=math.pi / 2, phi=math.pi, psi=math.pi / 2, phi_dot=-4.61538, psi_dot=150.0),
+            2.0,
+            "a published benchmark that grazes the lower pole at 0.00004 degrees: no place for angles",
+        ),
     ]
     return {scene.name: scene for scene in catalogue}
 

@@ -51,7 +51,7 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
     """
     last = samples - 1
     for dithered in (False, True):
-        place = np.arange(samples, dtype=float)
+        place: Any = np.arange(samples, dtype=float)
         if dithered:
             golden = 0.5 * (math.sqrt(5.0) - 1.0)
             place[1:last] += np.mod(golden * place[1:last], 1.0) - 0.5

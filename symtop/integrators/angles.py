@@ -4,7 +4,7 @@ The chart ends at theta = 0 and pi. p_phi and p_psi enter as parameters, so ever
 show them again from the increments that it produced (`observe` in `drive`).
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 

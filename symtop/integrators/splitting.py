@@ -19,13 +19,12 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-
 from numba.cpython.unsafe.tuple import tuple_setitem
 
 from symtop import top as model
-from symtop.integrators.compiled import register_jitable
 from symtop.checks import SymtopError, finite
 from symtop.integrators.angles import chart_outcome, reduced
+from symtop.integrators.compiled import register_jitable
 from symtop.integrators.drive import driver
 from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.registry import Integrator

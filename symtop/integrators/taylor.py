@@ -96,7 +96,7 @@ def built_in() -> list[Integrator]:
 
 
 def _absent() -> Integrator:
-    def refuse(top: SymmetricTop, start: Angles, plan: Plan) -> Run:  # noqa: ARG001
+    def refuse(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         msg = "taylor needs the package heyoka, which has wheels for Linux only (elsewhere: conda-forge)"
         raise SymtopError(msg)
 

@@ -6,6 +6,7 @@ a drift of a few rounding units does.
 """
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -69,7 +70,7 @@ def growth(time: ArrayLike, residual: ArrayLike) -> Fit:
     t, r = np.asarray(time, float), np.abs(np.asarray(residual, float))
     edges = np.geomspace(t[-1] / 100.0, t[-1], 13)
     middles, tops = [], []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         inside = (t > low) & (t <= high) & np.isfinite(r)
         if inside.any():
             middles.append(math.sqrt(low * high))

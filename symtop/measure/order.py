@@ -6,6 +6,7 @@ count, with Student's 95 % interval. Fewer than `LEAST` points give no verdict.
 """
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +38,7 @@ def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:
     if used is not None:
         mask &= np.asarray(used, bool)
     n = int(mask.sum())
-    if n < 3:  # noqa: PLR2004
+    if n < 3:
         return Fit(math.nan, math.nan, math.nan, mask)
     u, v = np.log(x[mask]), np.log(y[mask])
     du, dv = u - u.mean(), v - v.mean()
@@ -58,7 +59,7 @@ def order(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, omega: float
     h, e, b = (np.asarray(values, float) for values in np.broadcast_arrays(step_size, error, bound))
     used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR) & (h * omega < LARGEST_PHASE)
     falling = np.argsort(h)
-    for finer, coarser in zip(falling[:-1], falling[1:], strict=True):
+    for finer, coarser in pairwise(falling):
         if used[coarser] and used[finer] and e[coarser] <= e[finer] * math.sqrt(h[coarser] / h[finer]):
             used[falling[: int(np.flatnonzero(falling == coarser)[0])]] = False
     fit = power_law(h, e, used)

@@ -51,7 +51,7 @@ def _band(axis: Any, data: xr.Dataset, scene: str, quantity: str) -> float:
     return level
 
 
-def _curve(axis: Any, xs: Any, ys: Any, judged: Any, style: Look, name: str, dashed: bool) -> None:  # noqa: FBT001
+def _curve(axis: Any, xs: Any, ys: Any, judged: Any, style: Look, name: str, dashed: bool) -> None:
     order = np.argsort(xs)
     order = order[np.isfinite(xs[order]) & np.isfinite(ys[order])]
     line = (0, (4, 2)) if dashed else "-"
@@ -60,7 +60,9 @@ def _curve(axis: Any, xs: Any, ys: Any, judged: Any, style: Look, name: str, das
     for mask, face in ((filled, style.color), (~filled, "white")):
         pick = order[mask[order]]
         axis.plot(xs[pick], ys[pick], style.marker, ls="none", color=style.color, mfc=face, ms=style.size, zorder=3)
-    axis.plot([], [], style.marker, color=style.color, ls=line, ms=style.size, lw=1.1, label=name)  # one entry in the legend
+    axis.plot(
+        [], [], style.marker, color=style.color, ls=line, ms=style.size, lw=1.1, label=name
+    )  # one entry in the legend
 
 
 def residual_history(data: xr.Dataset, scenes: Sequence[str], rows: Sequence[tuple[str, str]]) -> Any:
@@ -77,7 +79,14 @@ def residual_history(data: xr.Dataset, scenes: Sequence[str], rows: Sequence[tup
                 t, r = t[good], np.maximum(r[good], 1e-17)
                 style = look(str(name))
                 axis.plot(t, r, ",", color=style.color, alpha=0.5, zorder=2)
-                axis.plot(*envelope(t, r), style.marker + "-", ms=0.8 * style.size, color=style.color, label=str(name), zorder=3)
+                axis.plot(
+                    *envelope(t, r),
+                    style.marker + "-",
+                    ms=0.8 * style.size,
+                    color=style.color,
+                    label=str(name),
+                    zorder=3,
+                )
             axis.set(xscale="log", yscale="log")
             if quantity == rows[0][0]:
                 axis.set_title(scene)
@@ -106,7 +115,7 @@ def outcome_strips(data: xr.Dataset, scenes: Sequence[str], verdicts: Sequence[s
     groups = [[str(n) for n, k in zip(data["integrator"].values, knobs, strict=True) if k == knob] for knob in KNOBS]
     kept = [(label, names) for label, names in zip(KNOBS.values(), groups, strict=True) if names]
     tallest = max(len(names) for _, names in kept)
-    figure, axes = panels(len(scenes), len(kept), height=0.6 + 0.34 * tallest, sharex="col")
+    figure, axes = panels(len(scenes), len(kept), height=0.75 + 0.3 * tallest, sharex="col")
     used: set[str] = set()
     for line, scene in zip(axes, scenes, strict=True):
         for axis, (label, names) in zip(line, kept, strict=True):

@@ -34,14 +34,15 @@ _LOOKS = {
     "taylor": Look(BLACK, "*", 8.0),
     "exact": Look(GREY, "x"),
 }
-_FAMILY_COLORS = {
-    "discrete-lagrangian": BLUE,
-    "splitting": GREEN,
-    "runge-kutta": ORANGE,
-    "taylor": BLACK,
-    "library": VERMILLION,
-    "exact": GREY,
-    "other": PURPLE,
+# Shades of a family: light enough to tell apart, of one hue so that families stay together.
+_SHADES = {
+    "discrete-lagrangian": (BLUE, "#7B9FD1", "#1B3A6B"),
+    "splitting": (GREEN, "#7CC9A8", "#00563F"),
+    "runge-kutta": (ORANGE, "#B37400", "#F5C766"),
+    "taylor": (BLACK, "#555555", "#999999"),
+    "library": (VERMILLION, "#F09A66", "#8A3C00"),
+    "exact": (GREY,),
+    "other": (PURPLE, "#8C4A73", "#E6B8D2"),
 }
 _MARKERS = "osv^<>DPXph8dH"
 
@@ -60,14 +61,17 @@ OUTCOME_HATCHES = {"wrong_regime": "\\\\\\", "left_chart": "///", "not_converged
 
 
 def look(name: str) -> Look:
-    """Colour and marker of an integrator: a fixed one, or its family's colour and a marker from its name."""
+    """Colour and marker of an integrator: a fixed one, or a shade of its family and a marker by its place in it."""
     if name in _LOOKS:
         return _LOOKS[name]
     from symtop.integrators.registry import integrators  # noqa: PLC0415
 
     known = integrators()
     family = known[name].family if name in known else "other"
-    return Look(_FAMILY_COLORS[family], _MARKERS[zlib.crc32(name.encode()) % len(_MARKERS)])
+    peers = [entry.name for entry in known.values() if entry.family == family and entry.name not in _LOOKS]
+    place = peers.index(name) if name in peers else zlib.crc32(name.encode())
+    shades = _SHADES[family]
+    return Look(shades[place % len(shades)], _MARKERS[place % len(_MARKERS)])
 
 
 def use() -> None:
@@ -97,9 +101,9 @@ def use() -> None:
 
 
 def panels(rows: int, columns: int, width: float = 9.6, height: float = 3.4, **options: Any) -> Any:
-    """A grid of axes, always two-dimensional."""
+    """A grid of axes, always two-dimensional, with room for a legend below."""
     use()
-    return plt.subplots(rows, columns, figsize=(width, height * rows), squeeze=False, **options)
+    return plt.subplots(rows, columns, figsize=(width, height * rows + 0.8), squeeze=False, **options)
 
 
 def legend_below(figure: Any, axes: Any, columns: int = 6) -> None:

@@ -37,7 +37,7 @@ def folder() -> Path:
 
 def names() -> list[str]:
     """Names of all studies, in the order of the report."""
-    order = ["convergence", "work_precision", "drift", "stability"]
+    order = ["truth", "convergence", "work_precision", "drift", "stability", "reduction"]
     found = sorted(path.stem for path in folder().glob("*.py") if not path.stem.startswith("_"))
     return [name for name in order if name in found] + [name for name in found if name not in order]
 
@@ -89,9 +89,9 @@ def _measure_all(study: Study, missing: dict[Path, Case], jobs: int, quiet: bool
                 for path, case in missing.items()
             }
             for future in as_completed(futures):
-                error = future.exception()
-                if error is not None:
-                    failures.append(_failure(futures[future], error))
+                problem = future.exception()
+                if problem is not None:
+                    failures.append(_failure(futures[future], problem))
                 bar.update()
     return failures
 

@@ -79,7 +79,7 @@ class Study:
         """Hash of everything the case's numbers depend on: its settings, the way it is measured, the sources."""
         content = json.dumps([self.name, case.scene, case.integrator, dict(case.settings)], sort_keys=True)
         measured = _source(self.measure)
-        return hashlib.sha256("\n".join([content, measured, numerics_digest()]).encode()).hexdigest()[:20]
+        return hashlib.sha256(f"{content}\n{measured}\n{numerics_digest()}".encode()).hexdigest()[:20]
 
 
 def _source(function: Callable[..., Any]) -> str:

@@ -1,0 +1,109 @@
+"""Published values of this problem, computed anew.
+
+Each entry names its source, the value as printed, and ours. They agree if they round to the same printed digits.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from symtop.reference import reference
+from symtop.scenes import Scene, closed_form, scene
+from symtop.top import Angles, SymmetricTop
+
+
+class Published(NamedTuple):
+    """One published number and ours."""
+
+    source: str
+    quantity: str
+    published: float
+    ours: float
+    unit: float  # one unit of the last printed digit
+    remark: str = ""
+
+    @property
+    def reproduced(self) -> bool:
+        """Do they agree to the last printed digit?"""
+        return abs(self.ours - self.published) <= 0.5000001 * self.unit
+
+
+def woodhouse() -> Scene:
+    """Woodhouse's elementary separatrix: theta0 = pi/3, phi' = 2g/sqrt 3, psi' = (3 I1 - I3) g/(I3 sqrt 3)."""
+    top = SymmetricTop(2.0, 1.0, 2.0)
+    g = math.sqrt(top.mgl / top.I1)
+    root = math.sqrt(3.0)
+    start = Angles(math.pi / 3.0, phi_dot=2.0 * g / root, psi_dot=(3.0 * top.I1 - top.I3) * g / (top.I3 * root))
+    return Scene("separatrix", top, start, 20.0 / g)
+
+
+def published_values() -> list[Published]:
+    """All entries, each evaluated now."""
+    return [_simo_wong(), *_bruls_cardona_arnold(), *_woodhouse(), *_kinon_betsch(), *_hairer(), *_detest()]
+
+
+def _simo_wong() -> Published:
+    where = scene("simo-wong")
+    energy = where.top.energy(where.start)
+    return Published("Simo & Wong 1991; Krysl 2005", "energy of the fast top", 1269.975, energy, 1e-3)
+
+
+def _bruls_cardona_arnold() -> list[Published]:
+    moved = reference("bruls-cardona-arnold", [1.0])["axis"].values[0] - np.array([0.0, 1.0, 0.0])
+    printed = (0.17334, -0.35991, -0.74849)
+    return [
+        Published(
+            "Bruls, Cardona & Arnold 2012", f"{name} displacement of the centre of mass at t = 1", value, ours, 1e-5,
+            "regression data of public codes, h = 2e-6",
+        )
+        for name, value, ours in zip("xyz", printed, moved, strict=True)
+    ]  # fmt: skip
+
+
+def _woodhouse() -> list[Published]:
+    where, rows = woodhouse(), []
+    g = math.sqrt(where.top.mgl / where.top.I1)
+    for t in (1.0, 5.0):
+        exact = 1.0 / (1.0 + 1.0 / math.cosh(g * t))
+        ours = math.cos(float(closed_form(where)(np.array([t])).theta[0]))
+        rows.append(
+            Published("Woodhouse, problem 5.3", f"cos theta on the separatrix at t = {t:g}", exact, ours, 1e-13)
+        )
+    return rows
+
+
+def _kinon_betsch() -> list[Published]:
+    where = scene("kinon-betsch")
+    motion = closed_form(where)(np.linspace(0.0, where.horizon, 301))
+    return [
+        Published("Kinon & Betsch", "largest tilt (degrees)", 60.0, math.degrees(motion.theta.max()), 1e-10),
+        Published("Kinon & Betsch", "precession rate", 10.0, float(motion.phi_dot.mean()), 1e-10),
+    ]  # fmt: skip
+
+
+def _hairer() -> list[Published]:
+    where = scene("hairer-lubich-wanner")
+    momenta = where.top.momenta(where.start)
+    source = "Hairer, Lubich & Wanner, figure VII.5.3"
+    return [
+        Published(source, "energy", 1.72, where.top.energy(where.start), 1e-12),
+        Published(source, "vertical angular momentum", 1.04, momenta.p_phi, 1e-12),
+    ]
+
+
+def _detest() -> list[Published]:
+    """Euler's equations of DETEST B5, integrated by SciPy's DOP853 at its tightest tolerance."""
+    from scipy.integrate import solve_ivp  # noqa: PLC0415
+
+    done = solve_ivp(
+        lambda _, y: (y[1] * y[2], -y[0] * y[2], -0.51 * y[0] * y[1]), (0.0, 20.0), (0.0, 1.0, 1.0),
+        method="DOP853", rtol=3e-14, atol=1e-15,
+    )  # fmt: skip
+    printed = (-0.93965707987, -0.34211777540, 0.74141265962)
+    return [
+        Published(
+            "Enright & Pryce 1987, DETEST B5", f"y{k + 1}(20) of the free body", value, float(done.y[k, -1]), 1e-11
+        )
+        for k, value in enumerate(printed)
+    ]

@@ -1,0 +1,31 @@
+"""The README says what the code says."""
+
+import re
+from pathlib import Path
+
+from symtop.report.page import integrator_table, markdown_table
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_table_of_integrators_is_the_generated_one():
+    shown = re.search(r"<!-- integrators -->\n(.*?)\n<!-- /integrators -->", README, re.DOTALL)
+    assert shown is not None
+    assert shown.group(1) == markdown_table(*integrator_table()), "regenerate: symtop integrators --markdown"
+
+
+def test_every_study_is_explained():
+    for script in (ROOT / "studies").glob("[!_]*.py"):
+        assert f"| `{script.stem}` |" in README
+
+
+def test_its_python_examples_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for block in re.findall(r"```python\n(.*?)```", README, re.DOTALL):
+        exec(compile(block.replace('"simpson"', '"simpson-of-the-readme"'), "README.md", "exec"), {})
+
+
+def test_its_figures_are_there():
+    for path in re.findall(r"!\[[^]]*\]\(([^)]+)\)", README):
+        assert (ROOT / path).is_file()
