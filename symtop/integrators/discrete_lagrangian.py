@@ -149,7 +149,7 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:  # noqa: ARG001
     """The force sum W0 of a step of length zero, as a flat history for the predictor."""
     sin_start, cos_start = _start_trig(rule, state[0])
     W0 = _forces(par, _node_sums(rule, state[0], 0.0, sin_start, cos_start)).W0
-    return (W0, W0, W0)
+    return (W0, W0, W0, W0)
 
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
@@ -158,8 +158,9 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     flight = h * state[1] / par.I1
     scale = h * h / par.I1
     sin_start, cos_start = _start_trig(rule, theta)
-    # W0 is smooth in time: the parabola through its last three values predicts the next one
-    d = flight - scale * (3.0 * (carry[0] - carry[1]) + carry[2])
+    # W0 is smooth in time: the cubic through its last four values predicts the next one. At 300 steps a nutation that
+    # leaves 1.1 to 1.6 iterations, where a parabola left 1.8 to 2.0.
+    d = flight - scale * (4.0 * (carry[0] + carry[2]) - 6.0 * carry[1] - carry[3])
     sums = _node_sums(rule, theta, d, sin_start, cos_start)
     force = _forces(par, sums)
     correction = 0.0
@@ -184,7 +185,7 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     v = force.v + force.v_slope * correction
     C = sums.C - sums.P1 * correction
     step = (d, -h * (W0 + W1), h * v, h * (par.p_psi / par.I3 - v * C))
-    return step, (W0, carry[0], carry[1]), effort, outcome
+    return step, (W0, carry[0], carry[1], carry[2]), effort, outcome
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
