@@ -60,7 +60,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
                 f"{quantity}-{cost.replace('_', '-')}",
                 figure,
                 f"Largest {quantity} error over {PERIODS:g} nutation periods against {COSTS[cost]}. Best is towards "
-                "the lower left. Dashed: the inner loop runs in plain Python, not compiled. Hollow points lie within ten "
+                "the lower left. Dashed: the inner loop runs in plain Python, not compiled. Hollow: within ten "
                 f"times of the reference's own bound (grey band).{others}",
                 f"Log-log work-precision plots of {quantity} error against {COSTS[cost]}, one panel a scene.",
             )

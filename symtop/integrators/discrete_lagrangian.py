@@ -13,10 +13,11 @@ d = theta1 - theta0. With sums over the nodes theta_i = theta0 + a_i d (c = cos,
     W0 = sum w (1-a) s [v p_psi - mgl - v^2 ((I1-I3) c + I3 C)],   W1 the same with a for 1-a
     p_theta0 = I1 d/h + h W0   (Newton, analytic slope),           p_theta1 = p_theta0 - h (W0 + W1)
 
-`midpoint` is a = (1/2), w = (1); `trapezoidal` is a = (0, 1), w = (1/2, 1/2). Both are symmetric, symplectic,
-of order 2, and conserve p_phi and p_psi exactly. The midpoint rule equals the implicit midpoint rule on the
-reduced Hamiltonian (reduction and discretisation commute); the trapezoidal rule does *not* commute with the
-reduction and must not be confused with Stormer-Verlet, which is explicit.
+`midpoint` is a = (1/2), w = (1); `trapezoidal` is a = (0, 1), w = (1/2, 1/2); `simpson-linear` is a = (0, 1/2, 1),
+w = (1/6, 2/3, 1/6) and gains no order from its better quadrature, because the path is still a straight line (see
+`galerkin`). All are symmetric, symplectic, of order 2, and conserve p_phi and p_psi exactly. The midpoint rule
+equals the implicit midpoint rule on the reduced Hamiltonian (reduction and discretisation commute); the trapezoidal
+rule does *not* commute with the reduction and must not be confused with Stormer-Verlet, which is explicit.
 
 The start is p0 = dL/dq' (the discrete Legendre transform); starting from q1 = q0 + h q0' instead costs an order.
 p_phi - p_psi C is formed as north sum w cos^2(theta/2) + south sum w sin^2(theta/2), without cancellation at the
@@ -25,6 +26,7 @@ poles. Source: Marsden and West, Discrete mechanics and variational integrators,
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,7 +37,8 @@ from symtop.integrators.compiled import register_jitable
 from symtop.integrators.drive import driver
 from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.outcomes import NOT_CONVERGED
-from symtop.integrators.registry import Integrator
+from symtop.integrators.registry import Integrator, Plan, Run, Solver
+from symtop.top import Angles, SymmetricTop
 
 
 class Quadrature(NamedTuple):
@@ -142,11 +145,11 @@ def _forces(par: Any, sums: Any) -> Any:
     )
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:  # noqa: ARG001
     """The force sum W0 of a step of length zero, as a flat history for the predictor."""
     sin_start, cos_start = _start_trig(rule, state[0])
     W0 = _forces(par, _node_sums(rule, state[0], 0.0, sin_start, cos_start)).W0
-    return (W0, W0, W0)
+    return (W0, W0, W0, W0)
 
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
@@ -155,8 +158,9 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     flight = h * state[1] / par.I1
     scale = h * h / par.I1
     sin_start, cos_start = _start_trig(rule, theta)
-    # W0 is smooth in time: the parabola through its last three values predicts the next one
-    d = flight - scale * (3.0 * (carry[0] - carry[1]) + carry[2])
+    # W0 is smooth in time: the cubic through its last four values predicts the next one. At 300 steps a nutation that
+    # leaves 1.1 to 1.6 iterations, where a parabola left 1.8 to 2.0.
+    d = flight - scale * (4.0 * (carry[0] + carry[2]) - 6.0 * carry[1] - carry[3])
     sums = _node_sums(rule, theta, d, sin_start, cos_start)
     force = _forces(par, sums)
     correction = 0.0
@@ -181,7 +185,7 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     v = force.v + force.v_slope * correction
     C = sums.C - sums.P1 * correction
     step = (d, -h * (W0 + W1), h * v, h * (par.p_psi / par.I3 - v * C))
-    return step, (W0, carry[0], carry[1]), effort, outcome
+    return step, (W0, carry[0], carry[1], carry[2]), effort, outcome
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
@@ -197,19 +201,8 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 march = driver(begin, increment, observe)
 
 
-def discrete_lagrangian(
-    name: str,
-    nodes: Sequence[float],
-    weights: Sequence[float],
-    *,
-    order: int | None = None,
-    summary: str = "",
-    reference: str = "marsden-west-2001",
-) -> Integrator:
-    """A variational integrator from a quadrature rule on [0, 1]: two tuples make a method.
-
-    The rule is symmetric if it reads the same from both ends; a rule that integrates t exactly has order 2.
-    """
+def quadrature(nodes: Sequence[float], weights: Sequence[float]) -> tuple[Quadrature, bool]:
+    """The checked rule with its nodes in order, and whether it reads the same from both ends."""
     if len(nodes) != len(weights) or len(nodes) == 0:
         msg = f"nodes and weights must be equally many, at least one, not {len(nodes)} and {len(weights)}"
         raise SymtopError(msg)
@@ -225,12 +218,36 @@ def discrete_lagrangian(
     mirror = sorted((1.0 - node, share) for node, share in pairs)
     symmetric = all(abs(a - c) + abs(b - d) < 1e-15 for (a, b), (c, d) in zip(pairs, mirror, strict=True))
     points, shares = (tuple(column) for column in zip(*pairs, strict=True))
-    fresh = sum(node != 0.0 for node in points)  # a node at 0 is evaluated once a step, not once an iteration
+    return Quadrature(points, shares), symmetric
+
+
+@dataclass(frozen=True)
+class StraightLine:
+    """A solver that remembers its rule, so that other ways to step the same rule can be set beside it."""
+
+    rule: Quadrature
+    solve: Solver
+
+    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        """Run the reduced kernel."""
+        return self.solve(top, start, plan)
+
+
+def rule_of(method: Integrator) -> Quadrature | None:
+    """The rule of an integrator that `discrete_lagrangian` made; None for any other."""
+    solver = method.solvers.get("angles")
+    return solver.rule if isinstance(solver, StraightLine) else None
+
+
+def record(
+    name: str, rule: Quadrature, solver: Solver, *, order: int | None, symmetric: bool, summary: str, reference: str
+) -> Integrator:
+    """The registry entry of a discrete Lagrangian on a straight line, whichever kernel steps it."""
     return Integrator(
         name=name,
         family="discrete-lagrangian",
-        summary=summary or f"discrete Lagrangian with nodes {points} and weights {shares}",
-        solvers={"angles": fixed_step(march, Quadrature(points, shares), reduced, fresh, implicit=True)},
+        summary=summary or f"discrete Lagrangian with nodes {rule.nodes} and weights {rule.weights}",
+        solvers={"angles": solver},
         order=order,
         explicit=False,
         symplectic=True,
@@ -240,11 +257,41 @@ def discrete_lagrangian(
     )
 
 
+def discrete_lagrangian(
+    name: str,
+    nodes: Sequence[float],
+    weights: Sequence[float],
+    *,
+    order: int | None = None,
+    summary: str = "",
+    reference: str = "marsden-west-2001",
+) -> Integrator:
+    """A variational integrator from a quadrature rule on [0, 1]: two tuples make a method.
+
+    The rule is symmetric if it reads the same from both ends; a rule that integrates t exactly has order 2.
+    """
+    rule, symmetric = quadrature(nodes, weights)
+    fresh = sum(node != 0.0 for node in rule.nodes)  # a node at 0 is evaluated once a step, not once an iteration
+    solver = StraightLine(rule, fixed_step(march, rule, reduced, fresh, implicit=True))
+    return record(name, rule, solver, order=order, symmetric=symmetric, summary=summary, reference=reference)
+
+
+# name: nodes, weights, order
+RULES: dict[str, tuple[tuple[float, ...], tuple[float, ...], int]] = {
+    "midpoint": ((0.5,), (1.0,), 2),
+    "trapezoidal": ((0.0, 1.0), (0.5, 0.5), 2),
+    "simpson-linear": ((0.0, 0.5, 1.0), (1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0), 2),
+}
+
+
 def built_in() -> list[Integrator]:
     """The rules that ship with symtop."""
+    said = {
+        "midpoint": "discrete Lagrangian, midpoint rule",
+        "trapezoidal": "discrete Lagrangian, trapezoidal rule",
+        "simpson-linear": "discrete Lagrangian, Simpson's rule on a straight line (order 2: the line limits it)",
+    }
     return [
-        discrete_lagrangian("midpoint", (0.5,), (1.0,), order=2, summary="discrete Lagrangian, midpoint rule"),
-        discrete_lagrangian(
-            "trapezoidal", (0.0, 1.0), (0.5, 0.5), order=2, summary="discrete Lagrangian, trapezoidal rule"
-        ),
+        discrete_lagrangian(name, nodes, weights, order=order, summary=said[name])
+        for name, (nodes, weights, order) in RULES.items()
     ]

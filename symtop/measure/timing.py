@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import xarray as xr
 
-from symtop.integrators.registry import Integrator
+from symtop.integrators.registry import Integrator, Run
 from symtop.measure.accuracy import knobs
 from symtop.scenes import Scene
 from symtop.simulate import choose_chart, make_plan
@@ -70,6 +70,13 @@ def timings(
     return [Timing(tuple(found), first) for found, first in zip(samples, firsts, strict=True)]
 
 
+def bare_run(scene: Scene, method: Integrator, chart: str, setting: float, horizon: float) -> Callable[[], Run]:
+    """A call of one of a method's solvers, start to horizon, with nothing around it."""
+    plan, _ = make_plan(scene, method, horizon=horizon, samples=2, **knobs(method, setting))
+    solve = method.solvers[chart]
+    return lambda: solve(scene.top, scene.start, plan)
+
+
 def time_settings(
     scene: Scene, method: Integrator, settings: Sequence[float], horizon: float, observe: str, batches: int = 5
 ) -> xr.Dataset:
@@ -78,13 +85,8 @@ def time_settings(
     ``seconds`` is the smallest batch, ``seconds_samples`` are all of them, ``first_call`` the very first run with its
     compilation or loading, ``reliable`` 1 where the spread allows a verdict.
     """
-    solve = method.solvers[choose_chart(method, observe)]
-
-    def runner(setting: float) -> Callable[[], object]:
-        plan, _ = make_plan(scene, method, horizon=horizon, samples=2, **knobs(method, setting))
-        return lambda: solve(scene.top, scene.start, plan)
-
-    found = timings([runner(setting) for setting in settings], batches)
+    chart = choose_chart(method, observe)
+    found = timings([bare_run(scene, method, chart, setting, horizon) for setting in settings], batches)
     return xr.Dataset(
         {
             "seconds": ("setting", [timing.best for timing in found]),

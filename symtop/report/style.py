@@ -27,6 +27,8 @@ class Look(NamedTuple):
 _LOOKS = {
     "midpoint": Look(BLUE, "o", 8.0),
     "trapezoidal": Look(SKY, "s"),
+    "simpson-linear": Look(PURPLE, "v"),
+    "galerkin-simpson": Look(BLUE, "P"),
     "stormer-verlet": Look(GREEN, "^"),
     "rk45": Look(VERMILLION, "D"),
     "taylor": Look(BLACK, "*", 8.0),
