@@ -124,7 +124,7 @@ def _rates(par: Any, state: Any) -> Any:
     return state[3] / par.I1, precession, state[5] / par.I3 - precession * c
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:  # noqa: ARG001
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     """The rates at the start, as a history for the predictor."""
     rate = _rates(par, state)
     return (rate, rate, rate)
@@ -168,7 +168,7 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     return step, ((w, v, u), near, far), effort, outcome
 
 
-def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:  # noqa: ARG001
+def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     """p_phi and p_psi as the step left them."""
     return before[4] + dstate[4], before[5] + dstate[5]
 
