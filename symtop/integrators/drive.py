@@ -6,6 +6,11 @@ A kernel family is three plain functions on flat tuples of floats:
     increment(par, rule, state, carry, h) -> (dstate, carry, work, outcome)
     observe(par, rule, before, dstate, h) -> (p_phi, p_psi)  the momenta that this step really carried
 
+and two more where what is stepped is not what is shown (a processed method, a motion that is known exactly):
+
+    enter(par, rule, state, h) -> state                    the start as the kernel steps it, once a run
+    present(par, rule, state, k, h) -> state               a sample as the user sees it, once a sample
+
 `par` are the numbers of the top, `rule` the numbers of the method, `work` its force evaluations or solver
 iterations. A kernel returns the *increment* of the state; the loop adds it with Knuth's two-sum and carries
 the rounding error to the next step, which costs nothing (the loop is bound by the latency of the
@@ -52,19 +57,32 @@ def _accumulate(state: Any, low: Any, dstate: Any) -> Any:
     return state, low
 
 
+def _as_given(par: Any, rule: Any, state: Any, h: float) -> Any:
+    return state
+
+
+def _as_stepped(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
+    return state
+
+
 def driver(
-    begin: Callable[..., Any], increment: Callable[..., Any], observe: Callable[..., Any]
+    begin: Callable[..., Any],
+    increment: Callable[..., Any],
+    observe: Callable[..., Any],
+    enter: Callable[..., Any] = _as_given,
+    present: Callable[..., Any] = _as_stepped,
 ) -> Callable[..., March]:
     """Compile the loop around one kernel family.
 
     The returned function runs ``march(par, rule, state, h, marks)`` and records the state after
     ``marks[j]`` steps for each j (increasing whole numbers; a mark at 0 records the start).
     """
-    for part in (begin, increment, observe):
+    for part in (begin, increment, observe, enter, present):
         register_jitable(part)
 
     def prepare(par, rule, state, h):  # type: ignore[no-untyped-def]
-        return begin(par, rule, state, h)
+        state = enter(par, rule, state, h)
+        return state, begin(par, rule, state, h)
 
     def march(par, rule, state, low, carry, h, k, j, stop, marks, states, momenta):  # type: ignore[no-untyped-def]
         work = 0
@@ -82,21 +100,22 @@ def driver(
                 k += 1
             if outcome != 0 or k < marks[j]:
                 break
-            for i in range(len(state)):
-                states[j, i] = state[i]
+            shown = present(par, rule, state, k, h)
+            for i in range(len(shown)):
+                states[j, i] = shown[i]
             if k > 0:
                 momenta[j, 0], momenta[j, 1] = observe(par, rule, before, dstate, h)
             j += 1
         return state, low, carry, k, j, work, outcome
 
-    prepare = compile_kernel(prepare, begin)
-    march = compile_kernel(march, begin, increment, observe)
+    prepare = compile_kernel(prepare, begin, enter)
+    march = compile_kernel(march, begin, increment, observe, enter, present)
 
     def run(par: Any, rule: Any, state: tuple[float, ...], h: float, marks: NDArray[np.int64]) -> March:
         states = np.full((len(marks), len(state)), np.nan)
         momenta = np.full((len(marks), 2), np.nan)
         low = (0.0,) * len(state)
-        carry = prepare(par, rule, state, h)
+        state, carry = prepare(par, rule, state, h)
         k = j = work = outcome = 0
         while j < len(marks) and outcome == OK:
             stop = min(k + BLOCK, int(marks[-1]))
