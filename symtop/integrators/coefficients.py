@@ -35,12 +35,12 @@ def palindrome(outer: Sequence[float], *, odd: bool) -> tuple[float, ...]:
     return (*outer, *middle, *reversed(outer))
 
 
-def exact_sum(values: Sequence[float]) -> tuple[float, ...]:
-    """The same coefficients with the middle one (or the middle two, equally) closing the sum to 1."""
+def exact_sum(values: Sequence[float], total: float = 1.0) -> tuple[float, ...]:
+    """The same coefficients with the middle one (or the middle two, equally) closing the sum to `total`."""
     n = len(values)
     middle = range((n - 1) // 2, n // 2 + 1)
     others = math.fsum(value for i, value in enumerate(values) if i not in middle)
-    return tuple((1.0 - others) / len(middle) if i in middle else value for i, value in enumerate(values))
+    return tuple((total - others) / len(middle) if i in middle else value for i, value in enumerate(values))
 
 
 def strang_steps(order: int, outer: Sequence[float]) -> Table:

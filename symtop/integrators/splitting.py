@@ -11,21 +11,23 @@ Source: Blanes, Casas, A Concise Introduction to Geometric Numerical Integration
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from symtop.checks import SymtopError, finite, one_of
-from symtop.integrators import coefficients as table
+from symtop.integrators import coefficients as tables
 from symtop.integrators import splitting_angles, splitting_space
 from symtop.integrators.angles import reduced
-from symtop.integrators.coefficients import Table, exact_sum
-from symtop.integrators.fixed_step import fixed_step
+from symtop.integrators.coefficients import Table
+from symtop.integrators.drive import March
+from symtop.integrators.fixed_step import Prepare, fixed_step
 from symtop.integrators.registry import Integrator, Plan, Run, Solver
 from symtop.integrators.space import on_attitude, on_axis
-from symtop.integrators.splitting_loop import Composition
+from symtop.integrators.splitting_loop import Composition, Stages, closed
+from symtop.integrators.splitting_space import ROTATIONS
 from symtop.top import Angles, SymmetricTop
 
 _SPACE = {"axis": (splitting_space.march_axis, on_axis), "attitude": (splitting_space.march_attitude, on_attitude)}
-DRIFTS = ("exact", "cayley", "cayley-tuned")
 
 
 def composition(
@@ -54,90 +56,63 @@ def composition(
     Raises SymtopError for tables that do not fit together or do not sum to 1.
     """
     space = one_of("chart", chart, ("angles", "space")) == "space"
-    one_of("rotation", rotation, DRIFTS)
-    rule = _rule(drift, kick, gradient, rotation, finite("processor", processor))
-    if not space and (any(rule.gradient) or rotation != "exact" or rule.processor):
+    one_of("rotation", rotation, ROTATIONS)
+    rule, boost = _checked(drift, kick, gradient), finite("processor", processor)
+    if not space and (any(rule.gradient) or rotation != "exact" or boost):
         msg = f"chart must be 'space' for a composition with a gradient, a rotation or a processor, not {chart!r}"
         raise SymtopError(msg)
-    reads_same = all(row == row[::-1] for row in (rule.drift, rule.kick, rule.gradient))
+    reads_same = all(row == row[::-1] for row in rule[:3])
+    integrable = rotation != "exact" and rule.drift == (1.0,) and not any(rule.gradient) and not boost
+    if space:
+        stages = partial(splitting_space.stages, rule, rotation, boost)
+        solvers = {chart: _solver(march, prepare, stages) for chart, (march, prepare) in _SPACE.items()}
+    else:
+        solvers = {"angles": _solver(splitting_angles.march, reduced, partial(splitting_angles.stages, rule))}
     return Integrator(
         name=name,
         family="splitting",
         summary=summary or f"splitting with {len(rule.drift)} drifts and {rule.forces} forces a step",
-        solvers=_space_solvers(rule, rotation) if space else {"angles": _angles_solver(rule)},
+        solvers=solvers,
         order=order,
         explicit=True,
         symplectic=True,
         symmetric=reads_same,
-        conserves=frozenset({"p_phi", "p_psi"}) | ({"cayley_energy"} if _integrable(rule) else set()),
+        conserves=frozenset({"p_phi", "p_psi"} | ({"cayley_energy"} if integrable else set())),
         reference=reference,
     )
 
 
-def _integrable(rule: Composition) -> bool:
-    return rule.cayley != 0.0 and rule.drift == (1.0,) and not any(rule.gradient) and rule.processor == 0.0
-
-
-def _rule(
-    drift: Sequence[float],
-    kick: Sequence[float],
-    gradient: Sequence[float] | None,
-    rotation: str,
-    processor: float,
-) -> Composition:
-    """Checked coefficients that sum to 1."""
+def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] | None) -> Composition:
+    """Coefficients that fit together and sum to 1."""
     if len(kick) != len(drift) + 1 or not len(drift):
         msg = f"kick must have one coefficient more than drift, not {len(kick)} against {len(drift)}"
         raise SymtopError(msg)
-    slopes = tuple(finite("a gradient coefficient", value) for value in gradient or [0.0] * len(kick))
+    slopes = [0.0] * len(kick) if gradient is None else [finite("a gradient coefficient", c) for c in gradient]
     if len(slopes) != len(kick):
         msg = f"gradient must have as many coefficients as kick, not {len(slopes)} against {len(kick)}"
         raise SymtopError(msg)
-    drifts, kicks = _checked("drift", drift), _checked("kick", kick)
-    if any(c != 0.0 and b == 0.0 for b, c in zip(kicks, slopes, strict=True)):
-        msg = f"gradient must be zero where kick is, not {slopes} with {kicks}"
+    sums = {}
+    for label, row in (("drift", drift), ("kick", kick)):
+        sums[label] = [finite(f"a {label} coefficient", value) for value in row]
+        if abs(math.fsum(sums[label]) - 1.0) > 1e-12:
+            msg = f"{label} coefficients must sum to 1, not {math.fsum(sums[label])!r}"
+            raise SymtopError(msg)
+    if any(c != 0.0 and b == 0.0 for b, c in zip(sums["kick"], slopes, strict=True)):
+        msg = f"gradient must be zero where kick is, not {slopes} with {sums['kick']}"
         raise SymtopError(msg)
-    forces = sum(b != 0.0 for b in kicks) - (kicks[0] != 0.0 and kicks[-1] != 0.0)
-    return Composition(drifts, kicks, slopes, forces, float(rotation != "exact"), processor)
+    return closed(sums["drift"], sums["kick"], slopes)
 
 
-def _checked(label: str, values: Sequence[float]) -> tuple[float, ...]:
-    numbers = [finite(f"a {label} coefficient", value) for value in values]
-    if abs(math.fsum(numbers) - 1.0) > 1e-12:
-        msg = f"{label} coefficients must sum to 1, not {math.fsum(numbers)!r}"
-        raise SymtopError(msg)
-    return exact_sum(numbers)
-
-
-def _angles_solver(rule: Composition) -> Solver:
-    return fixed_step(splitting_angles.march, rule, reduced, 1, implicit=False)
-
-
-def _space_solvers(rule: Composition, rotation: str) -> dict[str, Solver]:
-    if rotation == "cayley-tuned":
-        return {chart: _tuned(chart, rule) for chart in _SPACE}
-    return {chart: fixed_step(march, rule, prepare, 1, implicit=False) for chart, (march, prepare) in _SPACE.items()}
-
-
-def _tuned(chart: str, rule: Composition) -> Solver:
-    """A solver that chooses tau for each run."""
-    march, prepare = _SPACE[chart]
+def _solver(
+    march: Callable[..., March], prepare: Prepare, stages: Callable[[SymmetricTop, Angles, float], Stages]
+) -> Solver:
+    """A solver that multiplies the coefficients out for each run."""
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        tuned = rule._replace(cayley=tangent_scale(top, start, plan.step_size))
-        return fixed_step(march, tuned, prepare, 1, implicit=False)(top, start, plan)
+        rule = stages(top, start, plan.step_size)
+        return fixed_step(march, rule, prepare, 1, implicit=False)(top, start, plan)
 
     return solve
-
-
-def tangent_scale(top: SymmetricTop, start: Angles, h: float) -> float:
-    """tan(x)/x with x = h Lm/2 I1: the Cayley drift with tau = (h/2 I1) times this turns |L| = Lm by the exact angle.
-
-    Lm is the root of the mean of |L|^2 = 2 I1 (E - p_psi^2/2 I3 - mgl u) + p_psi^2 over a nutation, from the exact mean of u.
-    """
-    angular = top.mean_square_momentum(start)
-    x = 0.5 * h * math.sqrt(angular) / top.I1
-    return math.tan(x) / x if x > 0.0 else 1.0
 
 
 def _on_space(name: str, numbers: Table, reference: str, summary: str) -> Integrator:
@@ -153,7 +128,7 @@ def _on_angles(name: str, numbers: Table, reference: str, summary: str) -> Integ
 def built_in() -> list[Integrator]:
     """The compositions that ship with symtop."""
     ABA = "blanes-casas-farres-laskar-makazaga-murua-2013"
-    strang = table.STRANG
+    strang = tables.STRANG
     return [
         _on_angles(
             "stormer-verlet",
@@ -161,11 +136,11 @@ def built_in() -> list[Integrator]:
             "hairer-lubich-wanner-2003",
             "kick-drift-kick splitting of the reduced Hamiltonian",
         ),
-        _on_angles("stormer-verlet-yoshida-4", table.YOSHIDA_4, "yoshida-1990", "three Stormer-Verlet steps"),
-        _on_angles("stormer-verlet-suzuki-4", table.SUZUKI_4, "suzuki-1990", "five Stormer-Verlet steps"),
+        _on_angles("stormer-verlet-yoshida-4", tables.YOSHIDA_4, "yoshida-1990", "three Stormer-Verlet steps"),
+        _on_angles("stormer-verlet-suzuki-4", tables.SUZUKI_4, "suzuki-1990", "five Stormer-Verlet steps"),
         _on_angles(
             "stormer-verlet-blanes-moan-6",
-            table.SRKN_14_6,
+            tables.SRKN_14_6,
             "blanes-moan-2002",
             "Runge-Kutta-Nystrom splitting of the reduced Hamiltonian, 14 forces",
         ),
@@ -192,26 +167,29 @@ def built_in() -> list[Integrator]:
         ),
         composition(
             "takahashi-imada",
-            *table.TAKAHASHI_IMADA[1:],
+            *tables.TAKAHASHI_IMADA[1:],
             chart="space",
-            processor=table.TAKAHASHI_IMADA_PROCESSOR,
+            processor=tables.TAKAHASHI_IMADA_PROCESSOR,
             order=4,
             summary="free top and kicks with a force gradient, processed, one force",
             reference="takahashi-imada-1984",
         ),
-        _on_space("chin-4a", table.CHIN_4A, "chin-1997", "positive kicks with a force gradient, two forces"),
-        _on_space("yoshida-4", table.YOSHIDA_4, "yoshida-1990", "gravity kicks, three Strang steps"),
-        _on_space("suzuki-4", table.SUZUKI_4, "suzuki-1990", "gravity kicks, five Strang steps"),
-        _on_space("srkn-6-4", table.SRKN_6_4, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 6 forces"),
-        _on_space("srkn-11-6", table.SRKN_11_6, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 11 forces"),
-        _on_space("srkn-14-6", table.SRKN_14_6, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 14 forces"),
-        _on_space("kahan-li-6", table.KAHAN_LI_6, "kahan-li-1997", "gravity kicks, 9 Strang steps"),
-        _on_space("suzuki-umeno-8", table.SUZUKI_UMENO_8, "suzuki-umeno-1993", "gravity kicks, 15 Strang steps"),
-        _on_space("kahan-li-8", table.KAHAN_LI_8, "kahan-li-1997", "gravity kicks, 17 Strang steps"),
+        _on_space("chin-4a", tables.CHIN_4A, "chin-1997", "positive kicks with a force gradient, two forces"),
+        _on_space("yoshida-4", tables.YOSHIDA_4, "yoshida-1990", "gravity kicks, three Strang steps"),
+        _on_space("suzuki-4", tables.SUZUKI_4, "suzuki-1990", "gravity kicks, five Strang steps"),
+        _on_space("srkn-6-4", tables.SRKN_6_4, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 6 forces"),
+        _on_space("srkn-11-6", tables.SRKN_11_6, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 11 forces"),
+        _on_space("srkn-14-6", tables.SRKN_14_6, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 14 forces"),
+        _on_space("kahan-li-6", tables.KAHAN_LI_6, "kahan-li-1997", "gravity kicks, 9 Strang steps"),
+        _on_space("suzuki-umeno-8", tables.SUZUKI_UMENO_8, "suzuki-umeno-1993", "gravity kicks, 15 Strang steps"),
+        _on_space("kahan-li-8", tables.KAHAN_LI_8, "kahan-li-1997", "gravity kicks, 17 Strang steps"),
         _on_space(
-            "sofroniou-spaletta-10", table.SOFRONIOU_SPALETTA_10, "sofroniou-spaletta-2005", "gravity kicks, 35 Strang steps"
+            "sofroniou-spaletta-10",
+            tables.SOFRONIOU_SPALETTA_10,
+            "sofroniou-spaletta-2005",
+            "gravity kicks, 35 Strang steps",
         ),
-        _on_space("aba-8-6-4", table.ABA_8_6_4, ABA, "gravity kicks, generalised order (8, 6, 4), 7 forces"),
-        _on_space("aba-10-6-4", table.ABA_10_6_4, ABA, "gravity kicks, generalised order (10, 6, 4), 8 forces"),
-        _on_space("aba-10-4", table.ABA_10_4, ABA, "gravity kicks, generalised order (10, 4), 7 forces"),
+        _on_space("aba-8-6-4", tables.ABA_8_6_4, ABA, "gravity kicks, generalised order (8, 6, 4), 7 forces"),
+        _on_space("aba-10-6-4", tables.ABA_10_6_4, ABA, "gravity kicks, generalised order (10, 6, 4), 8 forces"),
+        _on_space("aba-10-4", tables.ABA_10_4, ABA, "gravity kicks, generalised order (10, 4), 7 forces"),
     ]

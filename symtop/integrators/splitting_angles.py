@@ -19,7 +19,8 @@ from symtop import top as model
 from symtop.integrators.angles import chart_outcome
 from symtop.integrators.compiled import register_jitable
 from symtop.integrators.drive import driver
-from symtop.integrators.splitting_loop import compose
+from symtop.integrators.splitting_loop import Composition, Stages, compose
+from symtop.top import Angles, SymmetricTop
 
 effective_force = register_jitable(model.effective_force)
 
@@ -44,9 +45,14 @@ def kick_angles(par: Any, force: Any, step: Any, tau: float, bend: float) -> Any
 
 
 @register_jitable
-def drift_angles(par: Any, rule: Any, state: Any, step: Any, tau: float) -> Any:  # noqa: ARG001
-    """Free flight for a time tau."""
-    return (step[0] + tau * (state[1] + step[1]) / par.I1, step[1], step[2], step[3])
+def drift_angles(rule: Any, state: Any, step: Any, tau: float) -> Any:  # noqa: ARG001
+    """Free flight for a time I1 tau."""
+    return (step[0] + tau * (state[1] + step[1]), step[1], step[2], step[3])
+
+
+def stages(rule: Composition, top: SymmetricTop, start: Angles, h: float) -> Stages:  # noqa: ARG001
+    """Kicks in time, drifts in time over I1."""
+    return rule.stages(h / top.I1, h)
 
 
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
@@ -56,29 +62,29 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, p_theta, phi, psi); the work counted is the number of force evaluations."""
-    step, force = compose(force_angles, kick_angles, drift_angles, par, rule, state, carry, h)
+    step, force = compose(force_angles, kick_angles, drift_angles, par, rule, state, carry)
     return step, force, rule.forces, chart_outcome(state[0] + step[0])
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     """p_phi and p_psi from the increments of phi and psi, which are linear in them.
 
-    With k = (1/I3 - 1/I1)/2, a = sum b/(4 I1 sin^2 x), d = sum b/(4 I1 cos^2 x), x = theta/2 at the kicks:
-    (dphi + dpsi)/h = (k + 2d) south - k north,  (dphi - dpsi)/h = (k + 2a) north - k south.
+    With k = h (1/I3 - 1/I1)/2, a = sum b h/(4 I1 sin^2 x), d = sum b h/(4 I1 cos^2 x), x = theta/2 at the kicks:
+    dphi + dpsi = (k + 2d) south - k north,  dphi - dpsi = (k + 2a) north - k south.
     """
     step = (0.0, 0.0, 0.0, 0.0)
     a = d = 0.0
-    stages = len(rule.drift)
-    for i in range(stages + 1):
+    n = len(rule.drift)
+    for i in range(n + 1):
         theta = before[0] + step[0]
         sin_x, cos_x = np.sin(0.5 * theta), np.cos(0.5 * theta)
         a += rule.kick[i] / (4.0 * par.I1 * sin_x * sin_x)
         d += rule.kick[i] / (4.0 * par.I1 * cos_x * cos_x)
-        if i < stages:
-            step = kick_angles(par, force_angles(par, before, step), step, rule.kick[i] * h, 0.0)
-            step = drift_angles(par, rule, before, step, rule.drift[i] * h)
-    k = 0.5 * (1.0 / par.I3 - 1.0 / par.I1)
-    plus, minus = (dstate[2] + dstate[3]) / h, (dstate[2] - dstate[3]) / h
+        if i < n:
+            step = kick_angles(par, force_angles(par, before, step), step, rule.kick[i], 0.0)
+            step = drift_angles(rule, before, step, rule.drift[i])
+    k = 0.5 * h * (1.0 / par.I3 - 1.0 / par.I1)
+    plus, minus = dstate[2] + dstate[3], dstate[2] - dstate[3]
     determinant = 2.0 * k * (a + d) + 4.0 * a * d
     north = ((k + 2.0 * d) * minus + k * plus) / determinant
     south = ((k + 2.0 * a) * plus + k * minus) / determinant

@@ -31,6 +31,7 @@ Sources: McLachlan, Zanna, Found. Comput. Math. 5 (2005) 87 (splitting); Bobenko
 711 (processing).
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -38,29 +39,59 @@ import numpy as np
 from symtop.integrators.compiled import register_jitable
 from symtop.integrators.drive import driver
 from symtop.integrators.space import finite_outcome, observe_attitude, observe_axis
-from symtop.integrators.splitting_loop import compose
+from symtop.integrators.registry import Array
+from symtop.integrators.splitting_loop import Composition, Stages, compose
+from symtop.top import Angles, SymmetricTop
+
+TINY = 1e-300  # keeps sin(x)/x finite at L = 0 without a branch
+
+
+EXACT, CAYLEY, TUNED = range(3)
+ROTATIONS = ("exact", "cayley", "cayley-tuned")
+
+
+def stages(rule: Composition, rotation: str, processor: float, top: SymmetricTop, start: Angles, h: float) -> Stages:
+    """Drifts in half angles over |L|, kicks in angular momentum."""
+    half, kick = 0.5 * h / top.I1, h * top.mgl
+    turn = ROTATIONS.index(rotation)
+    if turn == TUNED:
+        half *= tangent_scale(top, start, h)
+    return rule.stages(half, kick, 2.0 * h * kick * kick / top.I1, turn, processor * h * kick / top.I1)
+
+
+def tangent_scale(top: SymmetricTop, start: Angles, h: float) -> float:
+    """tan(x)/x with x = h Lm/2 I1: a Cayley drift with tau = (h/2 I1) times this turns |L| = Lm by the exact angle.
+
+    Lm is the root of the mean of |L|^2 over a nutation, which is known in closed form.
+    """
+    x = 0.5 * h * math.sqrt(top.mean_square_momentum(start)) / top.I1
+    return math.tan(x) / x if x > 0.0 else 1.0
+
+
+def cayley_energy(top: SymmetricTop, h: float, tau: float, axis: Array, momentum: Array) -> Array:
+    """What kick-drift-kick with a Cayley drift conserves, shape (...): |L|^2/2 + k u/(2 tau) - k^2 (1 - u^2)/8, k = h mgl."""
+    kick, u = h * top.mgl, axis[..., 2]
+    square: Array = 0.5 * np.sum(momentum * momentum, axis=-1)
+    return square + kick * u / (2.0 * tau) - kick * kick * (1.0 - u) * (1.0 + u) / 8.0
 
 
 @register_jitable
-def rotor(par: Any, rule: Any, Lx: float, Ly: float, Lz: float, tau: float) -> Any:
-    """s and m: the rotation about L for a time tau has the quaternion (1 + m, s L)."""
-    half = 0.5 * tau / par.I1
-    if rule.cayley != 0.0:
-        half *= rule.cayley
-        square = half * half * (Lx * Lx + Ly * Ly + Lz * Lz)
-        root = np.sqrt(1.0 + square)
-        return half / root, -square / (root * (1.0 + root))
+def rotor(rule: Any, Lx: float, Ly: float, Lz: float, half: float) -> Any:
+    """s and m: the rotation about L by the angle 2 half |L| has the quaternion (1 + m, s L)."""
     square = half * half * (Lx * Lx + Ly * Ly + Lz * Lz)
-    x = np.sqrt(square + 1e-300)
-    sin, cos = np.sin(0.5 * x), np.cos(0.5 * x)
-    return half * (2.0 * sin * cos / x), -2.0 * sin * sin
+    if rule.turn == EXACT:
+        x = np.sqrt(square + TINY)
+        sin, cos = np.sin(0.5 * x), np.cos(0.5 * x)
+        return half * (2.0 * sin * cos / x), -2.0 * sin * sin
+    root = np.sqrt(1.0 + square)
+    return half / root, -square / (root * (1.0 + root))
 
 
 @register_jitable
-def kicked(par: Any, force: Any, tau: float, bend: float) -> Any:
-    """Increments of L_x and L_y by gravity in a time tau."""
+def kicked(force: Any, pull: float, bend: float) -> Any:
+    """Increments of L_x and L_y by gravity."""
     x, y, z = force
-    strength = par.mgl * (tau - 2.0 * bend * par.mgl * z / par.I1)
+    strength = pull - bend * z
     return -strength * y, strength * x
 
 
@@ -74,25 +105,26 @@ def force_axis(par: Any, state: Any, step: Any) -> Any:  # noqa: ARG001
 
 
 @register_jitable
-def kick_axis(par: Any, force: Any, step: Any, tau: float, bend: float) -> Any:
-    """Flow of gravity for a time tau."""
-    x, y = kicked(par, force, tau, bend)
+def kick_axis(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:  # noqa: ARG001
+    """Flow of gravity."""
+    x, y = kicked(force, pull, bend)
     return step[0], step[1], step[2], step[3] + x, step[4] + y, step[5]
 
 
 @register_jitable
-def drift_axis(par: Any, rule: Any, state: Any, step: Any, tau: float) -> Any:
-    """Free rotation for a time tau."""
-    x, y, z = force_axis(par, state, step)
+def drift_axis(rule: Any, state: Any, step: Any, half: float) -> Any:
+    """Free rotation."""
+    x, y, z = state[0] + step[0], state[1] + step[1], state[2] + step[2]
     Lx, Ly, Lz = state[3] + step[3], state[4] + step[4], state[5] + step[5]
-    s, m = rotor(par, rule, Lx, Ly, Lz, tau)
+    s, m = rotor(rule, Lx, Ly, Lz, half)
     w = 1.0 + m
     cx, cy, cz = Ly * z - Lz * y, Lz * x - Lx * z, Lx * y - Ly * x
     twice = 2.0 * s
+    r = s * (1.0 - (0.5 * w * w - 0.25) * (1.0 - (x * x + y * y + z * z)))
     return (
-        step[0] + twice * (w * cx + s * (Ly * cz - Lz * cy)),
-        step[1] + twice * (w * cy + s * (Lz * cx - Lx * cz)),
-        step[2] + twice * (w * cz + s * (Lx * cy - Ly * cx)),
+        step[0] + twice * (w * cx + r * (Ly * cz - Lz * cy)),
+        step[1] + twice * (w * cy + r * (Lz * cx - Lx * cz)),
+        step[2] + twice * (w * cz + r * (Lx * cy - Ly * cx)),
         step[3],
         step[4],
         step[5],
@@ -106,7 +138,7 @@ def begin_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 def increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (e, L); the work counted is the number of kicks with a new axis."""
-    step, axis = compose(force_axis, kick_axis, drift_axis, par, rule, state, carry, h)
+    step, axis = compose(force_axis, kick_axis, drift_axis, par, rule, state, carry)
     return step, axis, rule.forces, finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4])
 
 
@@ -120,16 +152,16 @@ def process_axis(s: float, x: float, y: float, z: float, Lx: float, Ly: float, L
 
 def enter_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
     """The start in the variables of a processed method."""
-    if rule.processor == 0.0:
+    if rule.boost == 0.0:
         return state
-    return process_axis(rule.processor * h * h * par.mgl / par.I1, *state)
+    return process_axis(rule.boost, *state)
 
 
 def present_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """Back from the variables of a processed method."""
-    if rule.processor == 0.0:
+    if rule.boost == 0.0:
         return state
-    return process_axis(-rule.processor * h * h * par.mgl / par.I1, *state)
+    return process_axis(-rule.boost, *state)
 
 
 # ---- the attitude ----------------------------------------------------------------------------------------------------
@@ -148,18 +180,19 @@ def force_attitude(par: Any, state: Any, step: Any) -> Any:  # noqa: ARG001
 
 
 @register_jitable
-def kick_attitude(par: Any, force: Any, step: Any, tau: float, bend: float) -> Any:
-    """Flow of gravity for a time tau."""
-    x, y = kicked(par, force, tau, bend)
+def kick_attitude(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:  # noqa: ARG001
+    """Flow of gravity."""
+    x, y = kicked(force, pull, bend)
     return step[0], step[1], step[2], step[3], step[4] + x, step[5] + y, step[6]
 
 
 @register_jitable
-def drift_attitude(par: Any, rule: Any, state: Any, step: Any, tau: float) -> Any:
-    """Free rotation for a time tau, without the spin about the body's axis."""
+def drift_attitude(rule: Any, state: Any, step: Any, half: float) -> Any:
+    """Free rotation, without the spin about the body's axis."""
     w, x, y, z = state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3]
     Lx, Ly, Lz = state[4] + step[4], state[5] + step[5], state[6] + step[6]
-    s, m = rotor(par, rule, Lx, Ly, Lz, tau)
+    s, m = rotor(rule, Lx, Ly, Lz, half)
+    m += 0.5 * (1.0 + m) * (1.0 - (w * w + x * x + y * y + z * z))
     return (
         step[0] + (m * w - s * (Lx * x + Ly * y + Lz * z)),
         step[1] + (m * x + s * (Lx * w + Ly * z - Lz * y)),
@@ -178,7 +211,7 @@ def begin_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 def increment_attitude(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (q, L); the work counted is the number of kicks with a new axis."""
-    step, axis = compose(force_attitude, kick_attitude, drift_attitude, par, rule, state, carry, h)
+    step, axis = compose(force_attitude, kick_attitude, drift_attitude, par, rule, state, carry)
     return step, axis, rule.forces, finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5])
 
 
@@ -195,15 +228,15 @@ def process_attitude(s: float, w: float, x: float, y: float, z: float, Lx: float
 
 def enter_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:
     """The start in the variables of a processed method."""
-    if rule.processor == 0.0:
+    if rule.boost == 0.0:
         return state
-    return process_attitude(rule.processor * h * h * par.mgl / par.I1, *state)
+    return process_attitude(rule.boost, *state)
 
 
 def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """The spin since the start, and back from the variables of a processed method."""
-    if rule.processor != 0.0:
-        state = process_attitude(-rule.processor * h * h * par.mgl / par.I1, *state)
+    if rule.boost != 0.0:
+        state = process_attitude(-rule.boost, *state)
     w, x, y, z, Lx, Ly, Lz = state
     half = 0.5 * par.twist * (k * h)
     c, s = np.cos(half), np.sin(half)
