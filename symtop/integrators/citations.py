@@ -107,12 +107,13 @@ ENTRIES: dict[str, tuple[str, dict[str, str]]] = {
     ),
     "suzuki-umeno-1993": _chapter(
         "Suzuki, M. and Umeno, K.",
-        "Higher-order decomposition theory of exponential operators and its applications to {QMC} and nonlinear dynamics",
+        "Higher-order decomposition theory of exponential operators and its applications to {QMC} and nonlinear "
+        "dynamics",
         "Computer Simulation Studies in Condensed-Matter Physics {VI}",
         "Springer",
         "74--86",
         1993,
-        editor="Landau, D. P. and Mon, K. K. and Sch{\\\"u}ttler, H.-B.",
+        editor='Landau, D. P. and Mon, K. K. and Sch{\\"u}ttler, H.-B.',
     ),
     "sofroniou-spaletta-2005": _article(
         "Sofroniou, M. and Spaletta, G.",

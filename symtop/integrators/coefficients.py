@@ -30,17 +30,16 @@ class Table(NamedTuple):
 
 def palindrome(outer: Sequence[float], *, odd: bool) -> tuple[float, ...]:
     """`outer`, then the middle one (or two equal ones) that close the sum to 1, then `outer` backwards."""
-    rest = math.fsum(outer)
-    middle = (1.0 - 2.0 * rest,) if odd else (0.5 - rest, 0.5 - rest)
-    return (*outer, *middle, *reversed(outer))
+    half = math.fsum([0.5, *(-value for value in outer)])  # rounded once
+    return (*outer, *((2.0 * half,) if odd else (half, half)), *reversed(outer))
 
 
 def exact_sum(values: Sequence[float], total: float = 1.0) -> tuple[float, ...]:
-    """The same coefficients with the middle one (or the middle two, equally) closing the sum to `total`."""
+    """The same coefficients with what is missing from `total` given to the middle one, or to the middle two equally."""
     n = len(values)
     middle = range((n - 1) // 2, n // 2 + 1)
-    others = math.fsum(value for i, value in enumerate(values) if i not in middle)
-    return tuple((total - others) / len(middle) if i in middle else value for i, value in enumerate(values))
+    share = math.fsum([total, *(-value for value in values)]) / len(middle)
+    return tuple(value + share if i in middle else value for i, value in enumerate(values))
 
 
 def strang_steps(order: int, outer: Sequence[float]) -> Table:

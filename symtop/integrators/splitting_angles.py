@@ -33,7 +33,7 @@ def force_angles(par: Any, state: Any, step: Any) -> Any:
 
 
 @register_jitable
-def kick_angles(par: Any, force: Any, step: Any, tau: float, bend: float) -> Any:  # noqa: ARG001
+def kick_angles(par: Any, force: Any, step: Any, tau: float, bend: float) -> Any:
     """Flow of the potential for a time tau."""
     slope, precession, turn = force
     return (
@@ -45,12 +45,12 @@ def kick_angles(par: Any, force: Any, step: Any, tau: float, bend: float) -> Any
 
 
 @register_jitable
-def drift_angles(rule: Any, state: Any, step: Any, tau: float) -> Any:  # noqa: ARG001
+def drift_angles(rule: Any, state: Any, step: Any, tau: float) -> Any:
     """Free flight for a time I1 tau."""
     return (step[0] + tau * (state[1] + step[1]), step[1], step[2], step[3])
 
 
-def stages(rule: Composition, top: SymmetricTop, start: Angles, h: float) -> Stages:  # noqa: ARG001
+def stages(rule: Composition, top: SymmetricTop, start: Angles, h: float) -> Stages:
     """Kicks in time, drifts in time over I1."""
     return rule.stages(h / top.I1, h)
 

@@ -8,17 +8,15 @@ A force is evaluated only where it is kicked with, and the one at the end of a s
 kick-first table with n drifts costs n forces and a drift-first one n - 1, but n drifts: its last drift and the first of
 the next step are not merged.
 
-The kernels see no h and no constants of the top: `stages` multiplies the tables out before a run, each product closed to
-the sum that it stands for. A sum that is wrong by one rounding is a clock that runs fast by 1e-16, in every step.
+The kernels see no h: `stages` multiplies the tables out before a run, each row closed to the product that its sum stands
+for. A sum that is wrong by one rounding is a clock that runs fast by 1e-16 in every step.
 """
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from numba.cpython.unsafe.tuple import tuple_setitem
-
 from symtop.integrators.coefficients import exact_sum
-from symtop.integrators.compiled import register_jitable
+from symtop.integrators.compiled import register_jitable, set_item
 
 
 class Composition(NamedTuple):
@@ -30,7 +28,7 @@ class Composition(NamedTuple):
     forces: int  # a step
 
     def stages(self, drift: float, kick: float, bend: float = 0.0, turn: int = 0, boost: float = 0.0) -> "Stages":
-        """The same times what a whole step drifts and kicks by."""
+        """The coefficients times what a whole step drifts and kicks by."""
         return Stages(
             exact_sum([a * drift for a in self.drift], drift),
             exact_sum([b * kick for b in self.kick], kick),
@@ -63,7 +61,7 @@ def compose(force: Any, kick: Any, drift: Any, par: Any, rule: Any, state: Any, 
     """Increment of one step and the force at its end. A force nobody kicks with is not evaluated."""
     step = state
     for i in range(len(state)):
-        step = tuple_setitem(step, i, 0.0)
+        step = set_item(step, i, 0.0)
     now = at_start
     n = len(rule.drift)
     for i in range(n):

@@ -1,4 +1,4 @@
-"""Splitting on the axis (e, L) and on the attitude (q, L): gravity kicks between exact free rotations, no pole anywhere.
+"""Splitting on the axis (e, L) and the attitude (q, L): gravity kicks between exact free rotations, no pole anywhere.
 
     kick(b h):   L += b h mgl (-e_y, e_x, 0),  with a gradient c:  b mgl -> b mgl - 2 c h^2 mgl^2 e_z / I1
     drift(a h):  e <- R e,  q <- r q,  R the rotation about L by the angle a h |L| / I1 and r its quaternion
@@ -10,25 +10,29 @@ T*SU(2), so any composition is symplectic there and Lie-Poisson in (e, L); L_z i
 rounding alone. {V, {V, {V, T}}} = 0 (T is quadratic in L), so Runge-Kutta-Nystrom tables apply, and
 {V, {V, T}} = mgl^2 sin^2(theta) / I1 is the force gradient.
 
-With v = s L and w the quaternion of half the angle x = (a h/2 I1) |L|, s = sin(x)/|L| and w = 1 + m:
+With x = (a h/2 I1) |L| half the angle, s = sin(x)/|L|, w = cos(x) and m = w - 1, no increment is a difference of large
+numbers:
 
-    dq = s L q + m q,       de = 2 s (w L x e + s L x (L x e)),       exact: m = cos(x) - 1,  Cayley below
+    dq = m q + s L q,       de = 2 s (w L x e + s L x (L x e))
 
-No increment is a difference of large numbers. A *Cayley* drift has s = tau/sqrt(1 + tau^2 L^2), w = 1/sqrt(1 + tau^2 L^2)
-instead, tau = h/2 I1: a rotation about L by a nearby angle that depends on |L| only, so symplectic too. Kick-drift-kick
-with it is an integrable map, that of the discrete Lagrange top, and keeps `cayley_energy` at every step size.
-It must not be confused with a Cayley *parametrisation* of an implicit method.
+Rounding makes w^2 + s^2 L^2 = 1 + 1e-17, the same in every step of a steady motion, and |e| and |q| would drift (1e-11 in
+1e6 steps was seen). So each drift adds to its s or m what the length lacks at that moment. The correction turns nothing
+but about L: L.e does not notice, while rescaling e itself would hand the drift over to p_psi.
+
+A *Cayley* drift has s = tau/sqrt(1 + tau^2 L^2), w = 1/sqrt(1 + tau^2 L^2) instead, tau = h/2 I1: a rotation about L by a
+nearby angle that depends on |L| only, so symplectic too. Kick-drift-kick with it is an integrable map, that of the
+discrete Lagrange top, and keeps `cayley_energy` at every step size. It is not a Cayley *parametrisation* of an implicit
+method.
 
 Takahashi and Imada's kick (total gradient coefficient -1/24) makes kick-drift-kick conjugate to order 4 through the
 processor exp(k h^2 (mgl/I1) G), k = 1/12, G = L.(e x z): the start is mapped once and each sample is mapped back. The
-flow of G is elementary: with D = cosh(s) + e_z sinh(s) and h for horizontal,
+flow of G for a time s is elementary. With D = cosh(s) + e_z sinh(s) and h for horizontal,
 
     e_h -> e_h / D,   e_z -> (e_z cosh(s) + sinh(s)) / D,   L_h -> D L_h - sinh(s) L_z e_h,   L_z, L.e fixed
     q -> (w e^(s/2), x e^(-s/2), y e^(-s/2), z e^(s/2)) / sqrt(D)
 
-Sources: McLachlan, Zanna, Found. Comput. Math. 5 (2005) 87 (splitting); Bobenko, Suris, Commun. Math. Phys. 204 (1999)
-147 (Cayley); Takahashi, Imada, J. Phys. Soc. Japan 53 (1984) 3765; Blanes, Casas, Ros, SIAM J. Sci. Comput. 21 (1999)
-711 (processing).
+Sources: Touma, Wisdom, Astron. J. 107 (1994) 1189 (splitting); Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147
+(Cayley); Takahashi, Imada, J. Phys. Soc. Japan 53 (1984) 3765; Rowlands, J. Comput. Phys. 97 (1991) 235 (processed).
 """
 
 import math
@@ -38,8 +42,8 @@ import numpy as np
 
 from symtop.integrators.compiled import register_jitable
 from symtop.integrators.drive import driver
-from symtop.integrators.space import finite_outcome, observe_attitude, observe_axis
 from symtop.integrators.registry import Array
+from symtop.integrators.space import finite_outcome, observe_attitude, observe_axis
 from symtop.integrators.splitting_loop import Composition, Stages, compose
 from symtop.top import Angles, SymmetricTop
 
@@ -71,7 +75,11 @@ def tangent_scale(top: SymmetricTop, start: Angles, h: float) -> float:
 
 
 def cayley_energy(top: SymmetricTop, h: float, tau: float, axis: Array, momentum: Array) -> Array:
-    """What kick-drift-kick with a Cayley drift conserves, shape (...): |L|^2/2 + k u/(2 tau) - k^2 (1 - u^2)/8, k = h mgl."""
+    """What kick-drift-kick with a Cayley drift conserves, of axes and momenta (..., 3), shape (...).
+
+    |L|^2/2 + k u/(2 tau) - k^2 (1 - u^2)/8 with k = h mgl and u = e_z; tau is h/2 I1, times `tangent_scale` if tuned.
+    Source: Bobenko and Suris 1999.
+    """
     kick, u = h * top.mgl, axis[..., 2]
     square: Array = 0.5 * np.sum(momentum * momentum, axis=-1)
     return square + kick * u / (2.0 * tau) - kick * kick * (1.0 - u) * (1.0 + u) / 8.0
@@ -113,13 +121,13 @@ def kicked(force: Any, pull: float, bend: float) -> Any:
 
 
 @register_jitable
-def force_axis(par: Any, state: Any, step: Any) -> Any:  # noqa: ARG001
+def force_axis(par: Any, state: Any, step: Any) -> Any:
     """The present axis: what a kick needs."""
     return state[0] + step[0], state[1] + step[1], state[2] + step[2]
 
 
 @register_jitable
-def kick_axis(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:  # noqa: ARG001
+def kick_axis(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:
     """Flow of gravity."""
     x, y = kicked(force, pull, bend)
     return step[0], step[1], step[2], step[3] + x, step[4] + y, step[5]
@@ -188,13 +196,13 @@ def axis_of(w: float, x: float, y: float, z: float) -> Any:
 
 
 @register_jitable
-def force_attitude(par: Any, state: Any, step: Any) -> Any:  # noqa: ARG001
+def force_attitude(par: Any, state: Any, step: Any) -> Any:
     """The present axis: what a kick needs."""
     return axis_of(state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3])
 
 
 @register_jitable
-def kick_attitude(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:  # noqa: ARG001
+def kick_attitude(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:
     """Flow of gravity."""
     x, y = kicked(force, pull, bend)
     return step[0], step[1], step[2], step[3], step[4] + x, step[5] + y, step[6]
