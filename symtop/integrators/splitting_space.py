@@ -10,19 +10,19 @@ T*SU(2), so any composition is symplectic there and Lie-Poisson in (e, L); L_z i
 rounding alone. {V, {V, {V, T}}} = 0 (T is quadratic in L), so Runge-Kutta-Nystrom tables apply, and
 {V, {V, T}} = mgl^2 sin^2(theta) / I1 is the force gradient.
 
-With x = (a h/2 I1) |L| half the angle, s = sin(x)/|L|, w = cos(x) and m = w - 1, no increment is a difference of large
-numbers:
+With x = (a h/2 I1) |L| half the angle, s = sin(x)/|L|, w = cos(x) and m = w - 1, no increment is a difference of
+large numbers:
 
     dq = m q + s L q,       de = 2 s (w L x e + s L x (L x e))
 
-Rounding makes w^2 + s^2 L^2 = 1 + 1e-17, the same in every step of a steady motion, and |e| and |q| would drift (1e-11 in
-1e6 steps was seen). So each drift adds to its s or m what the length lacks at that moment. The correction turns nothing
-but about L: L.e does not notice, while rescaling e itself would hand the drift over to p_psi.
+Rounding makes w^2 + s^2 L^2 = 1 + 1e-17, the same in every step of a steady motion, and |e| and |q| would drift
+(1e-11 in 1e6 steps was seen). So each drift adds to its s or m what the length lacks at that moment. The correction
+turns nothing but about L: L.e does not notice, while rescaling e itself would hand the drift over to p_psi.
 
-A *Cayley* drift has s = tau/sqrt(1 + tau^2 L^2), w = 1/sqrt(1 + tau^2 L^2) instead, tau = h/2 I1: a rotation about L by a
-nearby angle that depends on |L| only, so symplectic too. Kick-drift-kick with it is an integrable map, that of the
+A *Cayley* drift has s = tau/sqrt(1 + tau^2 L^2), w = 1/sqrt(1 + tau^2 L^2) instead, tau = h/2 I1: a rotation about L
+by a nearby angle that depends on |L| only, so symplectic too. Kick-drift-kick with it is an integrable map, that of the
 discrete Lagrange top, and keeps `cayley_energy` at every step size. It is not a Cayley *parametrisation* of an implicit
-method.
+method. `cayley-tuned` chooses tau from the start of a run: as a map it is symplectic and reversible for that one tau.
 
 Takahashi and Imada's kick (total gradient coefficient -1/24) makes kick-drift-kick conjugate to order 4 through the
 processor exp(k h^2 (mgl/I1) G), k = 1/12, G = L.(e x z): the start is mapped once and each sample is mapped back. The
