@@ -30,6 +30,7 @@ _HOME = {
     "integrators": "integrators.registry",
     "register": "integrators.registry",
     "discrete_lagrangian": "integrators.discrete_lagrangian",
+    "citation": "integrators.citations",
     "composition": "integrators.splitting",
     "simulate": "simulate",
     "reference": "reference",

@@ -224,15 +224,33 @@ class SymmetricTop:
 
     def nutation_period(self, at: Angles) -> float:
         """Time of one nutation, ``2 pi / AGM(sqrt(beta (u3-u1)), sqrt(beta (u3-u2)))``; inf on a separatrix."""
-        excess, beta, a, _ = self._cubic(at)
         low, high = self.turning_cosines(at)
+        frequency, _ = self._mean(at, low, high)
+        return 2.0 * math.pi / frequency if frequency > 0.0 else math.inf
+
+    def mean_square_momentum(self, at: Angles) -> float:
+        """The mean of ``|L|^2 = 2 I1 (E - mgl u) + p_psi^2 (1 - I1/I3)`` over a nutation, to 1e-14."""
+        low, high = self.turning_cosines(at)
+        excess, beta, a, _ = self._cubic(at)
+        _, gained = self._mean(at, low, high)
+        return self.I1**2 * (excess + beta * (math.cos(at.theta) - low) - gained + a * a)
+
+    def _mean(self, at: Angles, low: float, high: float) -> tuple[float, float]:
+        """The AGM of sqrt(beta (u3-u1)) and sqrt(beta (u3-u2)), and the mean of beta (u - u1), u the cosine.
+
+        The mean is ``sum 2^(n-1) c_n^2``, c_0^2 = x^2 - y^2 and c_(n+1) = (x - y)/2 along the AGM (DLMF 19.8.6).
+        """
+        excess, beta, a, _ = self._cubic(at)
         # Vieta: beta (u1 + u2 + u3) = alpha + a^2, so that beta -> 0 (the free top) is not a special case
         total = excess + beta * math.cos(at.theta) + a * a
         x, y = total - beta * (2.0 * low + high), total - beta * (low + 2.0 * high)
         x, y = math.sqrt(max(x, 0.0)), math.sqrt(max(y, 0.0))
+        gained, weight = 0.5 * beta * (high - low), 1.0
         while abs(x - y) > 4e-16 * x and x > 0.0 and y > 0.0:
+            gained += weight * (0.5 * (x - y)) ** 2
+            weight *= 2.0
             x, y = 0.5 * (x + y), math.sqrt(x * y)
-        return 2.0 * math.pi / y if y > 0.0 else math.inf
+        return y, gained
 
     def _cubic(self, at: Angles) -> tuple[float, float, float, float]:
         """alpha - beta cos(theta), beta, a and b of Goldstein's nutation cubic."""

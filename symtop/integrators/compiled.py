@@ -16,9 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from numba import config, njit
+from numba.cpython.unsafe.tuple import tuple_setitem
 from numba.extending import register_jitable
 
-__all__ = ["cache_root", "compile_kernel", "register_jitable", "source_digest"]
+__all__ = ["cache_root", "compile_kernel", "register_jitable", "set_item", "source_digest"]
+
+set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
 
 PACKAGE = Path(__file__).resolve().parent.parent
 KEPT = 6  # cache folders of older sources that are kept, a few megabytes each

@@ -6,6 +6,11 @@ A kernel family is three plain functions on flat tuples of floats:
     increment(par, rule, state, carry, h) -> (dstate, carry, work, outcome)
     observe(par, rule, before, dstate, h) -> (p_phi, p_psi)  the momenta that this step really carried
 
+and two more where what is stepped is not what is shown (a processed method, a motion that is known exactly):
+
+    enter(par, rule, state, h) -> state                    the start as the kernel steps it, once a run
+    present(par, rule, state, k, h) -> state               a sample as the user sees it, once a sample
+
 `par` are the numbers of the top, `rule` the numbers of the method, `work` its force evaluations or solver
 iterations. A kernel returns the *increment* of the state; the loop adds it with Knuth's two-sum and carries
 the rounding error to the next step, which costs nothing (the loop is bound by the latency of the
@@ -18,10 +23,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.cpython.unsafe.tuple import tuple_setitem
 from numpy.typing import NDArray
 
-from symtop.integrators.compiled import compile_kernel, register_jitable
+from symtop.integrators.compiled import compile_kernel, register_jitable, set_item
 from symtop.integrators.outcomes import OK
 
 Array = NDArray[np.float64]
@@ -47,24 +51,37 @@ def _accumulate(state: Any, low: Any, dstate: Any) -> Any:
         total = state[i] + addend
         virtual = total - state[i]
         error = (state[i] - (total - virtual)) + (addend - virtual)
-        state = tuple_setitem(state, i, total)
-        low = tuple_setitem(low, i, error)
+        state = set_item(state, i, total)
+        low = set_item(low, i, error)
     return state, low
 
 
-def driver(  # noqa: C901  (three compiled bodies, one loop)
-    begin: Callable[..., Any], increment: Callable[..., Any], observe: Callable[..., Any]
+def _as_given(par: Any, rule: Any, state: Any, h: float) -> Any:
+    return state
+
+
+def _as_stepped(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
+    return state
+
+
+def driver(  # noqa: C901  (one loop, read in one piece)
+    begin: Callable[..., Any],
+    increment: Callable[..., Any],
+    observe: Callable[..., Any],
+    enter: Callable[..., Any] = _as_given,
+    present: Callable[..., Any] = _as_stepped,
 ) -> Callable[..., March]:
     """Compile the loop around one kernel family.
 
     The returned function runs ``march(par, rule, state, h, marks)`` and records the state after
     ``marks[j]`` steps for each j (increasing whole numbers; a mark at 0 records the start).
     """
-    for part in (begin, increment, observe):
+    for part in (begin, increment, observe, enter, present):
         register_jitable(part)
 
     def prepare(par, rule, state, h):  # type: ignore[no-untyped-def]
-        return begin(par, rule, state, h)
+        state = enter(par, rule, state, h)
+        return state, begin(par, rule, state, h)
 
     def march(par, rule, state, low, carry, h, k, j, stop, marks, states, momenta):  # type: ignore[no-untyped-def]
         work = 0
@@ -82,21 +99,22 @@ def driver(  # noqa: C901  (three compiled bodies, one loop)
                 k += 1
             if outcome != 0 or k < marks[j]:
                 break
-            for i in range(len(state)):
-                states[j, i] = state[i]
+            shown = present(par, rule, state, k, h)
+            for i in range(len(shown)):
+                states[j, i] = shown[i]
             if k > 0:
                 momenta[j, 0], momenta[j, 1] = observe(par, rule, before, dstate, h)
             j += 1
         return state, low, carry, k, j, work, outcome
 
-    prepare = compile_kernel(prepare, begin)
-    march = compile_kernel(march, begin, increment, observe)
+    prepare = compile_kernel(prepare, begin, enter)
+    march = compile_kernel(march, begin, increment, observe, enter, present)
 
     def run(par: Any, rule: Any, state: tuple[float, ...], h: float, marks: NDArray[np.int64]) -> March:
         states = np.full((len(marks), len(state)), np.nan)
         momenta = np.full((len(marks), 2), np.nan)
         low = (0.0,) * len(state)
-        carry = prepare(par, rule, state, h)
+        state, carry = prepare(par, rule, state, h)
         k = j = work = outcome = 0
         while j < len(marks) and outcome == OK:
             stop = min(k + BLOCK, int(marks[-1]))
