@@ -223,10 +223,12 @@ def returned(method, h, steps):
     return charts.attitude_distance(home[:4], charts.quaternion_from_angles(START.theta, START.phi, START.psi))
 
 
-@pytest.mark.parametrize("name", [name for name in METHODS if "attitude" in METHODS[name].solvers])
+# cayley-tuned finds its tau from the start, and the numerical end has another mean of |L|^2: reversible for one tau only
+REVERSIBLE = [name for name in METHODS if "attitude" in METHODS[name].solvers and name != "cayley-tuned"]
+
+
+@pytest.mark.parametrize("name", REVERSIBLE)
 def test_a_symmetric_method_finds_its_way_back(name):
-    if name == "cayley-tuned":  # tau is found from the start, and the numerical end has another mean of |L|^2
-        pytest.skip("reversible for one tau only")
     assert METHODS[name].symmetric
     assert returned(METHODS[name], 0.1, 200) < 1e-10
 
