@@ -223,7 +223,7 @@ def returned(method, h, steps):
     return charts.attitude_distance(home[:4], charts.quaternion_from_angles(START.theta, START.phi, START.psi))
 
 
-# cayley-tuned finds its tau from the start, and the numerical end has another mean of |L|^2: reversible for one tau only
+# cayley-tuned finds its tau from the start, and the numerical end has another mean of |L|^2: one tau only
 REVERSIBLE = [name for name in METHODS if "attitude" in METHODS[name].solvers and name != "cayley-tuned"]
 
 
