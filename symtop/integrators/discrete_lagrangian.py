@@ -145,7 +145,7 @@ def _forces(par: Any, sums: Any) -> Any:
     )
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:  # noqa: ARG001
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     """The force sum W0 of a step of length zero, as a flat history for the predictor."""
     sin_start, cos_start = _start_trig(rule, state[0])
     W0 = _forces(par, _node_sums(rule, state[0], 0.0, sin_start, cos_start)).W0

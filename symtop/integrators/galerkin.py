@@ -27,7 +27,7 @@ Order 4, symmetric, symplectic, p_phi and p_psi conserved exactly; 1.4 times the
 iterations. It is not `simpson-linear`, whose path is a straight line and whose order is 2, and only for a constant mass
 is it Lobatto IIIA-IIIB of order 4: that pair makes the momenta linear in time, this method the rates. On the top, whose
 inertia depends on theta, the two differ by O(h^4), and Lobatto IIIA-IIIB is what comes of reducing first. Source:
-Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357, part 2 on Galerkin methods.
+Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357, on Galerkin methods.
 """
 
 from typing import Any, NamedTuple
@@ -166,7 +166,7 @@ def _correction(found: Any, m: float, d: float, flight: float, scale: float) -> 
     return (bow * short_d - short * bow_d) * inverse, (short * bow_m - bow * short_m) * inverse
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:  # noqa: ARG001
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     """V' at the start, as a history of V0 and Vm for the predictor."""
     V = _pull(par, _node(par, state[0]), par.south, par.north).slope
     return ((V, V), (V, V), (V, V), (V, V))
@@ -224,7 +224,7 @@ def _momenta(par: Any, node: Any, plus: float, minus: float) -> Any:
     )
 
 
-def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:  # noqa: ARG001
+def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     """p_phi and p_psi by the discrete Legendre transform of the increments that were added.
 
     The rates at the middle give P0 = 2 (B0 + B1)^-1 q'; P0 gives V0, and p_theta0 = I1 (16 m - 2 d)/6h + h V0/6 gives

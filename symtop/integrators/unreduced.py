@@ -13,7 +13,7 @@ the step is p0 = -D1 L_d, solved by Newton with an analytic 3 x 3 Jacobian, and 
 All three momenta are variables of the state: each step forms them anew from the increments that it adds, so that
 p_phi and p_psi are conserved only as far as the equations were solved and are free to drift. Order 2, symplectic,
 symmetric if the rule is. It is the witness that the reduced kernel assumed nothing: in exact arithmetic both are
-one map. It is not a method to use: two to three times the cost, an error of rounding per step that no compensated
+one map. It is not a method to use: about twice the cost, an error of rounding per step that no compensated
 sum can undo (p1 is formed at full size, not as an increment), and p_phi - p_psi cos(theta) cancels near a pole.
 Source: Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357.
 """
@@ -124,7 +124,7 @@ def _rates(par: Any, state: Any) -> Any:
     return state[3] / par.I1, precession, state[5] / par.I3 - precession * c
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:  # noqa: ARG001
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     """The rates at the start, as a history for the predictor."""
     rate = _rates(par, state)
     return (rate, rate, rate)
@@ -168,7 +168,7 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     return step, ((w, v, u), near, far), effort, outcome
 
 
-def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:  # noqa: ARG001
+def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     """p_phi and p_psi as the step left them."""
     return before[4] + dstate[4], before[5] + dstate[5]
 
