@@ -27,7 +27,7 @@ Order 4, symmetric, symplectic, p_phi and p_psi conserved exactly; 1.4 times the
 iterations. It is not `simpson-linear`, whose path is a straight line and whose order is 2, and only for a constant mass
 is it Lobatto IIIA-IIIB of order 4: that pair makes the momenta linear in time, this method the rates. On the top, whose
 inertia depends on theta, the two differ by O(h^4), and Lobatto IIIA-IIIB is what comes of reducing first. Source:
-Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357, part 2 (Galerkin).
+Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357, on Galerkin methods.
 """
 
 from typing import Any, NamedTuple
