@@ -104,7 +104,7 @@ class Integrator:
         return tuple(self.solvers)
 
 
-_BUILT_IN = ("discrete_lagrangian", "splitting", "scipy_ivp", "taylor")
+_BUILT_IN = ("discrete_lagrangian", "splitting", "runge_kutta", "dormand_prince", "gauss", "scipy_ivp", "taylor")
 _registry: dict[str, Integrator] = {}
 _loaded: list[str] = []
 
