@@ -71,7 +71,8 @@ def quaternion_from_frame(axis: Array, transverse: Array) -> Array:
     products = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
     best = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
     row = np.take_along_axis(products, best[..., None, None], axis=-2)[..., 0, :]
-    return row / np.sqrt(np.sum(row * row, axis=-1, keepdims=True))
+    unit: Array = row / np.sqrt(np.sum(row * row, axis=-1, keepdims=True))
+    return unit
 
 
 def theta_from_axis(axis: Array) -> Array:

@@ -3,14 +3,14 @@
     k_1 = f(y) (the last stage of the step before: first same as last),   k_i = f(y + h sum_{j<i} a_ij k_j),  i = 2 .. 6
     y+ = y + h sum_i b_i k_i  (order 5),    k_7 = f(y+),    err = h sum_i e_i k_i  (order 5 minus order 4)
     |err| = rms(err_m / (atol + rtol max(|y_m|, |y+_m|)))  must be below 1
-    h <- h min(10, .9 |err|^(-1/5)) after a step, not above h after a rejection;  h <- h max(.2, .9 |err|^(-1/5)) rejected
+    h <- h min(10, .9 |err|^(-1/5)) after a step (min(1, ..) after a rejection),  h max(.2, .9 |err|^(-1/5)) rejected
     y(t + x h) = y + h sum_i k_i (p_i1 x + p_i2 x^2 + p_i3 x^3 + p_i4 x^4)     samples between steps, order 4
 
 `rk45-compiled` is the same method as `rk45` on the same six equations (see `euler_lagrange`): it accepts and rejects
 the same steps, so that their times differ only by what Python costs and their errors not at all. It exists to keep
 the language out of a comparison of methods. Order 5, explicit, six evaluations a step; nothing is conserved.
-Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19; the interpolant: Shampine, Math. Comp. 46 (1986) 135; the
-initial step: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.4.
+Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19; the interpolant: Shampine, Math. Comp. 46 (1986) 135;
+the initial step: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.4.
 """
 
 import math
@@ -95,7 +95,9 @@ def _interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any
 
 
 @register_jitable
-def _try_steps(par: Any, pair: Any, state: Any, slopes: Any, tolerance: float, t: float, step: float, end: float) -> Any:
+def _try_steps(
+    par: Any, pair: Any, state: Any, slopes: Any, tolerance: float, t: float, step: float, end: float
+) -> Any:
     """Shrink the step until its error passes: new state, new time, next step, evaluations, outcome."""
     least = 10.0 * (np.nextafter(t, np.inf) - t)
     step = max(step, least)
@@ -112,8 +114,7 @@ def _try_steps(par: Any, pair: Any, state: Any, slopes: Any, tolerance: float, t
         change = SAFETY * error**-0.2 if error > 0.0 else GROW
         if error < 1.0:
             return new, after, h * min(grow, change), evaluations, OK
-        # the error may be infinite or not a number
-        step = h * (change if change > SHRINK else SHRINK)
+        step = h * (change if change > SHRINK else SHRINK)  # noqa: FURB136  (max would pass NaN on)
         grow = 1.0
     return state, t, step, evaluations, STEP_TOO_SMALL
 
@@ -121,7 +122,7 @@ def _try_steps(par: Any, pair: Any, state: Any, slopes: Any, tolerance: float, t
 def march(  # type: ignore[no-untyped-def]
     par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, found, ends
 ):
-    """Steps until the end, a failure, or `budget` evaluations; samples go to `found`, step ends to `ends` while it lasts."""
+    """Steps until the end, a failure or `budget` evaluations; samples go to `found`, step ends to `ends` if it has room."""
     evaluations = 0
     outcome = OK
     while t < end and outcome == OK and evaluations < budget:
@@ -187,7 +188,9 @@ def walk(top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_
     return Walk(found, ends[:steps], steps, evaluations, OUTCOMES[outcome], plan.horizon if outcome == OK else t)
 
 
-def as_run(top: SymmetricTop, times: Array, found: Array, steps: int, evaluations: int, outcome: str, reached: float) -> Run:
+def as_run(
+    top: SymmetricTop, times: Array, found: Array, steps: int, evaluations: int, outcome: str, reached: float
+) -> Run:
     """Samples of the unreduced state, shape (samples, 6), with p_theta and both momenta recomputed from the rates."""
     p_phi, p_psi = momenta(top, found[:, 0], found[:, 4], found[:, 5])
     return Run(to_angles(top, times, found), p_phi, p_psi, steps, evaluations, 0, outcome, reached)

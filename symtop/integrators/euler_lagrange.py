@@ -64,7 +64,7 @@ def momenta(par: Any, theta: Any, phi_dot: Any, psi_dot: Any) -> Any:
     return par.I1 * phi_dot * s * s + p_psi * c, p_psi
 
 
-def observe_angles(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+def observe_angles(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:  # noqa: ARG001
     """p_phi and p_psi of the state after the step."""
     return momenta(par, before[0] + dstate[0], before[4] + dstate[4], before[5] + dstate[5])
 

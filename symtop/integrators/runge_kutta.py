@@ -2,14 +2,14 @@
 
     k_i = f(y + h sum_{j<i} a_ij k_j),    i = 1 .. s,        y+ = y + h sum_i b_i k_i
 
-One kernel, two charts: the unreduced angles (theta, phi, psi, theta', phi', psi'), where energy and both momenta are free
-to drift, and the space frame (e, L), where f is quadratic and has no pole. A tableau is two rows of numbers; the top's
-equations are autonomous, so that c = sum_j a_ij is not used except to check what a user gives.
+One kernel, two charts: the unreduced angles (theta, phi, psi, theta', phi', psi'), where energy and both momenta are
+free to drift, and the space frame (e, L), where f is quadratic and has no pole. The top's equations are autonomous, so
+that c = sum_j a_ij serves only to check what a user gives.
 
-`rk4` is Kutta's classical method: order 4, four evaluations of f a step. No explicit Runge-Kutta method is symplectic or
-symmetric: the error of the energy, and of every constant that is not linear in the state, grows linearly with time.
-L_z = p_phi is linear in (e, L) and stays; in angles nothing does. Not to be confused with `rk45`, which
-chooses its steps, nor with Gauss methods, which are implicit and keep what rk4 loses.
+`rk4` is Kutta's classical method: order 4, four evaluations of f a step. No explicit Runge-Kutta method is symplectic
+or symmetric: the errors of energy and of every constant that is not linear in the state grow linearly with time.
+L_z = p_phi is linear in (e, L) and stays; in angles nothing does. Not to be confused with `rk45`, which chooses its
+steps, nor with Gauss methods, which are implicit and keep what rk4 loses.
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.1.
 """
 
@@ -40,21 +40,6 @@ class Tableau(NamedTuple):
 
 
 @register_jitable
-def later_stages(field: Any, par: Any, a: Any, stages: int, state: Any, slopes: Any, h: float) -> None:
-    """Fill the rows 1 .. stages-1 of `slopes`; row 0 is the slope at the start of the step."""
-    row = 0
-    for i in range(1, stages):
-        place = state
-        for m in range(len(state)):
-            total = 0.0
-            for j in range(i):
-                total += a[row + j] * slopes[j, m]
-            place = tuple_setitem(place, m, state[m] + h * total)
-        row += i
-        store(slopes, i, field(par, place))
-
-
-@register_jitable
 def store(slopes: Any, i: int, slope: Any) -> None:
     """Write a slope into row i."""
     for m in range(len(slope)):
@@ -62,14 +47,33 @@ def store(slopes: Any, i: int, slope: Any) -> None:
 
 
 @register_jitable
+def _add(place: Any, slopes: Any, i: int, weight: float) -> Any:
+    """place + weight slopes_i. With the stages as the outer loop rk4 takes 33 ns a step; as the inner one, 52."""
+    for m in range(len(place)):
+        place = tuple_setitem(place, m, place[m] + weight * slopes[i, m])
+    return place
+
+
+@register_jitable
+def later_stages(field: Any, par: Any, a: Any, stages: int, state: Any, slopes: Any, h: float) -> None:
+    """Fill the rows 1 .. stages-1 of `slopes`; row 0 is the slope at the start of the step."""
+    row = 0
+    for i in range(1, stages):
+        place = state
+        for j in range(i):
+            place = _add(place, slopes, j, h * a[row + j])
+        row += i
+        store(slopes, i, field(par, place))
+
+
+@register_jitable
 def weighted(weights: Any, state: Any, slopes: Any, h: float) -> Any:
     """h sum_i weights_i slopes_i, a tuple as long as the state."""
     step = state
     for m in range(len(state)):
-        total = 0.0
-        for i in range(len(weights)):
-            total += weights[i] * slopes[i, m]
-        step = tuple_setitem(step, m, h * total)
+        step = tuple_setitem(step, m, 0.0)
+    for i in range(len(weights)):
+        step = _add(step, slopes, i, h * weights[i])
     return step
 
 
@@ -81,8 +85,8 @@ def explicit_step(field: Any, par: Any, rule: Any, state: Any, slopes: Any, h: f
     return weighted(rule.b, state, slopes, h)
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """Working space for the slopes: an array costs 8 % against stages written out by hand, for any tableau."""
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:  # noqa: ARG001
+    """Working space for the slopes: 20 % slower than four stages written out by hand, and serves any tableau."""
     return np.empty((len(rule.b), len(state)))
 
 
@@ -133,8 +137,8 @@ def runge_kutta(
 ) -> Integrator:
     """An explicit Runge-Kutta method from its Butcher tableau.
 
-    `a` has one row a stage, either the entries below the diagonal (the first row empty) or whole rows with zeros from the
-    diagonal on; `b` must sum to 1. With `c` given, the row sums of `a` are checked against it.
+    `a` has one row a stage, either the entries below the diagonal (the first row empty) or whole rows with zeros from
+    the diagonal on; `b` must sum to 1. With `c` given, the row sums of `a` are checked against it.
 
     Raises SymtopError for a tableau that is implicit, ragged or inconsistent.
     """

@@ -1,7 +1,7 @@
 """SciPy's solvers on the full Euler-Lagrange equations, as a user of SciPy would call them.
 
-Six variables, nothing reduced (see `euler_lagrange`), so that every conserved quantity is free to drift; the tolerance is
-used for both rtol and atol; no Jacobian is given. None of the four is symplectic or symmetric, nothing is conserved.
+Six variables, nothing reduced (see `euler_lagrange`), so that every conserved quantity is free to drift; the tolerance
+is used for both rtol and atol; no Jacobian is given. None of the four is symplectic or symmetric, nothing is conserved.
 
     rk45     Dormand-Prince 5(4), explicit, order 5               Dormand and Prince, JCAM 6 (1980) 19
     dop853   Dormand-Prince 8(5,3), explicit, order 8             Hairer, Norsett, Wanner, Solving ODEs I, II.5
@@ -10,7 +10,7 @@ used for both rtol and atol; no Jacobian is given. None of the four is symplecti
 
 Radau and LSODA are made for stiff equations, which the top's are not: they are here because people use them. Every
 call of the right-hand side is counted, also those of difference quotients for a Jacobian, which SciPy's own `nfev` of
-Radau leaves out. The right-hand side is plain Python on floats, three times faster than the same lines on NumPy scalars.
+Radau leaves out. The right-hand side is plain Python on floats, three times faster than the same on NumPy scalars.
 """
 
 import math
@@ -38,6 +38,7 @@ class EulerLagrange:
         self.calls = 0
 
     def __call__(self, _: float, y: Any) -> tuple[float, ...]:
+        """y' at any time."""
         self.calls += 1
         theta, _, _, theta_dot, phi_dot, psi_dot = y.tolist()
         return (theta_dot, phi_dot, psi_dot, *accelerations(*self.numbers, theta, theta_dot, phi_dot, psi_dot))

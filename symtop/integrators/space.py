@@ -2,9 +2,9 @@
 
     e' = L x e / I1,    q' = (L q / I1 + twist q k) / 2,    L' = mgl k x e,    twist = p_psi (1/I3 - 1/I1)
 
-The attitude has a third form, the frame (e, L, a). A unit vector a across the axis is carried by a' = L x a / I1; the body
-turns past it about e at the constant rate `twist`, which is applied exactly when a sample is taken. Every equation and
-every constant of this form is linear or quadratic, whereas p_psi = L.e(q) is cubic in (q, L), where no Runge-Kutta
+The attitude has a third form, the frame (e, L, a). A unit vector a across the axis is carried by a' = L x a / I1; the
+body turns past it about e at the constant rate `twist`, which is applied exactly when a sample is taken. Every equation
+and every constant of this form is linear or quadratic, whereas p_psi = L.e(q) is cubic in (q, L), where no Runge-Kutta
 method keeps it; and what is integrated turns with the axis, not with the spin, so that the attitude is as accurate as
 the axis: 8 (order 4) to 30 times (order 8) better than with a fixed in the body.
 
@@ -63,7 +63,8 @@ def frame_to_attitude(par: SpaceTop, times: charts.Array, states: charts.Array) 
 @register_jitable
 def field_axis(par: Any, y: Any) -> Any:
     """Time derivative of (e, L)."""
-    wx, wy, wz = y[3] / par.I1, y[4] / par.I1, y[5] / par.I1
+    inverse = 1.0 / par.I1  # leaves the loop, as three divisions would not
+    wx, wy, wz = inverse * y[3], inverse * y[4], inverse * y[5]
     return (
         wy * y[2] - wz * y[1],
         wz * y[0] - wx * y[2],
@@ -77,7 +78,8 @@ def field_axis(par: Any, y: Any) -> Any:
 @register_jitable
 def field_frame(par: Any, y: Any) -> Any:
     """Time derivative of (e, L, a)."""
-    wx, wy, wz = y[3] / par.I1, y[4] / par.I1, y[5] / par.I1
+    inverse = 1.0 / par.I1
+    wx, wy, wz = inverse * y[3], inverse * y[4], inverse * y[5]
     return (*field_axis(par, y), wy * y[8] - wz * y[7], wz * y[6] - wx * y[8], wx * y[7] - wy * y[6])
 
 
@@ -87,7 +89,7 @@ def finite_outcome(value: float) -> int:
     return OK if np.isfinite(value) else NOT_FINITE
 
 
-def observe_axis(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+def observe_axis(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:  # noqa: ARG001
     """p_phi = L_z and p_psi = L.e after the step."""
     p_psi = 0.0
     for i in range(3):
@@ -95,7 +97,7 @@ def observe_axis(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any
     return before[5] + dstate[5], p_psi
 
 
-def observe_attitude(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+def observe_attitude(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:  # noqa: ARG001
     """p_phi = L_z and p_psi = L.e(q) after the step."""
     w, x = before[0] + dstate[0], before[1] + dstate[1]
     y, z = before[2] + dstate[2], before[3] + dstate[3]
