@@ -31,6 +31,7 @@ _HOME = {
     "register": "integrators.registry",
     "discrete_lagrangian": "integrators.discrete_lagrangian",
     "composition": "integrators.splitting",
+    "runge_kutta": "integrators.runge_kutta",
     "simulate": "simulate",
     "reference": "reference",
     "ClosedForm": "exact",

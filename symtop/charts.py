@@ -141,11 +141,13 @@ def angles_from_attitude(top: SymmetricTop, state: Array) -> Angles:
 def axis_distance(first: Array, second: Array) -> Array:
     """Angle between two axes in radians, shape (...), to 1e-16 however small."""
     cross = np.cross(first, second)
-    return np.arctan2(np.sqrt(np.sum(cross * cross, axis=-1)), np.sum(first * second, axis=-1))
+    angle: Array = np.arctan2(np.sqrt(np.sum(cross * cross, axis=-1)), np.sum(first * second, axis=-1))
+    return angle
 
 
 def attitude_distance(first: Array, second: Array) -> Array:
     """Angle of the rotation between two orientations in radians, shape (...)."""
     nearer = np.where(np.sum(first * second, axis=-1, keepdims=True) < 0.0, -second, second)
     gap = np.sqrt(np.sum((first - nearer) ** 2, axis=-1))
-    return 4.0 * np.arcsin(np.minimum(1.0, 0.5 * gap))
+    angle: Array = 4.0 * np.arcsin(np.minimum(1.0, 0.5 * gap))
+    return angle

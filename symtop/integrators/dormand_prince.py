@@ -111,7 +111,7 @@ def _try_steps(
         store(slopes, len(pair.b), field_angles(par, new))
         evaluations += len(pair.b)
         error = _rms(weighted(pair.error, state, slopes, h), state, new, tolerance)
-        change = SAFETY * error**-0.2 if error > 0.0 else GROW
+        change = GROW if error == 0.0 else SAFETY * error**-0.2
         if error < 1.0:
             return new, after, h * min(grow, change), evaluations, OK
         step = h * (change if change > SHRINK else SHRINK)  # noqa: FURB136  (max would pass NaN on)
@@ -122,7 +122,7 @@ def _try_steps(
 def march(  # type: ignore[no-untyped-def]
     par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, found, ends
 ):
-    """Steps until the end, a failure or `budget` evaluations; samples go to `found`, step ends to `ends` if it has room."""
+    """Steps until the end, a failure or `budget` evaluations; `found` takes the samples and `ends` the first step ends."""
     evaluations = 0
     outcome = OK
     while t < end and outcome == OK and evaluations < budget:
