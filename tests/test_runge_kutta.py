@@ -8,6 +8,7 @@ import pytest
 import symtop
 from symtop.integrators import dormand_prince
 from symtop.integrators.euler_lagrange import unreduced
+from symtop.integrators.outcomes import OUTCOMES
 from symtop.integrators.registry import integrator
 from symtop.integrators.runge_kutta import Tableau, march_angles, runge_kutta
 from symtop.integrators.scipy_ivp import EulerLagrange
@@ -213,6 +214,14 @@ def test_scipys_solvers_are_solve_ivp(name):
     np.testing.assert_array_equal(run["theta"], done.y[0])
     assert run.attrs["force_evaluations"] == rhs.calls  # more than nfev where a Jacobian is made of differences
     assert rhs.calls >= done.nfev
+
+
+@pytest.mark.parametrize("name", ["rk45", "rk45-compiled", "dop853", "lsoda", "radau"])
+def test_hopeless_tolerances_end_as_outcomes(name):
+    # in this scene DOP853 leaves a step whose interpolant meets an infinity
+    run = symtop.simulate("spheroid", name, tolerance=0.5, horizon=5.0)
+    assert run.attrs["outcome"] in OUTCOMES
+    assert np.array_equal(np.isfinite(run["theta"]), np.isfinite(run["p_phi"]))
 
 
 def test_taylor_in_three_precisions():

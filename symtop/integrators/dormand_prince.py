@@ -122,7 +122,7 @@ def _try_steps(
 def march(  # type: ignore[no-untyped-def]
     par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, found, ends
 ):
-    """Steps until the end, a failure or `budget` evaluations; `found` takes the samples and `ends` the first step ends."""
+    """Steps until the end, a failure or `budget` evaluations; `found` takes the samples, `ends` the first step ends."""
     evaluations = 0
     outcome = OK
     while t < end and outcome == OK and evaluations < budget:

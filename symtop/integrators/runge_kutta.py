@@ -86,7 +86,7 @@ def explicit_step(field: Any, par: Any, rule: Any, state: Any, slopes: Any, h: f
 
 
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:  # noqa: ARG001
-    """Working space for the slopes: 20 % slower than four stages written out by hand, and serves any tableau."""
+    """Working space for the slopes: 23 % slower than four stages written out by hand, and serves any tableau."""
     return np.empty((len(rule.b), len(state)))
 
 

@@ -64,29 +64,24 @@ def solver(method: str) -> Solver:
             make: Callable[..., Any] = getattr(integrate, method)
             stepper = make(rhs, 0.0, y0, plan.horizon, rtol=plan.tolerance, atol=plan.tolerance)
             while stepper.status == "running" and outcome == "ok":
-                outcome = _step(stepper)
-                if outcome != "ok":
+                try:
+                    stepper.step()
+                    if stepper.status == "failed":
+                        outcome = "step_too_small" if np.isfinite(stepper.y).all() else "not_finite"
+                        break
+                    steps += 1
+                    now = int(np.searchsorted(plan.times, stepper.t, side="right"))
+                    if now > seen:
+                        found[seen:now] = stepper.dense_output()(plan.times[seen:now]).T  # DOP853 evaluates f here too
+                        seen = now
+                except (OverflowError, ZeroDivisionError, ValueError):  # sin of infinity, or no finite Jacobian
+                    outcome = "not_finite"
                     break
-                steps += 1
-                now = int(np.searchsorted(plan.times, stepper.t, side="right"))
-                if now > seen:
-                    found[seen:now] = stepper.dense_output()(plan.times[seen:now]).T
-                    seen = now
                 outcome = _judge(stepper, rhs.calls)
         reached = plan.horizon if outcome == "ok" else float(stepper.t)
         return as_run(top, plan.times, found, steps, rhs.calls, outcome, reached)
 
     return solve
-
-
-def _step(stepper: Any) -> str:
-    try:
-        stepper.step()
-    except (OverflowError, ZeroDivisionError, ValueError):  # sin of infinity, or a Jacobian that is not finite
-        return "not_finite"
-    if stepper.status != "failed":
-        return "ok"
-    return "step_too_small" if np.isfinite(stepper.y).all() else "not_finite"
 
 
 def _judge(stepper: Any, calls: int) -> str:
