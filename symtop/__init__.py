@@ -32,6 +32,7 @@ _HOME = {
     "discrete_lagrangian": "integrators.discrete_lagrangian",
     "citation": "integrators.citations",
     "composition": "integrators.splitting",
+    "runge_kutta": "integrators.runge_kutta",
     "simulate": "simulate",
     "reference": "reference",
     "ClosedForm": "exact",

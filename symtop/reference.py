@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from symtop import charts, datasets
 from symtop.checks import SymtopError, SymtopWarning, one_of
+from symtop.integrators import taylor
 from symtop.scenes import Scene, closed_form
 from symtop.scenes import scene as find_scene
 
@@ -38,14 +39,6 @@ SUSPICIOUS = 1e-12  # a disagreement beyond this is an error of one of them, not
 MOST_CACHED = 200_000  # times; larger results are not kept on disk
 
 
-class _Working(NamedTuple):
-    """An arithmetic that heyoka offers."""
-
-    kind: Any  # converts a decimal string
-    epsilon: float
-    compact: bool  # unrolled code for quadruple precision takes 20 times longer to build and runs no faster
-
-
 class Checks(NamedTuple):
     """Largest errors seen up to each check time (running maxima), by quantity."""
 
@@ -56,71 +49,12 @@ class Checks(NamedTuple):
     psi: charts.Array
 
 
-def _working(precision: str) -> _Working:
-    if precision == "double":
-        return _Working(float, EPSILON, compact=False)
-    if precision == "longdouble":
-        return _Working(np.longdouble, float(np.finfo(np.longdouble).eps), compact=True)
-    import heyoka as hy  # noqa: PLC0415
-
-    return _Working(hy.real128, 2.0**-112, compact=True)
-
-
-@functools.lru_cache(maxsize=32)
-def _stepper(chart: str, precision: str) -> Any:
-    import heyoka as hy  # noqa: PLC0415
-
-    from symtop.integrators.taylor import equations  # noqa: PLC0415
-
-    system, working = equations(chart), _working(precision)
-    zero = [working.kind("0")] * len(system)
-    tolerance = working.kind(repr(working.epsilon / 100.0))
-    fp_type = np.float64 if precision == "double" else working.kind
-    return hy.taylor_adaptive(system, zero, tol=tolerance, fp_type=fp_type, compact_mode=working.compact)
-
-
-def _start_digits(chart: str, scene: Scene) -> tuple[list[str], list[str]]:
-    """State and parameters of a chart as decimal strings of 50 digits, from the exact doubles of the scene."""
-    from mpmath import mp, workdps  # noqa: PLC0415
-
-    with workdps(60):
-        at, top = scene.start, scene.top
-        theta, phi, psi, theta_dot, phi_dot, psi_dot = (
-            mp.mpf(getattr(at, name)) for name in ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
-        )
-        s, c, sin_phi, cos_phi = mp.sin(theta), mp.cos(theta), mp.sin(phi), mp.cos(phi)
-        half, total, difference = theta / 2, (phi + psi) / 2, (phi - psi) / 2
-        nod, swing = top.I1 * theta_dot, top.I1 * phi_dot * s
-        spin = top.I3 * (psi_dot + phi_dot * c)
-        attitude = [
-            mp.cos(half) * mp.cos(total),
-            mp.sin(half) * mp.cos(difference),
-            mp.sin(half) * mp.sin(difference),
-            mp.cos(half) * mp.sin(total),
-        ]
-        axis = [s * sin_phi, -s * cos_phi, c]
-        momentum = [
-            nod * cos_phi + (spin * s - swing * c) * sin_phi,
-            nod * sin_phi - (spin * s - swing * c) * cos_phi,
-            swing * s + spin * c,
-        ]
-        state = [*(axis if chart == "axis" else attitude), *momentum]
-        twist = spin * (1 / mp.mpf(top.I3) - 1 / mp.mpf(top.I1))
-        parameters = [1 / mp.mpf(top.I1), mp.mpf(top.mgl), twist]
-        return [mp.nstr(value, 50) for value in state], [mp.nstr(value, 50) for value in parameters]
-
-
 def integrate(scene: Scene, times: charts.Array, precision: str, chart: str = "attitude") -> tuple[Any, int]:
     """heyoka's states at increasing times, in the working precision, and the number of steps it took."""
-    stepper, working = _stepper(chart, precision), _working(precision)
-    state, parameters = _start_digits(chart, scene)
-    stepper.time = working.kind("0")
-    stepper.state[:] = [working.kind(value) for value in state]
-    stepper.pars[:] = [working.kind(value) for value in parameters[: len(stepper.pars)]]
-    grid = times if times[0] == 0.0 else np.concatenate([[0.0], times])
-    numbers = grid if precision == "double" else np.array([working.kind(float(t)) for t in grid])
-    _, _, _, steps, *_, states = stepper.propagate_grid(numbers)
-    return states[grid.size - times.size :], int(steps)
+    flight = taylor.propagate(
+        chart, precision, taylor.arithmetic(precision).epsilon / 100.0, scene.top, scene.start, times
+    )
+    return flight.states, flight.steps
 
 
 def have_heyoka() -> bool:
@@ -266,7 +200,7 @@ def _compute(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
         grain = 4.0 * EPSILON
     else:
         found, checks = _integrated(scene, times, precision)
-        grain = 8.0 * max(_working(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
+        grain = 8.0 * max(taylor.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
     data = xr.Dataset(coords={"time": times, "component": ["x", "y", "z"], "part": ["w", "x", "y", "z"]})
     for name, values in found.items():
         dims = ("time", {"axis": "component", "quaternion": "part"}[name]) if values.ndim > 1 else ("time",)

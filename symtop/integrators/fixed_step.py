@@ -5,17 +5,29 @@ from typing import Any
 
 from symtop.integrators.drive import March
 from symtop.integrators.outcomes import OUTCOMES
-from symtop.integrators.registry import Plan, Run, Solver
+from symtop.integrators.registry import Array, Plan, Run, Solver
 from symtop.top import Angles, SymmetricTop
 
 Prepare = Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]
 
 
-def fixed_step(march: Callable[..., March], rule: Any, prepare: Prepare, evaluations: int, *, implicit: bool) -> Solver:
+Present = Callable[[Any, Array, Array], Array]
+
+
+def fixed_step(
+    march: Callable[..., March],
+    rule: Any,
+    prepare: Prepare,
+    evaluations: int,
+    *,
+    implicit: bool,
+    present: Present | None = None,
+) -> Solver:
     """A solver around a loop: `prepare` gives a kernel its parameters and state, `rule` the method's numbers.
 
     `evaluations` is how many force evaluations one unit of the kernel's counted work takes; for an implicit method
-    that unit is one iteration.
+    that unit is one iteration. `present(par, times, states)` makes states of the
+    chart from the kernel's, where they differ.
     """
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
@@ -24,7 +36,7 @@ def fixed_step(march: Callable[..., March], rule: Any, prepare: Prepare, evaluat
         momenta = done.momenta
         momenta[plan.marks == 0] = top.momenta(start)[:2]
         return Run(
-            states=done.states,
+            states=done.states if present is None else present(par, plan.times, done.states),
             p_phi=momenta[:, 0],
             p_psi=momenta[:, 1],
             steps=done.steps,

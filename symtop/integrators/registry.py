@@ -104,7 +104,18 @@ class Integrator:
         return tuple(self.solvers)
 
 
-_BUILT_IN = ("discrete_lagrangian", "unreduced", "galerkin", "splitting", "scipy_ivp", "taylor", "closed_form")
+_BUILT_IN = (
+    "discrete_lagrangian",
+    "unreduced",
+    "galerkin",
+    "splitting",
+    "runge_kutta",
+    "dormand_prince",
+    "gauss",
+    "scipy_ivp",
+    "taylor",
+    "closed_form",
+)
 _registry: dict[str, Integrator] = {}
 _loaded: list[str] = []
 

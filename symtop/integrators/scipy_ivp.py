@@ -1,46 +1,50 @@
 """SciPy's solvers on the full Euler-Lagrange equations, as a user of SciPy would call them.
 
-Six variables, nothing reduced, so that every conserved quantity is free to drift:
+Six variables, nothing reduced (see `euler_lagrange`), so that every conserved quantity is free to drift; the tolerance
+is used for both rtol and atol; no Jacobian is given. None of the four is symplectic or symmetric, nothing is conserved.
 
-    theta'' = sin(theta) [phi' (I1 phi' cos(theta) - I3 w3) + mgl] / I1,     w3 = psi' + phi' cos(theta)
-    phi''   = theta' (I3 w3 - 2 I1 phi' cos(theta)) / (I1 sin(theta))
-    psi''   = theta' phi' sin(theta) - phi'' cos(theta)
+    rk45     Dormand-Prince 5(4), explicit, order 5               Dormand and Prince, JCAM 6 (1980) 19
+    dop853   Dormand-Prince 8(5,3), explicit, order 8             Hairer, Norsett, Wanner, Solving ODEs I, II.5
+    radau    Radau IIA, 3 stages, implicit, order 5, L-stable     Hairer and Wanner, Solving ODEs II, IV.8
+    lsoda    Adams (order 1-12) or BDF (1-5), chosen on the way   Petzold, SIAM J. Sci. Stat. Comput. 4 (1983) 136
 
-The tolerance is used for both rtol and atol. `rk45` is Dormand-Prince 5(4), explicit, of order 5, neither
-symplectic nor symmetric; nothing is conserved. The right-hand side is plain Python on floats, three times faster
-than the same lines on NumPy scalars. Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19.
+Radau and LSODA are made for stiff equations, which the top's are not: they are here because people use them. Every
+call of the right-hand side is counted, also those of difference quotients for a Jacobian, which SciPy's own `nfev` of
+Radau leaves out. The right-hand side is plain Python on floats, three times faster than the same on NumPy scalars.
 """
 
+import math
+import warnings
 from collections.abc import Callable
-from math import cos, sin
 from typing import Any
 
 import numpy as np
 
-from symtop.integrators.angles import require_chart
-from symtop.integrators.registry import Integrator, Plan, Run
+from symtop.integrators.dormand_prince import LEAST_TOLERANCE, as_run
+from symtop.integrators.euler_lagrange import accelerations, unreduced
+from symtop.integrators.registry import Integrator, Plan, Run, Solver
 from symtop.top import Angles, SymmetricTop
 
 EVALUATIONS = 20_000_000  # a run's limit: about two minutes
-LEAST_TOLERANCE = 2.3e-14  # SciPy itself refuses rtol below 100 eps
 
 
-def euler_lagrange(top: SymmetricTop) -> Callable[[float, Any], tuple[float, ...]]:
-    """Right-hand side of y' = f(t, y) with y = (theta, phi, psi, theta', phi', psi')."""
-    I1, I3, mgl = top.I1, top.I3, top.mgl
+class EulerLagrange:
+    """Right-hand side of y' = f(t, y) with y = (theta, phi, psi, theta', phi', psi'), and how often it was called."""
 
-    def rhs(_: float, y: Any) -> tuple[float, ...]:
+    __slots__ = ("calls", "numbers")
+
+    def __init__(self, top: SymmetricTop) -> None:
+        self.numbers = (top.I1, top.I3, top.mgl)
+        self.calls = 0
+
+    def __call__(self, _: float, y: Any) -> tuple[float, ...]:
+        """y' at any time."""
+        self.calls += 1
         theta, _, _, theta_dot, phi_dot, psi_dot = y.tolist()
-        s, c = sin(theta), cos(theta)
-        spin = I3 * (psi_dot + phi_dot * c)
-        theta_ddot = s * (phi_dot * (I1 * phi_dot * c - spin) + mgl) / I1
-        phi_ddot = theta_dot * (spin - 2.0 * I1 * phi_dot * c) / (I1 * s)
-        return theta_dot, phi_dot, psi_dot, theta_ddot, phi_ddot, theta_dot * phi_dot * s - phi_ddot * c
-
-    return rhs
+        return (theta_dot, phi_dot, psi_dot, *accelerations(*self.numbers, theta, theta_dot, phi_dot, psi_dot))
 
 
-def solver(method: str) -> Callable[[SymmetricTop, Angles, Plan], Run]:
+def solver(method: str) -> Solver:
     """A solver of the registry around one method of ``scipy.integrate``.
 
     This is the loop of ``solve_ivp`` with ``t_eval``, to the same bits, kept open so that a run that fails
@@ -50,69 +54,67 @@ def solver(method: str) -> Callable[[SymmetricTop, Angles, Plan], Run]:
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         from scipy import integrate  # noqa: PLC0415  (0.6 s to import)
 
-        require_chart(start)
-        y0 = (start.theta, start.phi, start.psi, start.theta_dot, start.phi_dot, start.psi_dot)
-        found = np.full((6, plan.times.size), np.nan)
+        _, y0 = unreduced(top, start)
+        rhs = EulerLagrange(top)
+        found = np.full((plan.times.size, len(y0)), np.nan)
         steps = seen = 0
         outcome = "ok"
-        with np.errstate(all="ignore"):
-            method_class = getattr(integrate, method)
-            stepper = method_class(euler_lagrange(top), 0.0, y0, plan.horizon, rtol=plan.tolerance, atol=plan.tolerance)
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # LSODA's failures; they are in its status as well
+            make: Callable[..., Any] = getattr(integrate, method)
+            stepper = make(rhs, 0.0, y0, plan.horizon, rtol=plan.tolerance, atol=plan.tolerance)
             while stepper.status == "running" and outcome == "ok":
                 try:
                     stepper.step()
-                except (OverflowError, ZeroDivisionError, ValueError):  # sin of infinity, or a pole hit exactly
+                    if stepper.status == "failed":
+                        outcome = "step_too_small" if np.isfinite(stepper.y).all() else "not_finite"
+                        break
+                    steps += 1
+                    now = int(np.searchsorted(plan.times, stepper.t, side="right"))
+                    if now > seen:
+                        found[seen:now] = stepper.dense_output()(plan.times[seen:now]).T  # DOP853 evaluates f here too
+                        seen = now
+                except (OverflowError, ZeroDivisionError, ValueError):  # sin of infinity, or no finite Jacobian
                     outcome = "not_finite"
                     break
-                if stepper.status == "failed":
-                    outcome = "step_too_small"
-                    break
-                steps += 1
-                now = int(np.searchsorted(plan.times, stepper.t, side="right"))
-                if now > seen:
-                    found[:, seen:now] = stepper.dense_output()(plan.times[seen:now])
-                    seen = now
-                outcome = _judge(stepper)
+                outcome = _judge(stepper, rhs.calls)
         reached = plan.horizon if outcome == "ok" else float(stepper.t)
-        return _as_run(top, found, steps, int(stepper.nfev), outcome, reached)
+        return as_run(top, plan.times, found, steps, rhs.calls, outcome, reached)
 
     return solve
 
 
-def _judge(stepper: Any) -> str:
-    theta = stepper.y[0]
+def _judge(stepper: Any, calls: int) -> str:
     if not np.isfinite(stepper.y).all():
         return "not_finite"
-    if not 0.0 < theta < np.pi:
+    if not 0.0 < stepper.y[0] < math.pi:
         return "left_chart"
-    return "out_of_budget" if stepper.nfev > EVALUATIONS else "ok"
+    return "out_of_budget" if calls > EVALUATIONS else "ok"
 
 
-def _as_run(top: SymmetricTop, found: Any, steps: int, evaluations: int, outcome: str, reached: float) -> Run:
-    """p_theta and both momenta from the angles and rates that were found."""
-    theta, phi, psi, theta_dot, phi_dot, psi_dot = found
-    states = np.stack([theta, top.I1 * theta_dot, phi, psi], axis=-1)
-    p_psi = top.I3 * (psi_dot + phi_dot * np.cos(theta))
-    p_phi = top.I1 * phi_dot * np.sin(theta) ** 2 + p_psi * np.cos(theta)
-    return Run(states, p_phi, p_psi, steps, evaluations, 0, outcome, reached)
+def _entry(method: str, summary: str, order: int | None, reference: str, *, explicit: bool) -> Integrator:
+    return Integrator(
+        name=method.lower(),
+        family="library",
+        summary=f"SciPy's {method} ({summary}) on the unreduced Euler-Lagrange equations",
+        solvers={"angles": solver(method)},
+        knob="tolerance",
+        tier="python",
+        order=order,
+        explicit=explicit,
+        symplectic=False,
+        symmetric=False,
+        conserves=frozenset(),
+        least_tolerance=LEAST_TOLERANCE,
+        reference=reference,
+    )
 
 
 def built_in() -> list[Integrator]:
     """SciPy's methods under the names of this registry."""
     return [
-        Integrator(
-            name="rk45",
-            family="library",
-            summary="SciPy's RK45 (Dormand-Prince) on the six-variable Euler-Lagrange equations",
-            solvers={"angles": solver("RK45")},
-            knob="tolerance",
-            tier="python",
-            order=5,
-            explicit=True,
-            symplectic=False,
-            symmetric=False,
-            conserves=frozenset(),
-            least_tolerance=LEAST_TOLERANCE,
-            reference="dormand-prince-1980",
-        ),
+        _entry("RK45", "Dormand-Prince 5(4)", 5, "dormand-prince-1980", explicit=True),
+        _entry("DOP853", "Dormand-Prince 8(5,3)", 8, "hairer-norsett-wanner-1993", explicit=True),
+        _entry("LSODA", "Adams or BDF of variable order", None, "petzold-1983", explicit=False),
+        _entry("Radau", "implicit Radau IIA", 5, "hairer-wanner-1996", explicit=False),
     ]

@@ -7,19 +7,20 @@ All constants, |e| = 1, L.e = p_psi, L_z = p_phi and the energy, are linear or q
 three times cheaper than the attitude chart and is used whenever nobody asks for the spin angle. The order follows
 from the tolerance (about 20 in double); the step from the size of the series' last terms. Asking for a
 hundredth of the rounding unit removes the truncation bias that makes energy drift linearly at tolerance eps.
-A Taylor step of order n computes n derivatives of the state; `force_evaluations` counts them.
+`taylor` works in double, `taylor-longdouble` and `taylor-quad` with mantissas of 64 and 113 bits: they show what the
+method does without rounding, and `symtop.reference` is made by the same function. A Taylor step of order n computes n
+derivatives of the state; `force_evaluations` counts them.
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
 """
 
 import functools
-from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop import charts
 from symtop.checks import SymtopError
-from symtop.integrators.registry import Array, Integrator, Plan, Run
+from symtop.integrators.registry import Array, Integrator, Plan, Run, Solver
 from symtop.top import Angles, SymmetricTop
 
 EPSILON = float(np.finfo(np.float64).eps)
@@ -46,39 +47,110 @@ def equations(chart: str) -> list[Any]:
     return [*zip(axis, motion, strict=True), *zip(momentum, [-mgl * y, mgl * x, 0.0 * x], strict=True)]
 
 
+class Arithmetic(NamedTuple):
+    """A floating-point type that heyoka offers."""
+
+    kind: Any  # converts a decimal string
+    epsilon: float
+    compact: bool  # unrolled code in quadruple precision takes 20 times longer to build and runs no faster
+
+
+def arithmetic(precision: str) -> Arithmetic:
+    """The type behind "double", "longdouble" (80 bits on x86) or "quad" (113 bits)."""
+    if precision == "double":
+        return Arithmetic(float, EPSILON, compact=False)
+    if precision == "longdouble":
+        return Arithmetic(np.longdouble, float(np.finfo(np.longdouble).eps), compact=False)
+    import heyoka as hy  # noqa: PLC0415
+
+    return Arithmetic(hy.real128, 2.0**-112, compact=True)
+
+
 @functools.lru_cache(maxsize=32)
-def _stepper(chart: str, tolerance: float) -> Any:
+def stepper(chart: str, precision: str, tolerance: float) -> Any:
     """A compiled heyoka integrator; building one costs 0.1 s the first time, then milliseconds from its disk cache."""
     import heyoka as hy  # noqa: PLC0415
 
-    system = equations(chart)
-    return hy.taylor_adaptive(system, [0.0] * len(system), tol=tolerance)
+    system, working = equations(chart), arithmetic(precision)
+    zero, bound = [working.kind("0")] * len(system), working.kind(repr(tolerance))
+    fp_type = np.float64 if precision == "double" else working.kind
+    return hy.taylor_adaptive(system, zero, tol=bound, fp_type=fp_type, compact_mode=working.compact)
 
 
-def solver(chart: str) -> Callable[[SymmetricTop, Angles, Plan], Run]:
-    """A solver of the registry in one chart."""
+@functools.lru_cache(maxsize=256)
+def start_numbers(chart: str, precision: str, top: SymmetricTop, at: Angles) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """State and parameters of a start, correctly rounded to the working precision from its exact doubles.
+
+    Momenta that were rounded to double first would move theta(8) by 5e-15 in the first scene.
+    """
+    from mpmath import mp, workdps  # noqa: PLC0415
+
+    kind = arithmetic(precision).kind
+    with workdps(60):
+        theta, phi, psi, theta_dot, phi_dot, psi_dot = (mp.mpf(getattr(at, name)) for name in at.__slots__)
+        s, c, sin_phi, cos_phi = mp.sin(theta), mp.cos(theta), mp.sin(phi), mp.cos(phi)
+        half, total, difference = theta / 2, (phi + psi) / 2, (phi - psi) / 2
+        nod, swing = top.I1 * theta_dot, top.I1 * phi_dot * s
+        spin = top.I3 * (psi_dot + phi_dot * c)
+        attitude = [
+            mp.cos(half) * mp.cos(total),
+            mp.sin(half) * mp.cos(difference),
+            mp.sin(half) * mp.sin(difference),
+            mp.cos(half) * mp.sin(total),
+        ]
+        axis = [s * sin_phi, -s * cos_phi, c]
+        momentum = [
+            nod * cos_phi + (spin * s - swing * c) * sin_phi,
+            nod * sin_phi - (spin * s - swing * c) * cos_phi,
+            swing * s + spin * c,
+        ]
+        state = [*(axis if chart == "axis" else attitude), *momentum]
+        twist = spin * (1 / mp.mpf(top.I3) - 1 / mp.mpf(top.I1))
+        parameters = [1 / mp.mpf(top.I1), mp.mpf(top.mgl), twist]
+        return tuple(kind(mp.nstr(value, 50)) for value in state), tuple(
+            kind(mp.nstr(value, 50)) for value in parameters
+        )
+
+
+class Flight(NamedTuple):
+    """What one run of heyoka returns."""
+
+    states: Any  # (times, dimension of the chart), in the working precision
+    steps: int
+    order: int
+    outcome: str  # heyoka's word
+
+
+def propagate(chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array) -> Flight:
+    """heyoka's states at increasing times, in the working precision; the one place where heyoka is run."""
+    integrator, kind = stepper(chart, precision, tolerance), arithmetic(precision).kind
+    state, parameters = start_numbers(chart, precision, top, start)
+    integrator.time = kind("0")
+    integrator.state[:] = state
+    integrator.pars[:] = parameters[: integrator.pars.size]  # the axis chart does not need the last one
+    grid = times if times[0] == 0.0 else np.concatenate([[0.0], times])
+    numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
+    outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers)
+    return Flight(states[grid.size - times.size :], int(steps), int(integrator.order), str(outcome))
+
+
+def solver(chart: str, precision: str) -> Solver:
+    """A solver of the registry in one chart and one arithmetic; samples are rounded to double."""
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        stepper = _stepper(chart, plan.tolerance)
-        stepper.time = 0.0
-        stepper.state[:] = charts.space_state(chart, top, start)
-        spin = top.momenta(start).p_psi
-        numbers = (1.0 / top.I1, top.mgl, spin * (1.0 / top.I3 - 1.0 / top.I1))
-        stepper.pars[:] = numbers[: stepper.pars.size]  # the axis chart does not need the last one
-        grid = plan.times if plan.times[0] == 0.0 else np.concatenate([[0.0], plan.times])
-        outcome, _, _, steps, *_, states = stepper.propagate_grid(grid)
-        states = states[grid.size - plan.times.size :]
+        flight = propagate(chart, precision, plan.tolerance, top, start, plan.times)
+        p_phi, p_psi = (values.astype(float) for values in space_momenta(chart, flight.states))
+        states = flight.states.astype(float)
         good = np.isfinite(states).all(axis=1)
-        word = "ok" if good.all() and "time_limit" in str(outcome) else "not_finite"
+        word = "ok" if good.all() and "time_limit" in flight.outcome else "not_finite"
         reached = plan.horizon if word == "ok" else float(plan.times[good][-1]) if good.any() else 0.0
-        p_phi, p_psi = space_momenta(chart, states)
-        return Run(states, p_phi, p_psi, int(steps), int(steps) * int(stepper.order), 0, word, reached)
+        return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, word, reached)
 
     return solve
 
 
-def space_momenta(chart: str, states: Array) -> tuple[Array, Array]:
-    """p_phi = L_z and p_psi = L.e of states in a space-frame chart."""
+def space_momenta(chart: str, states: Any) -> tuple[Any, Any]:
+    """p_phi = L_z and p_psi = L.e of states in a space-frame chart, in the precision of the states."""
     if chart == "axis":
         axis, momentum = states[:, :3], states[:, 3:]
     else:
@@ -86,13 +158,26 @@ def space_momenta(chart: str, states: Array) -> tuple[Array, Array]:
     return momentum[:, 2].copy(), np.sum(momentum * axis, axis=-1)
 
 
+# beyond double there are no vector units, and quadruple precision is software: a step costs 12 and 500 times as much
+_SUMMARIES = {
+    "double": "heyoka's Taylor series on the space-frame equations, without poles",
+    "longdouble": "heyoka's Taylor series in 80-bit arithmetic, samples rounded to double",
+    "quad": "heyoka's Taylor series in quadruple precision, samples rounded to double; slow, keep the horizon short",
+}
+
+
 def built_in() -> list[Integrator]:
-    """heyoka's integrator, where heyoka is installed."""
+    """heyoka's integrator in three arithmetics, where heyoka is installed."""
     try:
-        import heyoka  # noqa: F401, PLC0415
+        import heyoka as hy  # noqa: PLC0415
     except ImportError:
         return [_absent()]
-    return [_entry({"axis": solver("axis"), "attitude": solver("attitude")})]
+    wide = ["longdouble"] if np.finfo(np.longdouble).eps < EPSILON else []
+    quad = ["quad"] if hasattr(hy, "real128") else []
+    return [
+        _entry(precision, {chart: solver(chart, precision) for chart in ("axis", "attitude")})
+        for precision in ("double", *wide, *quad)
+    ]
 
 
 def _absent() -> Integrator:
@@ -100,21 +185,22 @@ def _absent() -> Integrator:
         msg = "taylor needs the package heyoka, which has wheels for Linux only (elsewhere: conda-forge)"
         raise SymtopError(msg)
 
-    return _entry({"attitude": refuse})
+    return _entry("double", {"attitude": refuse})
 
 
-def _entry(solvers: Any) -> Integrator:
+def _entry(precision: str, solvers: dict[str, Solver]) -> Integrator:
+    epsilon = arithmetic(precision).epsilon
     return Integrator(
-        name="taylor",
+        name="taylor" if precision == "double" else f"taylor-{precision}",
         family="taylor",
-        summary="heyoka's Taylor series on the space-frame equations, without poles",
+        summary=_SUMMARIES[precision],
         solvers=solvers,
         knob="tolerance",
         explicit=True,
         symplectic=False,
         symmetric=False,
         conserves=frozenset(),
-        least_tolerance=EPSILON / 1000.0,
-        default_tolerance=EPSILON / 100.0,
+        least_tolerance=epsilon / 1000.0,
+        default_tolerance=epsilon / 100.0,
         reference="biscani-izzo-2021",
     )
