@@ -23,7 +23,7 @@ def cases(quick: bool) -> list[Case]:
         horizon = min(where.horizon, 8.0 * where.nutation_period) if name != "spheroid" else where.horizon
         for method in integrators().values():
             if method.knob == "step_size":
-                steps = step_ladder(method, where, horizon, quick)
+                steps = step_ladder(method, where, horizon, *((8, 1e5) if quick else ()))
                 grid.append(Case(name, method.name, {"horizon": horizon, "step_sizes": steps}))
     return grid
 

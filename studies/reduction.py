@@ -35,12 +35,12 @@ def cases(quick: bool) -> list[Case]:
         period = scene(name).nutation_period
         several = several_charts()
         for method in several[:6] if quick else several:
-            settings = ladder(method, scene(name), CHART_PERIODS * period, quick=True)[1 :: 3 if quick else 2]
+            settings = ladder(method, scene(name), CHART_PERIODS * period, 8, 1e5)[1 :: 3 if quick else 2]
             plan = {
                 "part": "charts",
                 "settings": settings,
                 "horizon": CHART_PERIODS * period,
-                "batches": 3 if quick else 5,
+                "batches": 2 if quick else 3,
             }
             grid.append(Case(name, method.name, plan))
         for twin in twins():

@@ -9,7 +9,7 @@ from symtop.report.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, 
 from symtop.scenes import added_scenes, scene
 from symtop.study.study import Case, Picture, Study, Table
 
-SCENES = {"spheroid": 1e5, "goldstein": 1e5, "hairer-lubich-wanner": 1e5, "bruls-cardona-arnold": 1e3}
+SCENES = {"spheroid": 1e5, "goldstein": 1e4, "hairer-lubich-wanner": 1e4, "bruls-cardona-arnold": 1e3}
 LONGEST = {"quadruple, attitude": 100.0, "closed form": 1e6}  # seconds of machine time, not of accuracy
 LOOKS = dict(zip(SOURCES, zip((ORANGE, VERMILLION, GREEN, BLUE, PURPLE, BLACK), "v<^>D*", strict=True), strict=True))
 

@@ -201,53 +201,50 @@ def _compute(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
     else:
         found, checks = _integrated(scene, times, precision)
         grain = 8.0 * max(taylor.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
-    data = xr.Dataset(coords={"time": times, "component": ["x", "y", "z"], "part": ["w", "x", "y", "z"]})
-    for name, values in found.items():
-        dims = ("time", {"axis": "component", "quaternion": "part"}[name]) if values.ndim > 1 else ("time",)
-        high, low = _split(values)
-        data[name] = (dims, high)
+    variables: dict[str, Any] = {}
+    stored = {name: _split(values) for name, values in found.items()}
+    for name, (high, low) in stored.items():
+        dims = ("time", {"axis": "component", "quaternion": "part"}[name]) if high.ndim > 1 else ("time",)
+        variables[name] = (dims, high)
         if precision != "closed-form":
-            data[f"{name}_lo"] = (dims, low)
-    bounds = _bounds(data, checks, grain, overlap)
+            variables[f"{name}_lo"] = (dims, low)
+    found = {name: high for name, (high, _) in stored.items()}
+    bounds = _bounds(times, found, checks, grain, overlap)
     if precision != "closed-form":
-        _raise_to_distance(bounds, data, _closed_values(scene, times))
-    for name, bound in bounds.items():
-        data[f"{name}_error_bound"] = ("time", bound)
-    for name, value in _constants(scene).items():
-        data[name] = ("time", np.full(times.size, value))
-    data.attrs["overlap_with_integration"] = overlap
-    return data
+        _raise_to_distance(bounds, found, _closed_values(scene, times))
+    variables.update({f"{name}_error_bound": ("time", bound) for name, bound in bounds.items()})
+    variables.update({name: ("time", np.full(times.size, value)) for name, value in _constants(scene).items()})
+    coordinates = {"time": times, "component": ["x", "y", "z"], "part": ["w", "x", "y", "z"]}
+    return xr.Dataset(variables, coordinates, {"overlap_with_integration": overlap})
 
 
-def _bounds(data: xr.Dataset, checks: Checks, grain: float, overlap: float) -> dict[str, charts.Array]:
+def _bounds(
+    times: charts.Array, found: dict[str, Any], checks: Checks, grain: float, overlap: float
+) -> dict[str, charts.Array]:
     """Error bounds from the checks; `overlap` counts in full if the closed form and an integration disagree."""
-    times = data["time"].values
     doubt = overlap if overlap > SUSPICIOUS else 0.0
-    sine = np.maximum(np.sin(data["theta"].values), np.finfo(float).tiny)
+    sine = np.maximum(np.sin(found["theta"]), np.finfo(float).tiny)
     axis = _envelope(checks, "axis", times) + grain + doubt
     attitude = _envelope(checks, "attitude", times) + grain + doubt
     # an error of the axis turns phi by 1/sin(theta) of it, and psi by the rest of the attitude's error
-    turn = np.maximum(_envelope(checks, "phi", times), axis / sine) + grain * np.abs(data["phi"].values)
-    spin = np.maximum(_envelope(checks, "psi", times), attitude + axis / sine) + grain * np.abs(data["psi"].values)
+    turn = np.maximum(_envelope(checks, "phi", times), axis / sine) + grain * np.abs(found["phi"])
+    spin = np.maximum(_envelope(checks, "psi", times), attitude + axis / sine) + grain * np.abs(found["psi"])
     return {"axis": axis, "attitude": attitude, "theta": axis, "phi": turn, "psi": spin}
 
 
-def _raise_to_distance(bounds: dict[str, charts.Array], data: xr.Dataset, closed: dict[str, Any]) -> None:
+def _raise_to_distance(bounds: dict[str, charts.Array], found: dict[str, Any], closed: dict[str, Any]) -> None:
     """Where an integration visibly differs from the closed form in double, that distance is its error at that time."""
-    distances = {
-        "axis": charts.axis_distance(data["axis"].values, closed["axis"]),
-        "attitude": charts.attitude_distance(data["quaternion"].values, closed["quaternion"]),
-        "theta": np.abs(data["theta"].values - closed["theta"]),
-        "phi": np.abs(data["phi"].values - closed["phi"]),
-        "psi": np.abs(data["psi"].values - closed["psi"]),
-    }
+    distances = {name: np.abs(found[name] - closed[name]) for name in ("theta", "phi", "psi")}
+    distances["axis"] = charts.axis_distance(found["axis"], closed["axis"])
+    distances["attitude"] = charts.attitude_distance(found["quaternion"], closed["quaternion"])
     for name, distance in distances.items():
-        scale = np.abs(data[name].values) if name in ("phi", "psi") else 1.0
+        scale = np.abs(found[name]) if name in ("phi", "psi") else 1.0
         grain = 4.0 * EPSILON * np.maximum(scale, 1.0)
         visible = distance > 8.0 * grain
         bounds[name] = np.where(visible, np.maximum(bounds[name], distance + grain), bounds[name])
 
 
+@functools.lru_cache(maxsize=256)
 def _constants(scene: Scene) -> dict[str, float]:
     from symtop.exact_mp import PreciseForm  # noqa: PLC0415
 

@@ -153,7 +153,8 @@ _scene, _integrator = scene, integrator  # the public argument names shadow thes
 
 def as_dataset(scene: Scene, chart: str, plan: Plan, run: Run) -> xr.Dataset:
     """The observables of a run, whatever chart it was computed in."""
-    columns = {"angles": _from_angles, "axis": _from_axis, "attitude": _from_attitude}[chart](scene, plan, run)
+    with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up, and that is a result
+        columns = {"angles": _from_angles, "axis": _from_axis, "attitude": _from_attitude}[chart](scene, plan, run)
     components = {"axis": "component", "quaternion": "part"}
     variables = {
         name: (("time", components[name]) if name in components else "time", values) for name, values in columns.items()

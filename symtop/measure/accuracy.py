@@ -13,36 +13,33 @@ from symtop.scenes import Scene
 from symtop.simulate import simulate
 
 SAMPLES = 331
+ENOUGH = {"compiled": 1e9, "python": 2e4}  # force evaluations of a run after which no finer setting is tried
 EPSILON = float(np.finfo(float).eps)
 
 
-def step_ladder(method: Integrator, scene: Scene, horizon: float, quick: bool = False) -> list[float]:
-    """Steps from ten a nutation down to where the method meets round-off or `MOST` steps, evenly in the logarithm.
+def step_ladder(method: Integrator, scene: Scene, horizon: float, count: int = 13, most: float = 4e6) -> list[float]:
+    """Steps from ten a nutation down to where the method meets round-off or `most` steps, evenly in the logarithm.
 
     The finest step of a method of order p resolves a nutation about 10 * 10^(11/p) times.
     """
     period = scene.nutation_period if math.isfinite(scene.nutation_period) else horizon / 8.0
-    decades = min(4.5, 11.0 / (method.order or 2))
-    most = 2e5 if quick else 4e6  # steps
-    decades = min(decades, max(math.log10(most * period / horizon / 10.0), 0.5))
-    count = 8 if quick else 13
+    decades = min(4.5, 11.0 / (method.order or 2), max(math.log10(most * period / horizon / 10.0), 0.5))
     # 10.37 a nutation: nothing here may be commensurate with it
     return [period / (10.37 * 10.0 ** (decades * k / (count - 1))) for k in range(count)]
 
 
-def tolerance_ladder(method: Integrator, quick: bool = False) -> list[float]:
-    """Tolerances from 1e-2 down to what the method's arithmetic allows."""
-    least = max(method.least_tolerance, 1e-18)
-    decades = -2.0 - math.log10(least)
-    count = 5 if quick else 10
+def tolerance_ladder(method: Integrator, count: int = 9) -> list[float]:
+    """Tolerances from 1e-2 down to what the method's arithmetic allows, or its patience."""
+    tedious = method.tier == "python" and method.explicit is False  # radau at 1e-12: a minute for ten nutations
+    decades = -2.0 - math.log10(max(method.least_tolerance, 1e-8 if tedious else 1e-18))
     return [10.0 ** (-2.0 - 0.999 * decades * k / (count - 1)) for k in range(count)]
 
 
-def ladder(method: Integrator, scene: Scene, horizon: float, quick: bool = False) -> list[float]:
-    """The settings of a method's one knob, coarse to fine."""
+def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, most: float = 4e6) -> list[float]:
+    """`count` settings of a method's one knob, coarse to fine; steps end at `most` of them."""
     if method.knob == "step_size":
-        return step_ladder(method, scene, horizon, quick)
-    return tolerance_ladder(method, quick) if method.knob == "tolerance" else [math.nan]
+        return step_ladder(method, scene, horizon, count, most)
+    return tolerance_ladder(method, count) if method.knob == "tolerance" else [math.nan]
 
 
 def knobs(method: Integrator, setting: float) -> dict[str, float | None]:
@@ -58,8 +55,11 @@ def error_table(
     Dimension ``setting``. ``axis`` ... hold the maximum over the run, ``axis_end`` ... the error at the horizon,
     ``axis_bound`` ... the least error that the reference can judge (its own bound plus rounding).
     """
-    rows = []
+    rows: list[dict[str, float | str]] = []
     for setting in settings:
+        if rows and float(rows[-1]["force_evaluations"]) > ENOUGH[method.tier]:
+            rows.append(dict.fromkeys(rows[-1], math.nan) | {"outcome": "not_run", "tier": method.tier})
+            continue
         run = simulate(scene, method, horizon=horizon, samples=SAMPLES, observe=observe, **knobs(method, setting))
         truth = reference(scene, run["time"].values, precision="closed-form")
         found = errors(scene, run, truth)

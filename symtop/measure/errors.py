@@ -41,6 +41,12 @@ def errors(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Dataset:
 
     `truth` holds `axis`, `theta`, `quaternion`, `energy`, `p_phi`, `p_psi` at the same times (see `reference`).
     """
+    with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
+        found = _found(scene, run, truth)
+    return xr.Dataset({name: ("time", values) for name, values in found.items()}, coords={"time": run["time"]})
+
+
+def _found(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> dict[str, charts.Array]:
     found = {
         "axis": charts.axis_distance(run["axis"].values, truth["axis"].values),
         "theta": np.abs(run["theta"].values - truth["theta"].values),
@@ -51,7 +57,7 @@ def errors(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Dataset:
     attitude = _quaternion(run)
     if attitude is not None:
         found["attitude"] = charts.attitude_distance(attitude, truth["quaternion"].values)
-    return xr.Dataset({name: ("time", values) for name, values in found.items()}, coords={"time": run["time"]})
+    return found
 
 
 def _quaternion(run: xr.Dataset) -> charts.Array | None:

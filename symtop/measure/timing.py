@@ -78,7 +78,13 @@ def bare_run(scene: Scene, method: Integrator, chart: str, setting: float, horiz
 
 
 def time_settings(
-    scene: Scene, method: Integrator, settings: Sequence[float], horizon: float, observe: str, batches: int = 5
+    scene: Scene,
+    method: Integrator,
+    settings: Sequence[float],
+    horizon: float,
+    observe: str,
+    batches: int = 5,
+    batch: float = BATCH,
 ) -> xr.Dataset:
     """Seconds of one run at each setting, without any observables: dimension ``setting`` (and ``batch``).
 
@@ -86,7 +92,7 @@ def time_settings(
     compilation or loading, ``reliable`` 1 where the spread allows a verdict.
     """
     chart = choose_chart(method, observe)
-    found = timings([bare_run(scene, method, chart, setting, horizon) for setting in settings], batches)
+    found = timings([bare_run(scene, method, chart, setting, horizon) for setting in settings], batches, batch)
     return xr.Dataset(
         {
             "seconds": ("setting", [timing.best for timing in found]),
