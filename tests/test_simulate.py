@@ -159,7 +159,7 @@ def test_scenes_say_what_they_are_for():
         "hairer-lubich-wanner", "simo-wong", "kinon-betsch",
     }  # fmt: skip
     assert names <= set(symtop.scenes())
-    for where in symtop.scenes().values():
+    for where in map(symtop.scene, names):
         assert where.purpose
         assert "\n" not in where.purpose
         assert where.nutation_period > 0.0

@@ -24,6 +24,21 @@ def _chapter(
 
 
 ENTRIES: dict[str, tuple[str, dict[str, str]]] = {
+    "klein-sommerfeld-1910": _book(
+        "Klein, F. and Sommerfeld, A.",
+        r"{\"U}ber die {T}heorie des {K}reisels",
+        "Teubner",
+        1910,
+        note="first part 1897",
+    ),
+    "hairer-mclachlan-razakarivony-2008": _article(
+        "Hairer, E. and McLachlan, R. I. and Razakarivony, A.",
+        "Achieving {B}rouwer's law with implicit {R}unge--{K}utta methods",
+        "BIT Numerical Mathematics",
+        "48",
+        "231--243",
+        2008,
+    ),
     "marsden-west-2001": _article(
         "Marsden, J. E. and West, M.",
         "Discrete mechanics and variational integrators",

@@ -215,7 +215,7 @@ def gauss(stages: int) -> Integrator:
         symplectic=False,
         symmetric=True,
         conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}),
-        reference="hairer-mclachlan-razakarivony-2008",
+        reference="butcher-1964 hairer-mclachlan-razakarivony-2008",
     )
 
 
