@@ -69,9 +69,9 @@ def _picture(data: xr.Dataset, quantity: str, power: int) -> Picture:
     for axis, name in zip(axes.flat, scenes, strict=False):
         steps, errors = data["step_size"].sel(scene=name).values, data[quantity].sel(scene=name).values
         if power and np.isfinite(errors).any():
-            coarse = float(np.nanmax(steps))
-            span = (coarse * (1e-12 / np.nanmax(errors)) ** (1.0 / power), coarse)
-            style.slope_guide(axis, power, span, 0.2 * 1e-12, f"$h^{{{power}}}$")
+            coarse, least = float(np.nanmax(steps)), 0.1 * float(np.nanmin(errors[:, 0]))
+            span = (coarse * max(1e-14 / least, 1e-14) ** (1.0 / power), coarse)
+            style.slope_guide(axis, power, span, least * (span[0] / coarse) ** power, f"$h^{{{power}}}$")
     slopes = [fit.slope for fit in orders.values() if np.isfinite(fit.slope)]
     range_ = (
         f"Fitted orders lie between {min(slopes):.3f} and {max(slopes):.3f}." if slopes else "None could be fitted."

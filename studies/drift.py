@@ -72,7 +72,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     sizes = Picture(
         "sizes",
         figures.dots(data, scenes, columns, log=True),
-        "Largest residual of every method over the whole run. Rounding is at 1e-16; what a method keeps stays within "
+        "Largest residual of every method over the whole run. Rounding is at 1e-16 (an exact zero is drawn at 1e-17); "
+        "what a method keeps stays within "
         "a few hundred of it, what it does not shows its truncation error, and drifts add up to the right.",
         "Dot plot of largest residuals of energy and momenta for every integrator.",
     )

@@ -12,12 +12,13 @@ from symtop.measure.verdicts import ACCURATE, VERDICTS
 from symtop.measure.verdicts import verdict as judge
 from symtop.reference import reference
 from symtop.report import figures
-from symtop.scenes import added_scenes, scene
+from symtop.scenes import Scene, added_scenes, closed_form, scene
 from symtop.simulate import simulate
 from symtop.study.study import Case, Picture, Study, Table
 
-SCENES = ["spheroid", "goldstein", "cusp", "fast"]
+SCENES = ["spheroid", "goldstein", "cusp", "fast", "bruls-cardona-arnold"]
 PERIODS = 40.0
+GRAZING = 1e-3  # rad
 FINEST, COARSEST = 0.002, 2.0  # nutation periods
 
 
@@ -84,6 +85,36 @@ def limits(data: xr.Dataset, name: str, method: str) -> tuple[float, float, str]
     return accurate, float(knob[failed[0]]) if failed.size else math.nan, str(words[failed[0]]) if failed.size else ""
 
 
+def grazing(data: xr.Dataset) -> list[str]:
+    """Scenes that come close to a pole, and what that does to methods whose chart ends there."""
+    sentences = []
+    for name in data["scene"].values:
+        where = scene(str(name))
+        low, high = closed_form(where).theta_range
+        gap = min(low, math.pi - high)
+        if gap > GRAZING:
+            continue
+        words = data["verdict"].sel(scene=name)
+        angles = [str(m) for m in data["integrator"].values if integrator(str(m)).charts() == ("angles",)]
+        others = [str(m) for m in data["integrator"].values if str(m) not in angles]
+        never = [m for m in angles if not (words.sel(integrator=m) == "accurate").any()]
+        good = [m for m in others if (words.sel(integrator=m) == "accurate").any()]
+        sentences.append(
+            f"On {name} the axis passes a pole at {math.degrees(gap):.1e} degrees, where phi' rises to "
+            f"{_fastest(where):.1e} rad/s within an instant: of {len(angles)} methods in the angles chart {len(never)} "
+            f"are accurate at no setting tried, while {len(good)} of {len(others)} methods in charts without poles are."
+        )
+    return sentences
+
+
+def _fastest(where: Scene) -> float:
+    """The largest precession rate, at the turning point next to the pole."""
+    theta = min(closed_form(where).theta_range, key=math.sin)
+    momenta = where.top.momenta(where.start)
+    x = 0.5 * theta
+    return abs(momenta.north / math.sin(x) ** 2 + momenta.south / math.cos(x) ** 2) / (4.0 * where.top.I1)
+
+
 def tables(data: xr.Dataset) -> list[Table]:
     """Limits of accuracy and of survival."""
     rows = []
@@ -128,7 +159,7 @@ def verdict(data: xr.Dataset) -> list[str]:
             f"{method} is accurate on every scene with {thing} up to {found[worst][0]:.2g}{ending} (least on {worst}); "
             f"{fate}."
         )
-    return sentences
+    return sentences + grazing(data)
 
 
 STUDY = Study(

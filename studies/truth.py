@@ -52,7 +52,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         axis.set_xlabel("horizon (s)")
     for axis in axes[:, 0]:
         axis.set_ylabel("axis error (rad)")
-    legend_below(figure, axes, columns=3)
+    legend_below(figure, axes)
     broken, most = bound_ratios(data)
     caption = (
         "True error of each source, against the closed form in 45 digits, and above it, shaded, the bound that the "

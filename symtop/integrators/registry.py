@@ -6,6 +6,8 @@ function ``solve(top, start, plan) -> Run``.
 """
 
 import importlib
+import importlib.metadata
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -14,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.checks import SymtopError, finite, one_of, positive
+from symtop.checks import SymtopError, SymtopWarning, finite, one_of, positive
 from symtop.top import Angles, SymmetricTop
 
 Array = NDArray[np.float64]
@@ -116,8 +118,11 @@ _BUILT_IN = (
     "taylor",
     "closed_form",
 )
+ENTRY_POINTS = "symtop.integrators"  # an Integrator, or a function that returns several
+
 _registry: dict[str, Integrator] = {}
 _loaded: list[str] = []
+_announced: list[str] = []
 
 
 def _load() -> None:
@@ -126,6 +131,21 @@ def _load() -> None:
         _loaded.append(module.__name__)
         for entry in module.built_in():
             _registry.setdefault(entry.name, entry)
+    if not _announced:
+        _announced.append(ENTRY_POINTS)
+        _load_packages()
+
+
+def _load_packages() -> None:
+    """Integrators that installed packages announce; one that fails is named and left out."""
+    for point in importlib.metadata.entry_points(group=ENTRY_POINTS):
+        try:
+            found = point.load()
+            for entry in [found] if isinstance(found, Integrator) else found():
+                register(entry)
+        except Exception as error:  # noqa: BLE001  (a stranger's package must not take the registry down)
+            said = f"the integrators of {point.value} are left out: {type(error).__name__}: {error}"
+            warnings.warn(said, SymtopWarning, stacklevel=4)
 
 
 def register(entry: Integrator, *, replace: bool = False) -> Integrator:

@@ -23,7 +23,7 @@ def error_curves(
     Points listed as True in ``judged[scene, integrator]`` are filled, the others hollow; the reference's own bound is a
     band at the bottom. The integrators in `faint` are thin lines without markers, and not in the legend.
     """
-    columns = min(2, len(scenes))
+    columns = 3 if len(scenes) == 3 else min(2, len(scenes))
     rows = -(-len(scenes) // columns)
     figure, axes = panels(rows, columns)
     for axis, scene in zip(axes.flat, scenes, strict=False):
@@ -46,7 +46,7 @@ def error_curves(
         axis.set_xlabel(labels[0])
     for axis in axes[:, 0]:
         axis.set_ylabel(labels[1])
-    legend_below(figure, axes, columns=5)
+    legend_below(figure, axes)
     return figure, axes
 
 
@@ -61,10 +61,14 @@ def pareto(cost: Any, error: Any) -> Any:
     return front.reshape(shape)
 
 
+SMALLEST = 1e-17
+
+
 def dots(data: xr.Dataset, scenes: Sequence[str], columns: Sequence[tuple[str, str]], *, log: bool) -> Any:
     """One row an integrator, one column a variable, one dot a scene: large tables at a glance.
 
-    Each column is ``(variable, label)``; a variable ``NAME`` with a companion ``NAME_interval`` gets a bar.
+    Zeros are drawn at `SMALLEST` on a logarithmic axis. Each column is ``(variable, label)``; a variable ``NAME`` with
+    a companion ``NAME_interval`` gets a bar.
     """
     names = [str(name) for name in data["integrator"].values]
     figure, axes = panels(1, len(columns), height=0.9 + 0.2 * len(names), sharey=True)
@@ -74,8 +78,9 @@ def dots(data: xr.Dataset, scenes: Sequence[str], columns: Sequence[tuple[str, s
             for row, name in enumerate(names):
                 cell = data.sel(scene=scene, integrator=name)
                 value, style = float(cell[variable]), look(name)
-                if not np.isfinite(value) or (log and value <= 0.0):
+                if not np.isfinite(value):
                     continue
+                value = max(value, SMALLEST) if log else value
                 bar = float(cell[f"{variable}_interval"]) if f"{variable}_interval" in cell else 0.0
                 axis.errorbar(
                     value,
@@ -178,7 +183,7 @@ def outcome_strips(data: xr.Dataset, scenes: Sequence[str], verdicts: Sequence[s
             for row, name in enumerate(names):
                 cell = data.sel(scene=scene, integrator=name)
                 used |= _strip(axis, row, cell["knob"].values, cell["verdict"].values)
-            axis.set(xscale="log", ylim=(len(names) - 0.5, -0.5), yticks=range(len(names)), yticklabels=names)
+            axis.set(xscale="log", ylim=(tallest - 0.5, -0.5), yticks=range(len(names)), yticklabels=names)
             axis.set_title(scene)
             axis.grid(visible=False)
             axis.tick_params(axis="y", length=0)

@@ -106,12 +106,13 @@ def panels(rows: int, columns: int, width: float = 9.6, height: float = 3.4, **o
     return plt.subplots(rows, columns, figsize=(width, height * rows + 0.8), squeeze=False, **options)
 
 
-def legend_below(figure: Any, axes: Any, columns: int = 6) -> None:
-    """One legend for the whole figure, under it."""
+def legend_below(figure: Any, axes: Any) -> None:
+    """One legend for the whole figure, under it, in as many columns as its longest label allows."""
     seen: dict[str, Any] = {}
     for axis in np.ravel(axes):
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             seen.setdefault(label, handle)
+    columns = max(1, min(len(seen), int(12.5 * figure.get_figwidth()) // (max(map(len, seen), default=0) + 6)))
     figure.legend(list(seen.values()), list(seen), loc="outside lower center", ncols=columns, frameon=False)
 
 
