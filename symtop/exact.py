@@ -34,9 +34,9 @@ from numpy.typing import ArrayLike
 from symtop.charts import Array
 from symtop.checks import SymtopError
 from symtop.exact_mp import PreciseForm
+from symtop.pairs import Pair, line, on_line, pair, reduced, turns
 from symtop.top import Angles, SymmetricTop
 
-Pair = tuple[float, float]  # an unevaluated sum of two doubles
 Cubic = tuple[float, float, float, float]
 
 # sin((2n+1)x)/sin x, cos((2n+1)x)/cos x, cos 2nx and sin 2nx/(sin x cos x) in powers of cos 2x
@@ -123,15 +123,15 @@ class ClosedForm:
             if any(0 < gap < 1e-290 for gap in (curve.floor.low, curve.crown.high, curve.m1)):
                 msg = f"the axis must meet a pole or miss it by 1e-145 (PreciseForm takes less), not as {start!r}"
                 raise SymtopError(msg)
-            self._quarters = (_pair(form.Omega / form.K), _pair(form.tau0 / form.K))
+            self._quarters = (pair(form.Omega / form.K), pair(form.tau0 / form.K))
             self._hyperbolic, self._scale, self._bend, self._frames = _expand(form)
 
         leading = [(angle - lag) / 2 for angle, lag in zip(form.angles0, form.lags0, strict=True)]
         phi0, psi0 = sum(leading), form.facing * (leading[0] - leading[1])
-        self._phi_line = (_pair(form.phi_rate), _pair(phi0))
-        self._psi_line = (_pair(form.psi_rate), _pair(psi0))
-        self._phi_turns = _turns(ctx, form.phi_rate, phi0)
-        self._half_turns = tuple(_turns(ctx, r / 2, s) for r, s in zip(form.mean_rates, leading, strict=True))
+        self._phi_line = (pair(form.phi_rate), pair(phi0))
+        self._psi_line = (pair(form.psi_rate), pair(psi0))
+        self._phi_turns = turns(ctx, form.phi_rate, phi0)
+        self._half_turns = tuple(turns(ctx, r / 2, s) for r, s in zip(form.mean_rates, leading, strict=True))
 
     def __call__(self, times: ArrayLike) -> Motion:
         """Angles and rates at `times`; every field has their shape."""
@@ -139,8 +139,8 @@ class ClosedForm:
         wave = self._wave(flat)
         cosine, sine = self._halves(wave)
         spun = wave.sum_lag - wave.difference_lag if self._upright else wave.difference_lag - wave.sum_lag
-        phi = _on_line(flat, self._phi_line, wave.sum_lag + wave.difference_lag)
-        psi = _on_line(flat, self._psi_line, spun)
+        phi = on_line(flat, self._phi_line, wave.sum_lag + wave.difference_lag)
+        psi = on_line(flat, self._psi_line, spun)
         psi_dot = self._w3 - (cosine - sine) * (cosine + sine) * wave.precession
         theta_dot = wave.nod if self._upright else -wave.nod
         beyond_pi, beyond_zero = (cosine < 0.0) & (sine >= 0.0), (cosine >= 0.0) & (sine < 0.0)
@@ -155,7 +155,7 @@ class ClosedForm:
         """Attitude (w, x, y, z), body to space, shape (..., 4); continuous in time, through poles as well."""
         flat, shape = _times(times)
         wave = self._wave(flat)
-        angles = [_reduced(flat, *part) for part in zip(self._half_turns, wave[2:4], strict=True)]
+        angles = [reduced(flat, *part) for part in zip(self._half_turns, wave[2:4], strict=True)]
         (total, difference), (cosine, sine) = angles if self._upright else angles[::-1], self._halves(wave)
         first, second = cosine * np.exp(1j * total), sine * np.exp(1j * difference)
         return np.stack([first.real, second.real, second.imag, first.imag], axis=-1).reshape(*shape, 4)
@@ -176,7 +176,7 @@ class ClosedForm:
 
     def _axis_and_node(self, times: Array, wave: _Wave) -> tuple[Array, Array, Array]:
         """Axis and line of nodes, shape (n, 3), and sin theta; node and sine both change sign beyond a pole."""
-        phi = _reduced(times, self._phi_turns, wave.sum_lag + wave.difference_lag)
+        phi = reduced(times, self._phi_turns, wave.sum_lag + wave.difference_lag)
         cosine, sine = self._halves(wave)
         across, along = 2.0 * cosine * sine, (cosine - sine) * (cosine + sine)
         x, y = np.cos(phi), np.sin(phi)
@@ -189,7 +189,7 @@ class ClosedForm:
         """The bounded part of the motion at flat `times`."""
         if not self._moves:
             return _Wave(*np.repeat(self._rest[:, None], times.size, axis=1))
-        high, low = _line(times, *self._quarters)
+        high, low = line(times, *self._quarters)
         nearest = np.rint(high)
         quarter = np.mod(nearest, 4.0).astype(np.intp)
         offset = (high - nearest) + low
@@ -312,41 +312,3 @@ def _times(times: ArrayLike) -> tuple[Array, tuple[int, ...]]:
         msg = f"times must be finite numbers of at most 1e100 in size, not {float(bad[0])!r}"
         raise SymtopError(msg)
     return array.ravel(), array.shape
-
-
-def _pair(value: Any) -> Pair:
-    high = float(value)
-    return high, float(value - high)
-
-
-def _turns(ctx: Any, rate: Any, start: Any) -> tuple[Pair, Pair]:
-    """A line of angles, rate t + start, in turns; its start to within whole turns."""
-    turn = 2 * ctx.pi
-    return _pair(rate / turn), _pair(start / turn - ctx.nint(start / turn))
-
-
-def _line(times: Array, rate: Pair, start: Pair) -> tuple[Array, Array]:
-    """The sum start + rate t as two doubles: Dekker's product and Knuth's sum."""
-    product = times * rate[0]
-    total = product + start[0]
-    added = total - product
-    rounding = (product - (total - added)) + (start[0] - added)
-    return total, _product_error(times, rate[0], product) + (rounding + (times * rate[1] + start[1]))
-
-
-def _product_error(x: Array, y: float, product: Array) -> Array:
-    x_scaled, y_scaled = 134217729.0 * x, 134217729.0 * y  # 2^27 + 1
-    x_high, y_high = x_scaled - (x_scaled - x), y_scaled - (y_scaled - y)
-    x_low, y_low = x - x_high, y - y_high
-    return ((x_high * y_high - product) + x_high * y_low + x_low * y_high) + x_low * y_low
-
-
-def _on_line(times: Array, line: tuple[Pair, Pair], lag: Array) -> Array:
-    high, low = _line(times, *line)
-    return high + (low + lag)
-
-
-def _reduced(times: Array, turns: tuple[Pair, Pair], lag: Array) -> Array:
-    """The angle to within whole turns, so that its error does not grow with time."""
-    high, low = _line(times, *turns)
-    return 2.0 * np.pi * ((high - np.rint(high)) + low) + lag

@@ -322,6 +322,15 @@ def _sources() -> str:
     """Hash of the sources that a reference depends on."""
     here = Path(__file__).resolve().parent
     digest = hashlib.sha256()
-    for name in ("reference.py", "exact.py", "exact_mp.py", "charts.py", "top.py", "integrators/taylor.py"):
+    for name in (
+        "reference.py",
+        "exact.py",
+        "exact_mp.py",
+        "exact_numbers.py",
+        "pairs.py",
+        "charts.py",
+        "top.py",
+        "integrators/taylor.py",
+    ):
         digest.update((here / name).read_bytes())
     return digest.hexdigest()

@@ -22,6 +22,7 @@ NUMERICS = (
     "charts.py",
     "scenes.py",
     "exact*.py",
+    "pairs.py",
     "reference.py",
     "simulate.py",
     "integrators/*.py",
