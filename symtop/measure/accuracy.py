@@ -20,12 +20,14 @@ EPSILON = float(np.finfo(float).eps)
 def step_ladder(method: Integrator, scene: Scene, horizon: float, count: int = 13, most: float = 4e6) -> list[float]:
     """Steps from ten a nutation down to where the method meets round-off or `most` steps, evenly in the logarithm.
 
-    The finest step of a method of order p resolves a nutation about 10 * 10^(11/p) times.
+    The finest step of a method of order p resolves a nutation about 10 * 10^(11/p) times; methods of high order, whose
+    steps have many stages, begin at five.
     """
     period = scene.nutation_period if math.isfinite(scene.nutation_period) else horizon / 8.0
-    decades = min(4.5, 11.0 / (method.order or 2), max(math.log10(most * period / horizon / 10.0), 0.5))
-    # 10.37 a nutation: nothing here may be commensurate with it
-    return [period / (10.37 * 10.0 ** (decades * k / (count - 1))) for k in range(count)]
+    power = method.order or 2
+    first = 10.37 if power <= 4 else 5.37  # nothing here may be commensurate with the nutation
+    decades = min(4.5, 11.0 / power + math.log10(10.37 / first), max(math.log10(most * period / horizon / first), 0.5))
+    return [period / (first * 10.0 ** (decades * k / (count - 1))) for k in range(count)]
 
 
 def tolerance_ladder(method: Integrator, count: int = 9) -> list[float]:

@@ -1,8 +1,10 @@
 """The order of a method: the slope of log error on log step, where it is honest to fit one.
 
-A point counts if its error is above ten times the reference's own bound, below 1e-2 (asymptotic), still
-above the run's round-off, and h omega < 0.3. The slope is the least-squares line through the points that
-count, with Student's 95 % interval. Fewer than `LEAST` points give no verdict.
+A point counts if its error is above ten times the reference's own bound, below 1e-2, still above the run's round-off,
+and h omega < 0.3 for a method of order 2 (in proportion more for higher orders, whose steps have more stages). Then the
+line must be straight: the coarsest points are dropped while the log-log curve bends significantly or scatters. The
+slope is the least-squares line through what is left, with Student's 95 % interval. Fewer than `LEAST` points, or an
+interval beyond `WIDEST`, give no verdict: such an error meets rounding before it is a power of the step.
 """
 
 import math
@@ -15,6 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 LEAST = 5
 LARGEST_ERROR = 1e-2
 LARGEST_PHASE = 0.3  # h omega
+WIDEST = 0.2  # 95 % interval of a slope that still says something
+STRAIGHT = 0.03  # change of slope over the window that does not matter
 
 
 class Fit(NamedTuple):
@@ -50,17 +54,36 @@ def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:
     return Fit(slope, float(student.ppf(0.975, n - 2)) * error, constant, mask)
 
 
-def order(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, omega: float) -> Fit:
+def order(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, omega: float, claim: int | None = None) -> Fit:
     """The order of a method from errors at several steps; `bound` is the least error that can be judged.
 
-    Points that stopped falling with the step (round-off) are cut: from the finest step upwards, a point
-    whose error does not exceed its finer neighbour's by half the expected factor is not asymptotic.
+    `claim` is the declared order and only widens the range of steps. Points that stopped falling with the step are cut:
+    from the finest step upwards, a point whose error does not exceed its finer neighbour's by the root of the ratio of
+    their steps is round-off, and so is all that is finer.
     """
     h, e, b = (np.asarray(values, float) for values in np.broadcast_arrays(step_size, error, bound))
-    used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR) & (h * omega < LARGEST_PHASE)
-    falling = np.argsort(h)
-    for finer, coarser in pairwise(falling):
+    phase = LARGEST_PHASE * max(claim or 2, 2) / 2.0
+    used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR) & (h * omega < phase)
+    rank = np.argsort(h)
+    for place, (finer, coarser) in enumerate(pairwise(rank), start=1):
         if used[coarser] and used[finer] and e[coarser] <= e[finer] * math.sqrt(h[coarser] / h[finer]):
-            used[falling[: int(np.flatnonzero(falling == coarser)[0])]] = False
+            used[rank[:place]] = False
     fit = power_law(h, e, used)
-    return fit if int(fit.used.sum()) >= LEAST else Fit(math.nan, math.nan, math.nan, used)
+    while int(used.sum()) > LEAST and (fit.interval > WIDEST or _bends(h[used], e[used])):
+        used[rank[np.flatnonzero(used[rank])[-1]]] = False
+        fit = power_law(h, e, used)
+    judged = int(fit.used.sum()) >= LEAST and fit.interval <= WIDEST
+    return fit if judged else Fit(math.nan, math.nan, math.nan, used)
+
+
+def _bends(h: NDArray[np.float64], e: NDArray[np.float64]) -> bool:
+    """Does the slope change by more than `STRAIGHT` over these points, and significantly so?"""
+    from scipy.stats import t as student  # noqa: PLC0415  (0.5 s to import)
+
+    u, v = np.log(h) - np.log(h).mean(), np.log(e)
+    matrix = np.stack([np.ones_like(u), u, u * u], axis=1)
+    solution = np.linalg.lstsq(matrix, v, rcond=None)[0]
+    rest = v - matrix @ solution
+    spread = float(rest @ rest) / (u.size - 3) * np.linalg.inv(matrix.T @ matrix)[2, 2]
+    change = 2.0 * abs(float(solution[2])) * (u.max() - u.min())
+    return bool(change > STRAIGHT and abs(solution[2]) > student.ppf(0.975, u.size - 3) * math.sqrt(spread))
