@@ -12,6 +12,7 @@ from symtop.scenes import added_scenes, scene
 from symtop.study.study import Case, Picture, Study, Table
 
 SCENES = ["spheroid", "goldstein", "loop", "hairer-lubich-wanner"]
+BASIC = ("midpoint", "trapezoidal", "stormer-verlet")
 JUDGED = ("attitude", "theta", "energy")
 
 
@@ -126,15 +127,13 @@ def verdict(data: xr.Dataset) -> list[str]:
     unjudged = [f"{method} on {name}" for (name, method), fit in found.items() if not np.isfinite(fit.slope)]
     if unjudged:
         sentences.append(f"Their errors meet rounding before they are a power of the step: {', '.join(unjudged)}.")
-    for method in data["integrator"].values:
-        worst = data["attitude_end"].sel(integrator=method)
-        if "spheroid" in data["scene"].values:
-            fit = fits(data.assign(attitude=data["attitude_end"]), "attitude").get(("spheroid", str(method)))
-            if fit is not None and np.isfinite(fit.constant):
-                sentences.append(
-                    f"On spheroid at t = 8 the attitude error of {method} is {fit.constant:.4g} h^{fit.slope:.2f} "
-                    f"(smallest found: {float(np.nanmin(worst.sel(scene='spheroid'))):.1e} rad)."
-                )
+    ends = fits(data.assign(attitude=data["attitude_end"]), "attitude")
+    for method in BASIC:
+        fit = ends.get(("spheroid", method))
+        if fit is not None and np.isfinite(fit.slope):
+            sentences.append(
+                f"On spheroid at t = 8 the attitude error of {method} is {fit.constant:.4g} h^{fit.slope:.2f}."
+            )
     return sentences
 
 

@@ -117,23 +117,38 @@ def tables(data: xr.Dataset) -> list[Table]:
     return [Table("Relative residuals, linear trends with 95 % intervals, and growth ~ t^exponent", header, rows)]
 
 
+ROUNDING = 3e-13  # relative, over a million steps
+STEADY = 0.25  # an exponent below this is not growth
+
+
+def kind(cell: xr.Dataset, quantity: str) -> str:
+    """Does a method keep a quantity to rounding, within bounds, or not at all? `cell` covers all scenes."""
+    largest, exponent = float(cell[f"{quantity}_largest"].max()), float(cell[f"{quantity}_exponent"].max())
+    if not np.isfinite(cell[f"{quantity}_largest"]).all():
+        return "failed"
+    if largest <= ROUNDING:
+        return "rounding"
+    return "bounded" if not exponent > STEADY else "growing"
+
+
 def verdict(data: xr.Dataset) -> list[str]:
     """Who keeps what, and at what rate the others lose it."""
     sentences = []
     for quantity in CONSTANTS:
-        kept, lost = [], []
+        groups: dict[str, list[tuple[float, str, float]]] = {}
         for name in data["integrator"].values:
             cell = data.sel(integrator=name)
-            worst = float(cell[f"{quantity}_largest"].max())
-            rate = float(cell[f"{quantity}_exponent"].max())
-            if str(name) in _flat(data, quantity):
-                kept.append(f"{name} (at most {worst:.1e})")
-            else:
-                lost.append(f"{name} (to {worst:.1e}, as t^{rate:.2f})")
-        if kept:
-            sentences.append(f"{quantity} has no trend with {', '.join(kept)}.")
-        if lost:
-            sentences.append(f"{quantity} grows with {', '.join(lost)}.")
+            worst, rate = (float(cell[f"{quantity}_{part}"].max()) for part in ("largest", "exponent"))
+            groups.setdefault(kind(cell, quantity), []).append((worst, str(name), rate))
+        if kept := groups.get("rounding"):
+            sentences.append(f"{quantity} stays at rounding with {len(kept)} methods (at most {max(kept)[0]:.1e}).")
+        if held := groups.get("bounded"):
+            (least, best, _), (most, last, _) = min(held), max(held)
+            span = f"from {least:.1e} ({best}) to {most:.1e} ({last})" if len(held) > 1 else f"{most:.1e} ({last})"
+            sentences.append(f"{quantity} has a bounded error with {len(held)} methods, {span}.")
+        if lost := groups.get("growing"):
+            listed = ", ".join(f"{name} (to {worst:.1e}, as t^{rate:.2f})" for worst, name, rate in sorted(lost))
+            sentences.append(f"{quantity} is lost with {listed}.")
     return sentences
 
 

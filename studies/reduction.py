@@ -246,12 +246,16 @@ def verdict(data: xr.Dataset) -> list[str]:
         f"holds stay within {max(drift):.1e}; it makes a step {ratios.min():.1f} to {ratios.max():.1f} times cheaper."
     )
     found = [(method, ratio) for _, method, cell in rows(data, "seconds") for ratio in chart_ratios(cell)]
-    for method in dict.fromkeys(name for name, _ in found):
-        mine = [ratio for name, ratio in found if name == method]
-        for chart in dict.fromkeys(ratio.chart for ratio in mine):
-            times = [ratio.time for ratio in mine if ratio.chart == chart]
-            span = f"{min(times):.2f} to {max(times):.2f}"
-            sentences.append(f"{method} takes {span} times as long in the {chart} chart as in {mine[0].base}.")
+    groups: dict[tuple[str, str, str], list[tuple[float, str]]] = {}
+    for method, ratio in found:
+        family = integrator(method).family
+        groups.setdefault((family, ratio.chart, ratio.base), []).append((ratio.time, method))
+    for (family, chart, base), times in groups.items():
+        (least, cheap), (most, dear) = min(times), max(times)
+        span = (
+            f"{least:.2f} ({cheap}) to {most:.2f} ({dear})" if len({name for _, name in times}) > 1 else f"{most:.2f}"
+        )
+        sentences.append(f"{family} methods take {span} times as long in the {chart} chart as in {base}.")
     return sentences
 
 

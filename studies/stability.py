@@ -85,13 +85,17 @@ def limits(data: xr.Dataset, name: str, method: str) -> tuple[float, float, str]
     return accurate, float(knob[failed[0]]) if failed.size else math.nan, str(words[failed[0]]) if failed.size else ""
 
 
+def gap_to_pole(name: str) -> float:
+    """The closest that the axis of a scene comes to a pole, in radians."""
+    low, high = closed_form(scene(name)).theta_range
+    return min(low, math.pi - high)
+
+
 def grazing(data: xr.Dataset) -> list[str]:
     """Scenes that come close to a pole, and what that does to methods whose chart ends there."""
     sentences = []
     for name in data["scene"].values:
-        where = scene(str(name))
-        low, high = closed_form(where).theta_range
-        gap = min(low, math.pi - high)
+        where, gap = scene(str(name)), gap_to_pole(str(name))
         if gap > GRAZING:
             continue
         words = data["verdict"].sel(scene=name)
@@ -138,27 +142,39 @@ def tables(data: xr.Dataset) -> list[Table]:
 
 
 def _unit(data: xr.Dataset, method: str) -> str:
-    fixed = data["knob_name"].sel(integrator=method).values[0] == "step_size"
-    return "nutation periods" if fixed else "tolerance"
+    knob = str(data["knob_name"].sel(integrator=method).values[0])
+    return {"step_size": "nutation periods", "tolerance": "tolerance"}.get(knob, "nothing to turn")
 
 
 def verdict(data: xr.Dataset) -> list[str]:
-    """Where each method stops being accurate and where it fails."""
+    """How far the methods go, which of them never fail, and how the others do."""
+    calm = [str(name) for name in data["scene"].values if gap_to_pole(str(name)) > GRAZING]
     sentences = []
-    for method in data["integrator"].values:
-        found = {str(name): limits(data, str(name), str(method)) for name in data["scene"].values}
-        worst = min(found, key=lambda name: found[name][0])
-        failed = [(at, name, how) for name, (_, at, how) in found.items() if how]
-        thing = "steps" if _unit(data, str(method)) == "nutation periods" else "tolerances"
+    for unit, thing in (("nutation periods", "steps"), ("tolerance", "tolerances")):
+        reach, first = [], {}
+        for method in data["integrator"].values:
+            if _unit(data, str(method)) != unit:
+                continue
+            found = [(*limits(data, name, str(method)), name) for name in calm]
+            reach.append((min(accurate if math.isfinite(accurate) else 0.0 for accurate, *_ in found), str(method)))
+            first[str(method)] = min(((at, how, name) for _, at, how, name in found if how), default=None)
+        if not reach:
+            continue
+        reach.sort(reverse=True)
         ending = " of a nutation" if thing == "steps" else ""
-        fate = "it never fails outright"
-        if failed:
-            at, name, how = min(failed)
-            fate = f"it first fails at {at:.2g} ({how.replace('_', ' ')} on {name})"
-        sentences.append(
-            f"{method} is accurate on every scene with {thing} up to {found[worst][0]:.2g}{ending} (least on {worst}); "
-            f"{fate}."
-        )
+        best = ", ".join(f"{name} ({value:.2g})" for value, name in reach[:5])
+        worst = ", ".join(f"{name} ({value:.2g})" for value, name in reach[:-4:-1])
+        sentences.append(f"Accurate with the largest {thing}{ending}: {best}; with the smallest only: {worst}.")
+        never = [name for name, fate in first.items() if fate is None]
+        if never:
+            sentences.append(f"{len(never)} of {len(first)} of them never end early: {', '.join(never)}.")
+        for how in dict.fromkeys(fate[1] for fate in first.values() if fate):
+            failing = sorted((fate[0], name, fate[2]) for name, fate in first.items() if fate and fate[1] == how)
+            at, name, where = failing[0]
+            later = f", then {len(failing) - 1} more" if len(failing) > 1 else ""
+            sentences.append(
+                f"First to end with {how.replace('_', ' ')}: {name} at {at:.2g}{ending} on {where}{later}."
+            )
     return sentences + grazing(data)
 
 
