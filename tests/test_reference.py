@@ -1,7 +1,10 @@
 """The reference: its bound is never below the true error, hardly above it, and its cache cannot lie."""
 
 import math
+import os
 import random
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -181,6 +184,45 @@ def test_a_damaged_cache_file_is_noticed_said_and_computed_again(cache, damage):
         again = symtop.reference("spheroid", times)
     assert again.equals(good)
     assert symtop.reference("spheroid", times).equals(good)  # and mended on disk, in silence
+
+
+CALL = """
+import os, sys
+import numpy as np
+import symtop
+from pathlib import Path
+if len(sys.argv) > 1:
+    Path.replace = lambda *_: os.kill(os.getpid(), 9)  # dies with the new file written and not yet in its place
+data = symtop.reference("spheroid", np.linspace(0.0, 5.0, 21))
+print(repr(float(data["theta"][-1])))
+"""
+
+
+def call(cache, *arguments):
+    environment = {**os.environ, "SYMTOP_CACHE": str(cache)}
+    return subprocess.Popen(
+        [sys.executable, "-W", "error", "-c", CALL, *arguments], env=environment, stdout=subprocess.PIPE, text=True
+    )
+
+
+def test_a_process_killed_while_it_writes_the_cache_harms_nobody(cache):
+    dying = call(cache, "die")
+    dying.communicate(timeout=120)
+    assert dying.returncode == -9
+    assert not list(cache.glob("reference/*.nc"))
+    after = call(cache)
+    shown = after.communicate(timeout=120)[0]
+    assert after.returncode == 0
+    assert float(shown) == float(symtop.reference("spheroid", np.linspace(0.0, 5.0, 21))["theta"][-1])
+
+
+def test_several_processes_share_a_cache(cache):
+    crowd = [call(cache) for _ in range(3)]
+    shown = {process.communicate(timeout=120)[0] for process in crowd}
+    assert [process.returncode for process in crowd] == [0, 0, 0]
+    assert len(shown) == 1
+    assert len(list(cache.glob("reference/*.nc"))) == 1
+    assert not list(cache.glob("reference/.*.part"))
 
 
 def test_a_cache_that_cannot_be_written_costs_time_and_nothing_else(tmp_path, monkeypatch):
