@@ -69,11 +69,11 @@ def _picture(data: xr.Dataset, quantity: str, power: int) -> Picture:
     judged = {key: fit.used for key, fit in orders.items()}
     figure, axes = figures.error_curves(data, scenes, "step_size", quantity, labels, judged)
     for axis, name in zip(axes.flat, scenes, strict=False):
-        steps, errors = data["step_size"].sel(scene=name).values, data[quantity].sel(scene=name).values
-        if power and np.isfinite(errors).any():
-            coarse, least = float(np.nanmax(steps)), 0.1 * float(np.nanmin(errors[:, 0]))
-            span = (coarse * max(1e-14 / least, 1e-14) ** (1.0 / power), coarse)
-            style.slope_guide(axis, power, span, least * (span[0] / coarse) ** power, f"$h^{{{power}}}$")
+        fitted = [fit.constant for (where, _), fit in orders.items() if where == name and np.isfinite(fit.slope)]
+        if power and fitted:
+            coarse = float(np.nanmax(data["step_size"].sel(scene=name).values))
+            ends = (0.2 * coarse, coarse)
+            style.slope_guide(axis, power, ends, 0.15 * min(fitted) * ends[0] ** power, f"$h^{{{power}}}$")
     slopes = [fit.slope for fit in orders.values() if np.isfinite(fit.slope)]
     range_ = (
         f"Fitted orders lie between {min(slopes):.3f} and {max(slopes):.3f}." if slopes else "None could be fitted."
@@ -82,8 +82,8 @@ def _picture(data: xr.Dataset, quantity: str, power: int) -> Picture:
     return Picture(
         f"{quantity}-order-{power}",
         figure,
-        f"Largest {quantity} error over the run against the step, {title}. Filled points enter the fit, hollow ones do "
-        f"not: too large, or within ten times of the reference's own error (grey band). {range_}",
+        f"Largest {quantity} error over the run against the step, {title}. Filled points enter the fit; hollow ones "
+        f"are too large, not yet on a line, or within ten times of the reference's own error (grey band). {range_}",
         f"Log-log plots of {quantity} error against step size, {title}: straight lines parallel to the guide.",
     )
 
@@ -113,20 +113,24 @@ def tables(data: xr.Dataset) -> list[Table]:
 
 def verdict(data: xr.Dataset) -> list[str]:
     """Whether every declared order was measured."""
-    declared, sentences, wrong = integrators(), [], []
+    declared, wrong, right = integrators(), [], 0
     found = fits(data, "attitude")
-    judged = {key: fit for key, fit in found.items() if np.isfinite(fit.slope)}
-    for (name, method), fit in judged.items():
+    for (name, method), fit in found.items():
         claim = declared[method].order if method in declared else None
-        if claim is not None and abs(fit.slope - claim) > max(0.05, 0.03 * claim):
+        if not np.isfinite(fit.slope) or claim is None:
+            continue
+        if abs(fit.slope - claim) > max(0.05, 0.03 * claim):
             wrong.append(f"{method} on {name} shows order {fit} where {claim} is declared")
-    sentences.append(
-        f"{len(judged)} of {len(found)} pairs of method and scene could be judged; "
-        + ("every one of them shows the order it declares." if not wrong else "; ".join(wrong) + ".")
-    )
-    unjudged = [f"{method} on {name}" for (name, method), fit in found.items() if not np.isfinite(fit.slope)]
-    if unjudged:
-        sentences.append(f"Their errors meet rounding before they are a power of the step: {', '.join(unjudged)}.")
+        else:
+            right += 1
+    sentences = [f"{right} of {len(found)} pairs of method and scene show the order that the method declares."]
+    if wrong:
+        sentences.append(f"Refuted: {'; '.join(wrong)}.")
+    reasons: dict[str, list[str]] = {}
+    for (name, method), fit in found.items():
+        if fit.reason:
+            reasons.setdefault(fit.reason, []).append(f"{method} on {name}")
+    sentences += [f"Not judged, because {reason}: {', '.join(pairs)}." for reason, pairs in reasons.items()]
     ends = fits(data.assign(attitude=data["attitude_end"]), "attitude")
     for method in BASIC:
         fit = ends.get(("spheroid", method))

@@ -118,17 +118,18 @@ def tables(data: xr.Dataset) -> list[Table]:
 
 
 ROUNDING = 3e-13  # relative, over a million steps
+LOST = 1e-2  # relative; an error of this size is not kept, however steady
 STEADY = 0.25  # an exponent below this is not growth
 
 
 def kind(cell: xr.Dataset, quantity: str) -> str:
     """Does a method keep a quantity to rounding, within bounds, or not at all? `cell` covers all scenes."""
-    largest, exponent = float(cell[f"{quantity}_largest"].max()), float(cell[f"{quantity}_exponent"].max())
-    if not np.isfinite(cell[f"{quantity}_largest"]).all():
+    if not (cell["outcome"] == "ok").all():
         return "failed"
+    largest, exponent = float(cell[f"{quantity}_largest"].max()), float(cell[f"{quantity}_exponent"].max())
     if largest <= ROUNDING:
         return "rounding"
-    return "bounded" if not exponent > STEADY else "growing"
+    return "bounded" if exponent <= STEADY and largest <= LOST else "growing"
 
 
 def verdict(data: xr.Dataset) -> list[str]:
@@ -149,6 +150,8 @@ def verdict(data: xr.Dataset) -> list[str]:
         if lost := groups.get("growing"):
             listed = ", ".join(f"{name} (to {worst:.1e}, as t^{rate:.2f})" for worst, name, rate in sorted(lost))
             sentences.append(f"{quantity} is lost with {listed}.")
+        if failed := groups.get("failed"):
+            sentences.append(f"Runs of {', '.join(name for _, name, _ in failed)} ended early.")
     return sentences
 
 

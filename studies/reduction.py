@@ -146,7 +146,7 @@ def _draw_twins(data: xr.Dataset) -> Picture:
             axis.plot(cell["sample_time"].values[1:], gap[1:], line, color=look.color, label=f"{angle} of {method}")
         axis.set_xlabel("time (s)")
     axes[0, 0].set_ylabel("largest difference so far (rad)")
-    style.legend_below(figure, axes, 3)
+    style.legend_below(figure, axes)
     worst = max(float(cell[variable].max()) for _, _, cell in rows(data, "theta_gap") for variable in ANGLES)
     return Picture(
         "twins",
@@ -251,11 +251,11 @@ def verdict(data: xr.Dataset) -> list[str]:
         family = integrator(method).family
         groups.setdefault((family, ratio.chart, ratio.base), []).append((ratio.time, method))
     for (family, chart, base), times in groups.items():
-        (least, cheap), (most, dear) = min(times), max(times)
-        span = (
-            f"{least:.2f} ({cheap}) to {most:.2f} ({dear})" if len({name for _, name in times}) > 1 else f"{most:.2f}"
+        middle = float(np.median([time for time, _ in times]))
+        sentences.append(
+            f"A run in the {chart} chart takes {middle:.2g} times as long as in {base} (median of "
+            f"{len({name for _, name in times})} {family} methods)."
         )
-        sentences.append(f"{family} methods take {span} times as long in the {chart} chart as in {base}.")
     return sentences
 
 

@@ -93,9 +93,15 @@ def angles_from_quaternion(quaternion: Array) -> tuple[Array, Array, Array]:
     return half + half, total + difference, total - difference
 
 
-def onto_branch(angle: Array, near: Array) -> Array:
-    """Add the multiple of 2 pi that brings each `angle` closest to `near`."""
-    return angle + 2.0 * np.pi * np.rint((near - angle) / (2.0 * np.pi))
+def unwrapped(angle: Array, guide: Array) -> Array:
+    """A continuous angle from samples of it modulo 2 pi; both shape (n,).
+
+    Between neighbouring samples the angle may turn many times: `guide`, the true motion, says how often, so that only
+    the *error* has to change by less than half a turn from sample to sample. It may grow to any size over the run.
+    """
+    lag = np.unwrap(angle - guide)
+    whole: Array = guide + (lag - 2.0 * np.pi * np.rint(lag[0] / (2.0 * np.pi)))
+    return whole
 
 
 def momentum_from_angles(top: SymmetricTop, theta: Any, phi: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any) -> Array:

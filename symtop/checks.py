@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import re
 from collections.abc import Iterable
 
 
@@ -51,12 +52,30 @@ def whole(name: str, value: object, least: int) -> int:
     return int(number)
 
 
+def row(name: str, values: object) -> list[float]:
+    """Return `values` as a list of finite floats; refuse anything that is not a row of them."""
+    if isinstance(values, (str, bytes, dict)) or not isinstance(values, Iterable):
+        msg = f"{name} must be a row of numbers, not {values!r}"
+        raise SymtopError(msg)
+    return [finite(f"an entry of {name}", value) for value in values]
+
+
+def label(name: str, value: object) -> str:
+    """Return `value` if it can name a scene or an integrator in a file, a table and a command."""
+    if isinstance(value, str) and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}", value):
+        return value
+    msg = f"{name} must be 1 to 64 letters, digits or ._+- (a letter or digit first), not {value!r}"
+    raise SymtopError(msg)
+
+
 def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     """Return `value` if it is one of `allowed`; otherwise name the nearest of them."""
     known = list(allowed)
     if isinstance(value, str) and value in known:
         return value
     near = difflib.get_close_matches(str(value), known, n=3, cutoff=0.5)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known)}"
+    hint = (
+        f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known[:12])}{' ...' * (len(known) > 12)}"
+    )
     msg = f"{name} {value!r} is unknown; {hint}"
     raise SymtopError(msg)

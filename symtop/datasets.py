@@ -110,11 +110,11 @@ def _plain(value: Any) -> Any:
 def write(data: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """Write a netCDF file so that it is whole or not there, whatever happens meanwhile."""
     target = Path(path)
-    if target.is_dir():
-        msg = f"cannot write {target}: it is a folder"
-        raise SymtopError(msg)
     temporary = ""
     try:
+        if target.is_dir():
+            msg = f"cannot write {target}: it is a folder"
+            raise SymtopError(msg)
         target.parent.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
         os.close(handle)

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from symtop.checks import SymtopError, one_of, positive
+from symtop.checks import SymtopError, label, one_of, positive
 from symtop.top import Angles, SymmetricTop
 
 if TYPE_CHECKING:
@@ -33,9 +33,7 @@ class Scene:
     observes: str = "attitude"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
-            msg = f"name must be a non-empty string, not {self.name!r}"
-            raise SymtopError(msg)
+        label("name", self.name)
         if not isinstance(self.top, SymmetricTop):
             msg = f"top must be a SymmetricTop, not {self.top!r}"
             raise SymtopError(msg)
@@ -164,8 +162,8 @@ def register_scene(entry: Scene) -> Scene:
     if not isinstance(entry, Scene):
         msg = f"register_scene needs a Scene, not {entry!r}"
         raise SymtopError(msg)
-    if entry.name in _catalogue():
-        msg = f"scene {entry.name!r} is one of symtop's own; choose another name"
+    if entry.name in _catalogue() or _added.get(entry.name, entry) != entry:
+        msg = f"scene {entry.name!r} is already known; choose another name"
         raise SymtopError(msg)
     _added[entry.name] = entry
     return entry

@@ -14,7 +14,7 @@ import xarray as xr
 
 from symtop import charts, datasets
 from symtop.checks import SymtopError, one_of, positive, whole
-from symtop.integrators.outcomes import sentence
+from symtop.integrators.outcomes import OUTCOMES, sentence
 from symtop.integrators.registry import Integrator, Plan, Run, integrator
 from symtop.scenes import OBSERVABLES, Scene, closed_form, scene
 from symtop.top import SymmetricTop
@@ -115,7 +115,8 @@ def simulate(
     where the chart does not show them), ``axis(time, component)``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, and
     ``quaternion`` where the chart has one. Samples after a failure are NaN; ``outcome``, ``outcome_message`` and
     ``reached_time`` say what happened. `observe` ("nutation", "axis", "attitude"; default: what the scene is
-    watched for) picks the smallest chart of the integrator that shows it.
+    watched for) picks the smallest chart of the integrator that shows it. A run of fewer steps than `samples` shows
+    every step.
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
@@ -123,9 +124,12 @@ def simulate(
     end = chosen.horizon if horizon is None else positive("horizon", horizon)
     watched = chosen.observes if observe is None else one_of("observe", observe, OBSERVABLES)
     count = whole("samples", samples, 2)
+    if count > MOST_SAMPLES:
+        msg = f"samples must be at most {MOST_SAMPLES}, not {count}"
+        raise SymtopError(msg)
     chart = choose_chart(method, watched)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, end, count)
-    run = method.solvers[chart](chosen.top, chosen.start, plan)
+    run = _checked(method, chart, plan, _solve(method, chart, chosen, plan))
     return datasets.describe(
         as_dataset(chosen, chart, plan, run),
         title=f"{method.name} on {chosen.name}",
@@ -146,6 +150,39 @@ def simulate(
         top={"I1": chosen.top.I1, "I3": chosen.top.I3, "mgl": chosen.top.mgl},
         start={name: getattr(chosen.start, name) for name in chosen.start.__slots__},
     )
+
+
+DIMENSIONS = {"angles": 4, "axis": 6, "attitude": 7}
+MOST_SAMPLES = 10_000_000
+
+
+def _solve(method: Integrator, chart: str, where: Scene, plan: Plan) -> object:
+    try:
+        return method.solvers[chart](where.top, where.start, plan)
+    except SymtopError:
+        raise
+    except Exception as error:
+        said = " ".join(str(error).split())
+        msg = f"integrator {method.name} failed on {where.name}: {type(error).__name__}: {said}"
+        raise SymtopError(msg) from error
+
+
+def _checked(method: Integrator, chart: str, plan: Plan, run: object) -> Run:
+    """What a solver returned, if it is what a solver returns; NaN before the end is an outcome of its own."""
+    shape = (plan.times.size, DIMENSIONS[chart])
+    if not isinstance(run, Run) or np.shape(run.states) != shape or np.iscomplexobj(run.states):
+        found = np.shape(run.states) if isinstance(run, Run) else type(run).__name__
+        msg = f"integrator {method.name} must return a Run with real states of shape {shape}, not {found}"
+        raise SymtopError(msg)
+    if np.shape(run.p_phi) != shape[:1] or np.shape(run.p_psi) != shape[:1] or run.outcome not in OUTCOMES:
+        known = ", ".join(OUTCOMES)
+        msg = f"integrator {method.name} must return p_phi and p_psi of shape {shape[:1]} and an outcome of {known}"
+        raise SymtopError(msg)
+    whole: Any = np.isfinite(run.states).all(axis=1)
+    if run.outcome == "ok" and not whole.all():
+        reached = float(plan.times[int(np.argmin(whole)) - 1]) if whole[0] else 0.0
+        return run._replace(outcome="not_finite", reached=reached)
+    return run
 
 
 _scene, _integrator = scene, integrator  # the public argument names shadow these
@@ -195,7 +232,7 @@ def _from_axis(scene: Scene, plan: Plan, run: Run) -> dict[str, Any]:
     truth = closed_form(scene)(plan.times)
     return {
         "theta": charts.theta_from_axis(axis),
-        "phi": charts.onto_branch(phi, truth.phi),
+        "phi": charts.unwrapped(phi, truth.phi),
         "axis": axis,
         "energy": space_energy(scene.top, axis, momentum, run.p_psi),
         "p_theta": node,
@@ -208,7 +245,7 @@ def _from_attitude(scene: Scene, plan: Plan, run: Run) -> dict[str, Any]:
     quaternion, momentum = run.states[:, :4], run.states[:, 4:]
     theta, phi, psi = charts.angles_from_quaternion(quaternion)
     truth = closed_form(scene)(plan.times)
-    phi, psi = charts.onto_branch(phi, truth.phi), charts.onto_branch(psi, truth.psi)
+    phi, psi = charts.unwrapped(phi, truth.phi), charts.unwrapped(psi, truth.psi)
     axis = charts.axis_from_quaternion(quaternion)
     return {
         "theta": theta,

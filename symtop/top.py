@@ -32,6 +32,17 @@ import numpy as np
 
 from symtop.checks import SymtopError, finite, positive
 
+LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
+
+
+def bounded(name: str, value: object, least: float = 0.0) -> float:
+    """Return `value` as a float of at most `LARGEST` in size."""
+    number = finite(name, value)
+    if not least <= abs(number) <= LARGEST:
+        msg = f"{name} must be between {least:g} and {LARGEST:g} in size, not {number!r}"
+        raise SymtopError(msg)
+    return number
+
 
 class Momenta(NamedTuple):
     """The two conserved momenta, with the two combinations that are small near a pole."""
@@ -55,7 +66,7 @@ class Angles:
 
     def __post_init__(self) -> None:
         for name in self.__slots__:
-            object.__setattr__(self, name, finite(name, getattr(self, name)))
+            object.__setattr__(self, name, bounded(name, getattr(self, name)))
         if not 0.0 <= self.theta <= math.pi:
             msg = f"theta must lie in [0, pi], not {self.theta!r}"
             raise SymtopError(msg)
@@ -114,9 +125,9 @@ class SymmetricTop:
     mgl: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "I1", positive("I1", self.I1))
-        object.__setattr__(self, "I3", positive("I3", self.I3))
-        object.__setattr__(self, "mgl", finite("mgl", self.mgl))
+        object.__setattr__(self, "I1", bounded("I1", positive("I1", self.I1), 1.0 / LARGEST))
+        object.__setattr__(self, "I3", bounded("I3", positive("I3", self.I3), 1.0 / LARGEST))
+        object.__setattr__(self, "mgl", bounded("mgl", self.mgl))
         if self.I3 > 2.0 * self.I1:
             msg = f"I3 must be at most 2 I1 (no rigid body exceeds it), not {self.I3!r} with I1 = {self.I1!r}"
             raise SymtopError(msg)
@@ -190,8 +201,11 @@ class SymmetricTop:
             return 0.0
         if momenta.south == 0.0 and self._sleeps(momenta.north, -self.mgl):
             return math.pi
-        tiny = 1e-9
-        below, above = tiny, math.pi - tiny
+        below, above = 1e-9, math.pi - 1e-9
+        if self.potential_slope(below, momenta) >= 0.0:  # the minimum is closer to the pole than anyone can tell
+            return 0.0
+        if self.potential_slope(above, momenta) <= 0.0:
+            return math.pi
         return float(brentq(self.potential_slope, below, above, args=(momenta,), xtol=4e-16, rtol=1e-15))
 
     def _sleeps(self, through: float, mgl: float) -> bool:

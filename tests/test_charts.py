@@ -99,9 +99,12 @@ def test_the_usual_formula_for_the_distance_has_a_floor_that_ours_has_not():
     assert charts.attitude_distance(base, turned) == pytest.approx(1e-10, rel=1e-5)
 
 
-def test_onto_branch_moves_by_whole_turns():
-    near = np.array([0.0, 100.0, -55.5])
-    angle = np.array([6.2, -2.0, 3.0])
-    moved = charts.onto_branch(angle, near)
-    assert np.all(np.abs(moved - near) <= math.pi)
-    assert np.allclose((moved - angle) / (2 * math.pi), np.rint((moved - angle) / (2 * math.pi)))
+def test_unwrapping_follows_an_error_of_many_turns():
+    """The guide supplies the turns between samples, and nothing of the error: it may lag by more than half a turn."""
+    t = np.linspace(0.0, 40.0, 60)
+    guide, angle = 0.3 + 11.0 * t, 0.3 + 10.2 * t  # lags by 32 rad in the end
+    wrapped = np.remainder(angle + np.pi, 2 * np.pi) - np.pi
+    assert charts.unwrapped(wrapped, guide) == pytest.approx(angle, abs=1e-12)
+    assert (
+        np.abs(wrapped + 2 * np.pi * np.rint((guide - wrapped) / (2 * np.pi)) - angle).max() > 6.0
+    )  # snapping would not

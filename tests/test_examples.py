@@ -22,6 +22,8 @@ EXAMPLE = Path(__file__).resolve().parent.parent / "studies" / "examples" / "my_
 def clean_registry(monkeypatch):
     monkeypatch.setattr(registry, "_registry", registry.integrators())
     monkeypatch.setattr(scenes, "_added", {})
+    monkeypatch.setattr(plugins, "_loaded", {})
+    monkeypatch.setattr(plugins, "_owners", {})
 
 
 @pytest.fixture

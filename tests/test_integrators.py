@@ -270,7 +270,7 @@ def test_a_user_makes_a_method_from_two_tuples():
         (lambda: symtop.composition("x", (0.9,), (0.5, 0.5)), "drift coefficients must sum to 1"),
         (lambda: symtop.register(symtop.integrator("midpoint")), "already registered"),
         (lambda: symtop.register("midpoint"), "register needs an Integrator"),
-        (lambda: Integrator(name="", family="other", summary="", solvers={}), "name must be a non-empty string"),
+        (lambda: Integrator(name="", family="other", summary="", solvers={}), "name must be 1 to 64 letters"),
         (lambda: Integrator(name="x", family="odd", summary="", solvers={}), "family 'odd' is unknown"),
         (lambda: Integrator(name="x", family="other", summary="", solvers={}), "solvers must map"),
     ],

@@ -388,7 +388,7 @@ def test_the_first_use_in_a_new_process_is_quick():
     [
         ("kick must have one coefficient more", ((1.0,), (1.0,)), {}),
         ("drift coefficients must sum to 1", ((0.9,), (0.5, 0.5)), {}),
-        ("a kick coefficient must be a finite number", ((1.0,), (math.nan, 0.5)), {}),
+        ("an entry of kick must be a finite number", ((1.0,), (math.nan, 0.5)), {}),
         ("gradient must have as many", ((1.0,), (0.5, 0.5), (0.0,)), {"chart": "space"}),
         ("gradient must be zero where kick is", ((0.5, 0.5), (0.0, 1.0, 0.0), (0.1, 0.0, 0.0)), {"chart": "space"}),
         ("chart must be 'space'", ((1.0,), (0.5, 0.5), (0.1, 0.1)), {}),
@@ -408,5 +408,5 @@ def test_every_method_has_a_citation():
         assert "year = {" in entry
     assert "Takahashi" in symtop.citation("takahashi-imada")
     assert all(fields["author"] and 1900 < int(fields["year"]) < 2030 for _, fields in ENTRIES.values())
-    with pytest.raises(symtop.SymtopError, match="has the reference"):
+    with pytest.raises(symtop.SymtopError, match="names no source that is known here"):
         symtop.citation(composition("mine", (1.0,), (0.5, 0.5)))

@@ -229,6 +229,6 @@ def citation(name: "str | Integrator") -> str:
     method = integrator(name)
     keys = [key for key in method.reference.replace(",", " ").split() if key in ENTRIES]
     if not keys:
-        msg = f"integrator {method.name!r} has the reference {method.reference!r}; known: {', '.join(ENTRIES)}"
+        msg = f"integrator {method.name!r} names no source that is known here (its reference is {method.reference!r})"
         raise SymtopError(msg)
     return "\n\n".join(bibtex(key) for key in keys)

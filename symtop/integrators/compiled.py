@@ -24,6 +24,7 @@ __all__ = ["cache_root", "compile_kernel", "register_jitable", "set_item", "sour
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
 
 PACKAGE = Path(__file__).resolve().parent.parent
+MOST_NEIGHBOURS = 100
 KEPT = 6  # cache folders of older sources that are kept, a few megabytes each
 
 
@@ -50,8 +51,9 @@ def _folder(sources: set[Path]) -> Path:
     name = source_digest()
     if foreign:
         digest = hashlib.sha256(name.encode())
-        for path in foreign:
-            digest.update(path.read_bytes())
+        for path in foreign:  # and what stands beside it, which it may import
+            for near in sorted(path.parent.glob("*.py"))[:MOST_NEIGHBOURS]:
+                digest.update(near.read_bytes())
         name = digest.hexdigest()[:16]
     return cache_root() / "kernels" / name
 
@@ -70,6 +72,7 @@ def _prune(keep: Path) -> None:
 def compile_kernel(function: Callable[..., Any], *parts: Callable[..., Any]) -> Any:
     """``njit`` with the disk cache; `parts` are the functions that `function` closes over.
 
+    Division by zero gives infinity, as in C: the kernel's outcome says what became of it.
     Functions typed at a prompt have no source file to stamp: they compile without the cache.
     """
     sources: set[Path] = set()
@@ -77,17 +80,17 @@ def compile_kernel(function: Callable[..., Any], *parts: Callable[..., Any]) -> 
         try:
             sources.add(Path(inspect.getfile(part)).resolve())
         except (TypeError, OSError):
-            return njit(function)
+            return njit(error_model="numpy")(function)
     if not all(path.is_file() for path in sources):
-        return njit(function)
+        return njit(error_model="numpy")(function)
     folder = _folder(sources)
     before = config.CACHE_DIR
     if not folder.is_dir():
         _prune(folder)
     try:
         config.CACHE_DIR = str(folder)  # numba reads it while it decorates, so nobody else's cache moves
-        return njit(cache=True)(function)
+        return njit(cache=True, error_model="numpy")(function)
     except RuntimeError:  # the cache folder cannot be written: slower, never wrong
-        return njit(function)
+        return njit(error_model="numpy")(function)
     finally:
         config.CACHE_DIR = before

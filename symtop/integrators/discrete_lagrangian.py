@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.checks import SymtopError, finite
+from symtop.checks import SymtopError, row
 from symtop.integrators.angles import chart_outcome, reduced
 from symtop.integrators.compiled import register_jitable
 from symtop.integrators.drive import driver
@@ -203,11 +203,10 @@ march = driver(begin, increment, observe)
 
 def quadrature(nodes: Sequence[float], weights: Sequence[float]) -> tuple[Quadrature, bool]:
     """The checked rule with its nodes in order, and whether it reads the same from both ends."""
-    if len(nodes) != len(weights) or len(nodes) == 0:
-        msg = f"nodes and weights must be equally many, at least one, not {len(nodes)} and {len(weights)}"
+    points, shares = tuple(row("nodes", nodes)), tuple(row("weights", weights))
+    if len(points) != len(shares) or not points:
+        msg = f"nodes and weights must be equally many, at least one, not {len(points)} and {len(shares)}"
         raise SymtopError(msg)
-    points = tuple(finite("a node", node) for node in nodes)
-    shares = tuple(finite("a weight", weight) for weight in weights)
     if not all(0.0 <= node <= 1.0 for node in points):
         msg = f"nodes must lie in [0, 1], not {points}"
         raise SymtopError(msg)
@@ -271,8 +270,9 @@ def discrete_lagrangian(
     The rule is symmetric if it reads the same from both ends; a rule that integrates t exactly has order 2.
     """
     rule, symmetric = quadrature(nodes, weights)
-    fresh = sum(node != 0.0 for node in rule.nodes)  # a node at 0 is evaluated once a step, not once an iteration
-    solver = StraightLine(rule, fixed_step(march, rule, reduced, fresh, implicit=True))
+    at_start = sum(node == 0.0 for node in rule.nodes)  # evaluated once a step, not once an iteration
+    fresh = len(rule.nodes) - at_start
+    solver = StraightLine(rule, fixed_step(march, rule, reduced, fresh, implicit=True, each_step=at_start))
     return record(name, rule, solver, order=order, symmetric=symmetric, summary=summary, reference=reference)
 
 

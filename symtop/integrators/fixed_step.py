@@ -21,13 +21,14 @@ def fixed_step(
     evaluations: int,
     *,
     implicit: bool,
+    each_step: int = 0,
     present: Present | None = None,
 ) -> Solver:
     """A solver around a loop: `prepare` gives a kernel its parameters and state, `rule` the method's numbers.
 
     `evaluations` is how many force evaluations one unit of the kernel's counted work takes; for an implicit method
-    that unit is one iteration. `present(par, times, states)` makes states of the
-    chart from the kernel's, where they differ.
+    that unit is one iteration (of Newton or of a sweep), and `each_step` evaluations come on top of every step.
+    `present(par, times, states)` makes states of the chart from the kernel's, where they differ.
     """
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
@@ -40,7 +41,7 @@ def fixed_step(
             p_phi=momenta[:, 0],
             p_psi=momenta[:, 1],
             steps=done.steps,
-            force_evaluations=done.work * evaluations,
+            force_evaluations=done.work * evaluations + done.steps * each_step,
             newton_iterations=done.work if implicit else 0,
             outcome=OUTCOMES[done.outcome],
             reached=done.steps * plan.step_size,

@@ -252,7 +252,7 @@ def built_in() -> list[Integrator]:
             name="galerkin-simpson",
             family="discrete-lagrangian",
             summary="Galerkin discrete Lagrangian, parabola in time and Simpson's rule",
-            solvers={"angles": fixed_step(march, Iteration(), reduced, 2, implicit=True)},
+            solvers={"angles": fixed_step(march, Iteration(), reduced, 2, implicit=True, each_step=1)},
             order=4,
             explicit=False,
             symplectic=True,

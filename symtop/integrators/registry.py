@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.checks import SymtopError, SymtopWarning, finite, one_of, positive
+from symtop.checks import SymtopError, SymtopWarning, finite, label, one_of, positive, whole
 from symtop.top import Angles, SymmetricTop
 
 Array = NDArray[np.float64]
@@ -77,16 +77,17 @@ class Integrator:
     reference: str = ""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name or self.name != self.name.strip():
-            msg = f"name must be a non-empty string without blanks around it, not {self.name!r}"
-            raise SymtopError(msg)
+        label("name", self.name)
+        if self.order is not None:
+            whole("order", self.order, 1)
         one_of("family", self.family, FAMILIES)
         one_of("tier", self.tier, TIERS)
         if self.knob not in KNOBS:
             msg = f"knob must be 'step_size', 'tolerance' or None, not {self.knob!r}"
             raise SymtopError(msg)
-        if not self.solvers or not set(self.solvers) <= {"angles", "axis", "attitude"}:
-            msg = f"solvers must map one of angles, axis, attitude to a function, not {dict(self.solvers)!r}"
+        given = self.solvers if isinstance(self.solvers, Mapping) else {}
+        if not given or not set(given) <= {"angles", "axis", "attitude"} or not all(map(callable, given.values())):
+            msg = f"solvers must map one of angles, axis, attitude to a function, not {self.solvers!r}"
             raise SymtopError(msg)
         object.__setattr__(self, "solvers", MappingProxyType(dict(self.solvers)))
 
@@ -123,6 +124,7 @@ ENTRY_POINTS = "symtop.integrators"  # an Integrator, or a function that returns
 _registry: dict[str, Integrator] = {}
 _loaded: list[str] = []
 _announced: list[str] = []
+_shipped: set[str] = set()  # by symtop or an installed package: every process has them
 
 
 def _load() -> None:
@@ -131,6 +133,7 @@ def _load() -> None:
         _loaded.append(module.__name__)
         for entry in module.built_in():
             _registry.setdefault(entry.name, entry)
+            _shipped.add(entry.name)
     if not _announced:
         _announced.append(ENTRY_POINTS)
         _load_packages()
@@ -142,7 +145,7 @@ def _load_packages() -> None:
         try:
             found = point.load()
             for entry in [found] if isinstance(found, Integrator) else found():
-                register(entry)
+                _shipped.add(register(entry).name)
         except Exception as error:  # noqa: BLE001  (a stranger's package must not take the registry down)
             said = f"the integrators of {point.value} are left out: {type(error).__name__}: {error}"
             warnings.warn(said, SymtopWarning, stacklevel=4)
@@ -159,6 +162,12 @@ def register(entry: Integrator, *, replace: bool = False) -> Integrator:
         raise SymtopError(msg)
     _registry[entry.name] = entry
     return entry
+
+
+def is_built_in(name: str) -> bool:
+    """Does every process know this integrator without being told?"""
+    _load()
+    return name in _shipped
 
 
 def integrators() -> dict[str, Integrator]:

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.cpython.unsafe.tuple import tuple_setitem
 
-from symtop.checks import SymtopError, finite
+from symtop.checks import SymtopError, row
 from symtop.integrators.angles import chart_outcome
 from symtop.integrators.compiled import register_jitable
 from symtop.integrators.drive import driver
@@ -93,13 +93,14 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 def increment_angles(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, phi, psi, theta', phi', psi'); the work counted is the number of force evaluations."""
     step = explicit_step(field_angles, par, rule, state, carry, h)
-    return step, carry, len(rule.b), chart_outcome(state[0] + step[0])
+    reach = step[1] + step[2] + step[3] + step[4] + step[5]
+    return step, carry, len(rule.b), chart_outcome(state[0] + step[0] + 0.0 * reach)
 
 
 def increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (e, L); the work counted is the number of force evaluations."""
     step = explicit_step(field_axis, par, rule, state, carry, h)
-    return step, carry, len(rule.b), finite_outcome(state[0] + step[0])
+    return step, carry, len(rule.b), finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5])
 
 
 march_angles = driver(begin, increment_angles, observe_angles)
@@ -108,13 +109,13 @@ march_axis = driver(begin, increment_axis, observe_axis)
 
 def _explicit(a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[list[list[float]], list[float]]:
     """The strict lower triangle, by rows, and the weights; refuses what is not an explicit tableau."""
-    weights = [finite("an entry of b", value) for value in b]
-    if not weights or len(a) != len(weights):
-        msg = f"a must have one row for each of the {len(weights)} entries of b (at least one), not {len(a)}"
+    weights = row("b", b)
+    rows = [row("a", values) for values in a] if isinstance(a, Sequence) else []
+    if not weights or len(rows) != len(weights):
+        msg = f"a must have one row for each of the {len(weights)} entries of b (at least one), not {len(rows)}"
         raise SymtopError(msg)
     lower = []
-    for i, row in enumerate(a):
-        values = [finite("an entry of a", value) for value in row]
+    for i, values in enumerate(rows):
         if len(values) not in (i, len(weights)) or any(value != 0.0 for value in values[i:]):
             msg = f"row {i + 1} of a must have {i} entries (or zeros after them) for an explicit method, not {values}"
             raise SymtopError(msg)
@@ -144,11 +145,11 @@ def runge_kutta(
     """
     lower, weights = _explicit(a, b)
     if c is not None:
-        sums, nodes = [math.fsum(row) for row in lower], [finite("an entry of c", value) for value in c]
+        sums, nodes = [math.fsum(values) for values in lower], row("c", c)
         if len(nodes) != len(sums) or any(abs(x - y) > ROUNDING for x, y in zip(sums, nodes, strict=True)):
             msg = f"c must be the row sums of a, {sums}, not {nodes}"
             raise SymtopError(msg)
-    triangle = tuple(value for row in lower for value in row)
+    triangle = tuple(value for values in lower for value in values)
     rule = Tableau(triangle or (0.0,), tuple(weights))  # Euler's is empty, and an empty tuple has no type of entry
     return Integrator(
         name=name,

@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from symtop.checks import SymtopError, finite, one_of
+from symtop.checks import SymtopError, finite, one_of, row
 from symtop.integrators import coefficients as tables
 from symtop.integrators import splitting_angles, splitting_space
 from symtop.integrators.angles import reduced
@@ -87,23 +87,22 @@ def composition(
 
 def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] | None) -> Composition:
     """Coefficients that fit together and sum to 1."""
-    if len(kick) != len(drift) + 1 or not len(drift):
-        msg = f"kick must have one coefficient more than drift, not {len(kick)} against {len(drift)}"
+    drifts, kicks = row("drift", drift), row("kick", kick)
+    if len(kicks) != len(drifts) + 1 or not drifts:
+        msg = f"kick must have one coefficient more than drift, not {len(kicks)} against {len(drifts)}"
         raise SymtopError(msg)
-    slopes = [0.0] * len(kick) if gradient is None else [finite("a gradient coefficient", c) for c in gradient]
-    if len(slopes) != len(kick):
-        msg = f"gradient must have as many coefficients as kick, not {len(slopes)} against {len(kick)}"
+    slopes = [0.0] * len(kicks) if gradient is None else row("gradient", gradient)
+    if len(slopes) != len(kicks):
+        msg = f"gradient must have as many coefficients as kick, not {len(slopes)} against {len(kicks)}"
         raise SymtopError(msg)
-    sums = {}
-    for label, row in (("drift", drift), ("kick", kick)):
-        sums[label] = [finite(f"a {label} coefficient", value) for value in row]
-        if abs(math.fsum(sums[label]) - 1.0) > 1e-12:
-            msg = f"{label} coefficients must sum to 1, not {math.fsum(sums[label])!r}"
+    for name, values in (("drift", drifts), ("kick", kicks)):
+        if abs(math.fsum(values) - 1.0) > 1e-12:
+            msg = f"{name} coefficients must sum to 1, not {math.fsum(values)!r}"
             raise SymtopError(msg)
-    if any(c != 0.0 and b == 0.0 for b, c in zip(sums["kick"], slopes, strict=True)):
-        msg = f"gradient must be zero where kick is, not {slopes} with {sums['kick']}"
+    if any(c != 0.0 and b == 0.0 for b, c in zip(kicks, slopes, strict=True)):
+        msg = f"gradient must be zero where kick is, not {slopes} with {kicks}"
         raise SymtopError(msg)
-    return closed(sums["drift"], sums["kick"], slopes)
+    return closed(drifts, kicks, slopes)
 
 
 def _solver(

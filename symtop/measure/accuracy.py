@@ -58,8 +58,9 @@ def error_table(
     ``axis_bound`` ... the least error that the reference can judge (its own bound plus rounding).
     """
     rows: list[dict[str, float | str]] = []
+    enough = False
     for setting in settings:
-        if rows and float(rows[-1]["force_evaluations"]) > ENOUGH[method.tier]:
+        if enough:
             rows.append(dict.fromkeys(rows[-1], math.nan) | {"outcome": "not_run", "tier": method.tier})
             continue
         run = simulate(scene, method, horizon=horizon, samples=SAMPLES, observe=observe, **knobs(method, setting))
@@ -73,6 +74,7 @@ def error_table(
             row[f"{name}_end"] = math.nan if failed else float(values[-1])
             row[f"{name}_bound"] = judge_limit(scene, truth, name)
         rows.append(row)
+        enough = run.attrs["force_evaluations"] > ENOUGH[method.tier]
     return xr.Dataset({name: ("setting", [row[name] for row in rows]) for name in rows[0]})
 
 

@@ -9,13 +9,14 @@ interval beyond `WIDEST`, give no verdict: such an error meets rounding before i
 
 import math
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 LEAST = 5
 LARGEST_ERROR = 1e-2
+FLOOR = 1e3  # times the reference's bound: a finest error beyond it has not met rounding
 LARGEST_PHASE = 0.3  # h omega
 WIDEST = 0.2  # 95 % interval of a slope that still says something
 STRAIGHT = 0.03  # change of slope over the window that does not matter
@@ -24,10 +25,11 @@ STRAIGHT = 0.03  # change of slope over the window that does not matter
 class Fit(NamedTuple):
     """A fitted power law, error = constant * h^slope."""
 
-    slope: float
+    slope: float  # NaN if it cannot be judged
     interval: float  # half-width of the 95 % confidence interval
     constant: float
     used: NDArray[np.bool_]
+    reason: str = ""  # why it cannot be judged
 
     def __str__(self) -> str:
         return f"{self.slope:.3f} +- {self.interval:.3f}" if math.isfinite(self.slope) else "not judged"
@@ -57,23 +59,35 @@ def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:
 def order(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, omega: float, claim: int | None = None) -> Fit:
     """The order of a method from errors at several steps; `bound` is the least error that can be judged.
 
-    `claim` is the declared order and only widens the range of steps. Points that stopped falling with the step are cut:
-    from the finest step upwards, a point whose error does not exceed its finer neighbour's by the root of the ratio of
-    their steps is round-off, and so is all that is finer.
+    `claim` is the declared order and only widens the range of steps. From the finest step upwards, points are cut until
+    an error exceeds its finer neighbour's by at least the root of the ratio of their steps: they have met round-off.
+    A fit that cannot be judged says why.
     """
     h, e, b = (np.asarray(values, float) for values in np.broadcast_arrays(step_size, error, bound))
     phase = LARGEST_PHASE * max(claim or 2, 2) / 2.0
-    used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR) & (h * omega < phase)
     rank = np.argsort(h)
+    finest = e[rank][np.isfinite(e[rank])][:2]
+    if finest.size == 0:
+        return _unjudged(e, "every run failed")
+    used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR) & (h * omega < phase)
     for place, (finer, coarser) in enumerate(pairwise(rank), start=1):
-        if used[coarser] and used[finer] and e[coarser] <= e[finer] * math.sqrt(h[coarser] / h[finer]):
+        if used[coarser] and used[finer]:
+            if e[coarser] > e[finer] * math.sqrt(h[coarser] / h[finer]):
+                break
             used[rank[:place]] = False
     fit = power_law(h, e, used)
-    while int(used.sum()) > LEAST and (fit.interval > WIDEST or _bends(h[used], e[used])):
+    while int(used.sum()) > LEAST and (not fit.interval <= WIDEST or _bends(h[used], e[used])):
         used[rank[np.flatnonzero(used[rank])[-1]]] = False
         fit = power_law(h, e, used)
-    judged = int(fit.used.sum()) >= LEAST and fit.interval <= WIDEST
-    return fit if judged else Fit(math.nan, math.nan, math.nan, used)
+    if int(used.sum()) >= LEAST and fit.interval <= WIDEST and not _bends(h[used], e[used]):
+        return fit
+    if np.min(finest) > FLOOR * np.max(b):
+        return _unjudged(used, "the error does not fall to rounding as a power of the step")
+    return _unjudged(used, "the error meets rounding before it is a power of the step")
+
+
+def _unjudged(used: NDArray[Any], reason: str) -> Fit:
+    return Fit(math.nan, math.nan, math.nan, used.astype(bool), reason)
 
 
 def _bends(h: NDArray[np.float64], e: NDArray[np.float64]) -> bool:

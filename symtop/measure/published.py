@@ -1,6 +1,7 @@
 """Published values of this problem, computed anew.
 
-Each entry names its source, the value as printed, and ours. They agree if they round to the same printed digits.
+Each entry names its source, the value, ours, and what the comparison is worth: ``printed`` digits, a printed
+``formula``, or a ``consistency`` with what the source was built from. Values agree if they round to the same digits.
 """
 
 import math
@@ -12,6 +13,8 @@ from symtop.reference import reference
 from symtop.scenes import Scene, closed_form, scene
 from symtop.top import Angles, SymmetricTop
 
+REMARK = "an asymmetric free body: tests the solver beside us, not symtop"
+
 
 class Published(NamedTuple):
     """One published number and ours."""
@@ -20,7 +23,8 @@ class Published(NamedTuple):
     quantity: str
     published: float
     ours: float
-    unit: float  # one unit of the last printed digit
+    unit: float  # one unit of the last digit that is compared
+    kind: str  # printed, formula or consistency
     remark: str = ""
 
     @property
@@ -46,7 +50,7 @@ def published_values() -> list[Published]:
 def _simo_wong() -> Published:
     where = scene("simo-wong")
     energy = where.top.energy(where.start)
-    return Published("Simo & Wong 1991; Krysl 2005", "energy of the fast top", 1269.975, energy, 1e-3)
+    return Published("Simo & Wong 1991; Krysl 2005", "energy of the fast top", 1269.975, energy, 1e-3, "printed")
 
 
 def _bruls_cardona_arnold() -> list[Published]:
@@ -54,7 +58,7 @@ def _bruls_cardona_arnold() -> list[Published]:
     printed = (0.17334, -0.35991, -0.74849)
     return [
         Published(
-            "Bruls, Cardona & Arnold 2012", f"{name} displacement of the centre of mass at t = 1", value, ours, 1e-5,
+            "Bruls, Cardona & Arnold 2012", f"{name} displacement of the centre at t = 1", value, ours, 1e-5, "printed",
             "regression data of public codes, h = 2e-6",
         )
         for name, value, ours in zip("xyz", printed, moved, strict=True)
@@ -68,7 +72,9 @@ def _woodhouse() -> list[Published]:
         exact = 1.0 / (1.0 + 1.0 / math.cosh(g * t))
         ours = math.cos(float(closed_form(where)(np.array([t])).theta[0]))
         rows.append(
-            Published("Woodhouse, problem 5.3", f"cos theta on the separatrix at t = {t:g}", exact, ours, 1e-13)
+            Published(
+                "Woodhouse, problem 5.3", f"cos theta on the separatrix at t = {t:g}", exact, ours, 1e-13, "formula"
+            )
         )
     return rows
 
@@ -77,8 +83,8 @@ def _kinon_betsch() -> list[Published]:
     where = scene("kinon-betsch")
     motion = closed_form(where)(np.linspace(0.0, where.horizon, 301))
     return [
-        Published("Kinon & Betsch", "largest tilt (degrees)", 60.0, math.degrees(motion.theta.max()), 1e-10),
-        Published("Kinon & Betsch", "precession rate", 10.0, float(motion.phi_dot.mean()), 1e-10),
+        Published("Kinon & Betsch", "largest tilt (deg)", 60.0, math.degrees(motion.theta.max()), 1e-10, "consistency"),
+        Published("Kinon & Betsch", "precession rate", 10.0, float(motion.phi_dot.mean()), 1e-10, "consistency"),
     ]  # fmt: skip
 
 
@@ -87,8 +93,8 @@ def _hairer() -> list[Published]:
     momenta = where.top.momenta(where.start)
     source = "Hairer, Lubich & Wanner, figure VII.5.3"
     return [
-        Published(source, "energy", 1.72, where.top.energy(where.start), 1e-12),
-        Published(source, "vertical angular momentum", 1.04, momenta.p_phi, 1e-12),
+        Published(source, "energy", 1.72, where.top.energy(where.start), 1e-12, "consistency"),
+        Published(source, "vertical angular momentum", 1.04, momenta.p_phi, 1e-12, "consistency"),
     ]
 
 
@@ -103,7 +109,7 @@ def _detest() -> list[Published]:
     printed = (-0.93965707987, -0.34211777540, 0.74141265962)
     return [
         Published(
-            "Enright & Pryce 1987, DETEST B5", f"y{k + 1}(20) of the free body", value, float(done.y[k, -1]), 1e-11
+            "Enright & Pryce 1987, DETEST B5", f"y{k + 1}(20)", value, float(done.y[k, -1]), 1e-11, "printed", REMARK
         )
         for k, value in enumerate(printed)
     ]

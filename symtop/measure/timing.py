@@ -88,8 +88,8 @@ def time_settings(
 ) -> xr.Dataset:
     """Seconds of one run at each setting, without any observables: dimension ``setting`` (and ``batch``).
 
-    ``seconds`` is the smallest batch, ``seconds_samples`` are all of them, ``first_call`` the very first run with its
-    compilation or loading, ``reliable`` 1 where the spread allows a verdict.
+    ``seconds`` is the smallest batch, ``seconds_samples`` are all of them, ``reliable`` 1 where the spread allows a
+    verdict. The settings of one method are interleaved; other methods are timed before and after.
     """
     chart = choose_chart(method, observe)
     found = timings([bare_run(scene, method, chart, setting, horizon) for setting in settings], batches, batch)
@@ -97,7 +97,6 @@ def time_settings(
         {
             "seconds": ("setting", [timing.best for timing in found]),
             "seconds_samples": (("setting", "batch"), [timing.samples for timing in found]),
-            "first_call": ("setting", [timing.first_call for timing in found]),
             "reliable": ("setting", [float(timing.reliable) for timing in found]),
         }
     )

@@ -82,8 +82,12 @@ def gather(results: Path) -> list[dict[str, Any]]:
         findings = store.read_json(results / f"{name}.json")
         if findings is None:
             continue
-        for picture in findings["pictures"]:
-            picture["data"] = _embedded(results / "figures" / picture["file"])
+        try:
+            for picture in findings["pictures"]:
+                picture["data"] = _embedded(results / "figures" / picture["file"])
+        except (OSError, KeyError, TypeError) as error:
+            msg = f"the findings of {name} in {results} are incomplete ({error}); run it again: symtop study {name}"
+            raise SymtopError(msg) from error
         findings["dataset"] = f"{name}.nc" if (results / f"{name}.nc").is_file() else ""
         found.append(findings)
     if not found:

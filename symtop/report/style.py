@@ -70,8 +70,9 @@ def look(name: str) -> Look:
     family = known[name].family if name in known else "other"
     peers = [entry.name for entry in known.values() if entry.family == family and entry.name not in _LOOKS]
     place = peers.index(name) if name in peers else zlib.crc32(name.encode())
-    shades = _SHADES[family]
-    return Look(shades[place % len(shades)], _MARKERS[place % len(_MARKERS)])
+    taken = {_LOOKS[entry.name].marker for entry in known.values() if entry.family == family and entry.name in _LOOKS}
+    shades, free = _SHADES[family], [marker for marker in _MARKERS if marker not in taken]
+    return Look(shades[place % len(shades)], free[place % len(free)])
 
 
 def use() -> None:
@@ -120,6 +121,4 @@ def slope_guide(axis: Any, power: float, x: tuple[float, float], y: float, label
     """A thin reference line y ~ x^power from (x[0], y)."""
     ends = np.array(x)
     axis.plot(ends, y * (ends / ends[0]) ** power, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
-    axis.annotate(
-        label, (ends[1], y * (ends[1] / ends[0]) ** power), color="#444444", fontsize=8.5, ha="right", va="bottom"
-    )
+    axis.annotate(label, (ends[0], y), color="#444444", fontsize=8.5, ha="right", va="center")

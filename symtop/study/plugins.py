@@ -6,8 +6,12 @@ import sys
 from pathlib import Path
 
 from symtop.checks import SymtopError
+from symtop.integrators.registry import integrators, is_built_in
+from symtop.scenes import added_scenes, scenes
 
+MOST_NEIGHBOURS = 100
 _loaded: dict[Path, str] = {}
+_owners: dict[str, str] = {}
 
 
 def load(path: str | Path) -> None:
@@ -18,6 +22,7 @@ def load(path: str | Path) -> None:
     if not file.is_file():
         msg = f"plugin must be a Python file, not {str(path)!r}"
         raise SymtopError(msg)
+    before = set(integrators()) | set(scenes())
     name = f"symtop_plugin_{file.stem}"
     spec = importlib.util.spec_from_file_location(name, file)
     if spec is None or spec.loader is None:
@@ -29,10 +34,15 @@ def load(path: str | Path) -> None:
         spec.loader.exec_module(module)
     except SymtopError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         msg = f"plugin {file.name} failed: {type(error).__name__}: {error}"
         raise SymtopError(msg) from error
-    _loaded[file] = hashlib.sha256(file.read_bytes()).hexdigest()
+    digest = hashlib.sha256(file.read_bytes())
+    for near in sorted(file.parent.glob("*.py"))[:MOST_NEIGHBOURS]:  # it may import what stands beside it
+        digest.update(near.read_bytes())
+    _loaded[file] = digest.hexdigest()
+    for name in (set(integrators()) | set(scenes())) - before:
+        _owners[name] = digest.hexdigest()
 
 
 def loaded() -> list[str]:
@@ -40,6 +50,11 @@ def loaded() -> list[str]:
     return [str(path) for path in _loaded]
 
 
-def digests() -> list[str]:
-    """Hashes of the plug-ins in use."""
-    return list(_loaded.values())
+def digest_of(name: str) -> str:
+    """Hash of the plug-in that registered an integrator or a scene; empty for everything else."""
+    return _owners.get(name, "")
+
+
+def is_local(name: str) -> bool:
+    """Was this integrator or scene registered by hand in this process, so that no other process can know it?"""
+    return name not in _owners and (name in added_scenes() or (name in integrators() and not is_built_in(name)))

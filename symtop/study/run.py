@@ -4,13 +4,18 @@ A case is computed only if no file holds its digest, so that an interrupted stud
 ends in seconds. Untimed cases share all cores through spawned processes; timed ones run alone.
 """
 
+import contextlib
 import hashlib
 import importlib.util
 import multiprocessing
 import os
+import signal
 import sys
+import tempfile
+import threading
+import time
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
@@ -83,7 +88,7 @@ def _measure_all(study: Study, missing: dict[Path, Case], jobs: int, quiet: bool
                 bar.update()
             return failures
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(max_workers=jobs, mp_context=context) as pool:
+        with ProcessPoolExecutor(jobs, context, _obey, (os.getpid(),)) as pool, _dropping(pool):
             futures: dict[Future[None], Case] = {
                 pool.submit(_measure, study.name, case, str(path), plugins.loaded()): case
                 for path, case in missing.items()
@@ -96,22 +101,52 @@ def _measure_all(study: Study, missing: dict[Path, Case], jobs: int, quiet: bool
     return failures
 
 
+def _obey(parent: int) -> None:
+    """In a worker: leave interrupts to the parent, and end with it however it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@contextlib.contextmanager
+def _dropping(pool: ProcessPoolExecutor) -> Iterator[None]:
+    """On an interrupt, finish what is being computed and drop the rest of the queue."""
+    try:
+        yield
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+
+
 def _failure(case: Case, error: BaseException) -> str:
-    last = traceback.format_exception_only(error)[-1].strip()
+    shown = str(error) if isinstance(error, SymtopError) else "".join(traceback.format_exception_only(error))
+    last = " ".join(shown.split())
     return f"{case.integrator} on {case.scene} failed: {last}"
 
 
-def _job_count(study: Study, cases: int, jobs: int | None) -> int:
-    if study.timed or cases < WORTH_A_POOL:
+def _job_count(study: Study, cases: Iterable[Case], jobs: int | None) -> int:
+    """One process for timed studies, few cases, and methods or scenes that only this process knows."""
+    chosen = list(cases)
+    ours = {name for case in chosen for name in (case.scene, case.integrator)}
+    if study.timed or len(chosen) < WORTH_A_POOL or any(plugins.is_local(name) for name in ours):
         return 1
-    return max(1, min(jobs or os.cpu_count() or 1, cases))
+    return max(1, min(jobs or os.cpu_count() or 1, len(chosen)))
 
 
 def _stamp(study: Study, digests: Iterable[str]) -> str:
     """Hash of what the drawings depend on: the cases, the script and the drawing code."""
     digest = hashlib.sha256("".join(digests).encode())
     package = Path(__file__).resolve().parents[1]
-    for path in [folder() / f"{study.name}.py", *sorted((package / "report").glob("*.py"))]:
+    for path in [
+        folder() / f"{study.name}.py",
+        package / "study" / "store.py",
+        *sorted((package / "report").glob("*.py")),
+    ]:
         digest.update(path.read_bytes())
     return digest.hexdigest()[:20]
 
@@ -132,7 +167,7 @@ def run(study: Study, results: Path, *, quick: bool = False, fresh: bool = False
     drawn = drawn and all((results / "figures" / picture["file"]).is_file() for picture in before["pictures"])
     if drawn and not missing and (results / f"{study.name}.nc").is_file():
         return {**before, "computed": 0}
-    failures = _measure_all(study, missing, _job_count(study, len(missing), jobs), quiet)
+    failures = _measure_all(study, missing, _job_count(study, missing.values(), jobs), quiet)
     done |= {path: data for path in missing if (data := store.load_case(path)) is not None}
     if not done:
         msg = f"study {study.name}: no case could be measured; {failures[0] if failures else 'the grid is empty'}"
@@ -161,10 +196,11 @@ def run(study: Study, results: Path, *, quick: bool = False, fresh: bool = False
 
 
 def _forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
-    """Remove the files of cases that are no longer asked for: their sources or settings are gone."""
-    wanted = set(keep)
+    """Remove what newer files of the same scene and method replace; cases that were not asked for stay."""
+    wanted = {path.name: path.name.rpartition("--")[0] for path in keep}
+    labels = set(wanted.values())
     for path in (results / "cases" / study.name).glob("*.nc"):
-        if path not in wanted:
+        if path.name not in wanted and path.name.rpartition("--")[0] in labels:
             path.unlink(missing_ok=True)
 
 
@@ -174,8 +210,13 @@ def _save(results: Path, study: Study, picture: Picture) -> dict[str, str]:
     file = f"{study.name}-{picture.name}.png"
     target = results / "figures" / file
     target.parent.mkdir(parents=True, exist_ok=True)
-    partial = target.with_suffix(".part.png")
-    picture.figure.savefig(partial, metadata={"Software": None})
-    partial.replace(target)
+    handle, partial = tempfile.mkstemp(prefix=f".{file}.", suffix=".part.png", dir=target.parent)
+    os.close(handle)
+    try:
+        picture.figure.savefig(partial, metadata={"Software": None})
+        Path(partial).chmod(0o644)
+        Path(partial).replace(target)
+    finally:
+        Path(partial).unlink(missing_ok=True)
     plt.close(picture.figure)
     return {"name": picture.name, "file": file, "caption": picture.caption, "alt": picture.alt}

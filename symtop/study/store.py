@@ -42,8 +42,13 @@ def combine(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
     methods = list(dict.fromkeys(case.integrator for case, _ in cases))
     sizes: dict[str, int] = {}
     coordinates: dict[str, Any] = {"scene": scenes, "integrator": methods}
-    for _, data in cases:
+    for case, data in cases:
         for name, size in data.sizes.items():
+            if name in data.coords and name in coordinates and data[name].dtype.kind == "f":
+                shared = min(size, sizes[str(name)])
+                if not np.array_equal(data[name].values[:shared], coordinates[str(name)].values[:shared]):
+                    msg = f"the coordinate {name} of {case.label} differs from that of the other cases"
+                    raise SymtopError(msg)
             if size > sizes.get(str(name), 0):
                 sizes[str(name)] = size
                 if name in data.coords:

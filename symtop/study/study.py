@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import xarray as xr
 
+from symtop import datasets
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -77,10 +79,19 @@ class Study:
     timed: bool = False  # timed cases run one at a time, on a machine that does nothing else
 
     def digest(self, case: Case) -> str:
-        """Hash of everything the case's numbers depend on: its settings, the way it is measured, the sources."""
-        content = json.dumps([self.name, case.scene, case.integrator, dict(case.settings)], sort_keys=True)
-        measured = _source(self.measure)
-        return hashlib.sha256(f"{content}\n{measured}\n{numerics_digest()}".encode()).hexdigest()[:20]
+        """Hash of everything the case's numbers depend on: settings, the way of measuring, sources, versions."""
+        from symtop.study import plugins  # noqa: PLC0415
+
+        content = [
+            json.dumps([self.name, case.scene, case.integrator, dict(case.settings)], sort_keys=True),
+            _source(self.measure),
+            numerics_digest(),
+            plugins.digest_of(case.scene),
+            plugins.digest_of(case.integrator),
+            datasets.provenance()["dependencies"],
+            datasets.provenance()["processor"] if self.timed else "",
+        ]
+        return hashlib.sha256("\n".join(content).encode()).hexdigest()[:20]
 
 
 def _source(function: Callable[..., Any]) -> str:
@@ -94,9 +105,7 @@ _digests: dict[Path, str] = {}
 
 
 def numerics_digest() -> str:
-    """Hash of the package's numerical sources, and of the plug-ins that are loaded."""
-    from symtop.study import plugins  # noqa: PLC0415
-
+    """Hash of the package's numerical sources."""
     package = Path(__file__).resolve().parent.parent
     if package not in _digests:
         digest = hashlib.sha256()
@@ -104,4 +113,4 @@ def numerics_digest() -> str:
             for path in sorted(package.glob(pattern)):
                 digest.update(path.read_bytes())
         _digests[package] = digest.hexdigest()
-    return _digests[package] + "".join(plugins.digests())
+    return _digests[package]
