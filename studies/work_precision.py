@@ -19,7 +19,7 @@ COSTS = {"seconds": "wall time of one run (s)", "force_evaluations": "force eval
 
 def cases(quick: bool) -> list[Case]:
     """Every method on every scene over ten nutation periods, from coarse to the limit of its arithmetic."""
-    grid, size = [], (5, 1e5) if quick else (8, 4e5)
+    grid, size = [], (5, 1e5) if quick else (7, 4e5)
     for name in [*(SCENES[:2] if quick else SCENES), *added_scenes()]:
         where = scene(name)
         horizon = PERIODS * where.nutation_period

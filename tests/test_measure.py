@@ -55,7 +55,7 @@ def test_one_stray_point_does_not_take_the_finer_ones_with_it():
         (np.full(16, 0.5), "does not fall"),
         (1e-4 + STEPS**2, "does not fall"),
         (np.full(16, np.nan), "every run failed"),
-        (np.full(16, 3e-15), "meets rounding"),
+        (np.full(16, 3e-15), "fewer than five points"),
     ],
 )
 def test_what_is_not_a_power_of_the_step_is_not_judged_and_says_why(error, reason):

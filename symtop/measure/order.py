@@ -83,7 +83,7 @@ def order(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, omega: float
         return fit
     if np.min(finest) > FLOOR * np.max(b):
         return _unjudged(used, "the error does not fall to rounding as a power of the step")
-    return _unjudged(used, "the error meets rounding before it is a power of the step")
+    return _unjudged(used, "fewer than five points lie on a straight line before rounding")
 
 
 def _unjudged(used: NDArray[Any], reason: str) -> Fit:

@@ -19,6 +19,7 @@ from symtop.scenes import Scene
 from symtop.simulate import choose_chart, make_plan
 
 BATCH = 0.02  # seconds
+CLEAR = 2e-4  # seconds
 NOISY = 0.25  # relative spread beyond which a timing is not called reliable
 
 
@@ -61,6 +62,8 @@ def timings(
         count = 1
         while (elapsed := _batch(function, count)) < batch:
             count = max(2 * count, int(1.2 * count * batch / max(elapsed, 1e-9)))
+            if elapsed > CLEAR:  # long enough to trust the estimate without a trial
+                break
         calls.append(count)
     order = [index for index in range(len(functions)) for _ in range(batches)]
     random.Random(seed).shuffle(order)  # noqa: S311
