@@ -121,12 +121,13 @@ def extended_error(table, scene, steps):
     from mpmath import mp, workdps
 
     from symtop.exact_mp import PreciseForm
+    from symtop.integrators.taylor import start_numbers
 
     wide = np.longdouble
     h = wide(8) / steps
     rule = space.stages(tables_rule(table), "exact", 0.0, scene.top, scene.start, float(h))
     half, pull = wide(0.5) * h / wide(scene.top.I1), h * wide(scene.top.mgl)
-    state = tuple(wide(value) for value in extended_start(scene))
+    state = start_numbers("axis", "longdouble", scene.top, scene.start)[0]
     for _ in range(steps):
         step = (wide(0),) * 6
         for i, b in enumerate(table.kick):
@@ -145,12 +146,6 @@ def tables_rule(table):
     from symtop.integrators.splitting_loop import closed
 
     return closed(table.drift, table.kick, [0.0] * len(table.kick))
-
-
-def extended_start(scene):
-    from symtop.reference import _start_digits
-
-    return _start_digits("axis", scene)[0]
 
 
 @pytest.mark.slow
