@@ -65,7 +65,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
             figures.outcome_strips(data, [str(name)], VERDICTS),
             f"What became of runs on {name} over {PERIODS:g} nutation periods as the step grows. Accurate means an "
             f"axis error of at most {ACCURATE:g} rad throughout. Failed runs are shown as failures, never left out.",
-            f"Strips for {name}, one an integrator: accurate at small steps, then wrong, then failing.",
+            f"Coloured strips for {name}, one an integrator, showing what became of its runs as steps grow.",
         )
         for name in data["scene"].values
     ]

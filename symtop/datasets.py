@@ -10,9 +10,7 @@ import json
 import os
 import platform
 import subprocess
-import sys
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -141,13 +139,3 @@ def read(path: str | os.PathLike[str]) -> xr.Dataset:
     except (OSError, ValueError, RuntimeError) as error:
         msg = f"cannot read {path} as netCDF: {error}"
         raise SymtopError(msg) from error
-
-
-def parameters(**values: Mapping[str, Any]) -> str:
-    """One JSON string of nested parameters, for an attribute."""
-    return json.dumps(values, sort_keys=True, default=float)
-
-
-def main_script() -> str:
-    """The command that is running, without its folder."""
-    return " ".join([Path(sys.argv[0]).name, *sys.argv[1:]])

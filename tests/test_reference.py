@@ -115,6 +115,26 @@ def test_a_bound_that_is_too_small_would_be_seen():
     assert not np.all(errors[0] <= data["attitude_error_bound"].values / 1000.0)
 
 
+def test_a_disagreement_of_the_two_methods_raises_the_bound(monkeypatch):
+    """An integration that is 1e-9 off, and a closed form that an integration contradicts by 1e-6: both must show."""
+    module = sys.modules["symtop.reference"]
+    where, times = symtop.scene("goldstein"), np.array([1.0, 2.0, 3.0])
+    honest = module._closed_values
+
+    def off(scene, moments):
+        found = honest(scene, moments)
+        return {**found, "theta": found["theta"] + 1e-9}
+
+    monkeypatch.setattr(module, "_closed_values", off)
+    assert np.all(module._compute(where, times, "longdouble")["theta_error_bound"] >= 0.99e-9)
+    monkeypatch.setattr(module, "_closed_values", honest)
+    assert np.all(module._compute(where, times, "longdouble")["theta_error_bound"] < 1e-15)
+    checks = module._closed_checks(where, 3.0)[0]
+    monkeypatch.setattr(module, "_closed_checks", lambda *_: (checks, 1e-6))
+    for name in ("axis", "attitude", "theta", "phi", "psi"):
+        assert np.all(module._compute(where, times, "closed-form")[f"{name}_error_bound"] >= 1e-6)
+
+
 @pytest.mark.parametrize("name", ["spheroid_ieee", "goldstein_at_rest_ieee"])
 def test_quadruple_precision_has_24_digits_at_t_8(truth, name):
     where = symtop.scene("spheroid" if name.startswith("spheroid") else "goldstein")

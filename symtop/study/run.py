@@ -206,7 +206,8 @@ def _forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
 
 def _save(results: Path, study: Study, picture: Picture) -> dict[str, str]:
     import matplotlib.pyplot as plt  # noqa: PLC0415
-    from PIL import Image  # noqa: PLC0415  (matplotlib brings it)
+
+    from symtop.report import style  # noqa: PLC0415
 
     file = f"{study.name}-{picture.name}.png"
     target = results / "figures" / file
@@ -215,8 +216,7 @@ def _save(results: Path, study: Study, picture: Picture) -> dict[str, str]:
     os.close(handle)
     try:
         picture.figure.savefig(partial, metadata={"Software": None})
-        with Image.open(partial) as image:  # 256 colours: a third of the bytes, and nothing to see
-            image.convert("RGB").quantize(256).save(partial, optimize=True)
+        style.compact(partial)
         Path(partial).chmod(0o644)
         Path(partial).replace(target)
     finally:
