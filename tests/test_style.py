@@ -13,12 +13,15 @@ def test_a_compacted_picture_keeps_the_colour_of_a_small_marker(tmp_path):
     colors = sorted({style.look(name).color for name in symtop.integrators()})
     for k, color in enumerate(colors):
         noise[5 * k : 5 * k + 3, :3] = [int(color[i : i + 2], 16) for i in (1, 3, 5)]
+    noise[200:] = 252
+    noise[250:] = 255
     path = tmp_path / "busy.png"
     Image.fromarray(noise).save(path)
     style.compact(path)
     after = np.asarray(Image.open(path).convert("RGB"))
     for k in range(len(colors)):
         assert np.array_equal(after[5 * k, 0], noise[5 * k, 0])
+    assert np.array_equal(after[-1, -1], [255, 255, 255])  # and paper stays white beside nearly white
     by_area = np.asarray(Image.fromarray(noise).quantize(256).convert("RGB"))
     assert any(not np.array_equal(by_area[5 * k, 0], noise[5 * k, 0]) for k in range(len(colors)))
 

@@ -118,7 +118,12 @@ def compact(path: str | Path) -> None:
     free = picture.quantize(256 - len(ours)).getpalette() or []
     palette = Image.new("P", (1, 1))
     palette.putpalette((fixed + free)[:768])
-    picture.quantize(palette=palette, dither=Image.Dither.NONE).save(path, optimize=True)
+    drawn = picture.quantize(palette=palette, dither=Image.Dither.NONE)
+    pixels, places = np.asarray(picture), np.array(drawn)
+    for k, color in enumerate(ours):  # the library's search for the nearest colour is a little coarse
+        places[(pixels == getrgb(color)).all(axis=-1)] = k
+    drawn.putdata(places.ravel())
+    drawn.save(path, optimize=True)
 
 
 def panels(rows: int, columns: int, width: float = 9.6, height: float = 3.4, **options: Any) -> Any:
