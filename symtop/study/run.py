@@ -185,6 +185,7 @@ def run(study: Study, results: Path, *, quick: bool = False, fresh: bool = False
         "verdict": study.verdict(combined),
         "tables": [table._asdict() for table in study.tables(combined)],
         "pictures": pictures,
+        "charts": [chart._asdict() for chart in study.charts(combined)],
         "failures": failures,
         "cases": len(paths),
         "quick": quick,

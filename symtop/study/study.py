@@ -41,6 +41,26 @@ class Picture(NamedTuple):
     alt: str
 
 
+class Series(NamedTuple):
+    """One line of a chart: an integrator's points (x, y, words shown at the pointer)."""
+
+    integrator: str
+    points: Sequence[tuple[float, float, str]]
+
+
+class Chart(NamedTuple):
+    """A log-log chart the reader can point at and filter; the page draws it, beside the figure it repeats.
+
+    ``panels`` holds the series of each choice (a scene, a quantity), the first one shown at first.
+    """
+
+    name: str
+    title: str
+    x: str
+    y: str
+    panels: Mapping[str, Sequence[Series]]
+
+
 class Table(NamedTuple):
     """A table of the report; cells are shown as they are."""
 
@@ -76,6 +96,7 @@ class Study:
     pictures: Callable[[xr.Dataset], list[Picture]]
     verdict: Callable[[xr.Dataset], list[str]]
     tables: Callable[[xr.Dataset], list[Table]] = lambda _: []
+    charts: Callable[[xr.Dataset], list[Chart]] = lambda _: []
     timed: bool = False  # timed cases run one at a time, on a machine that does nothing else
 
     def digest(self, case: Case) -> str:
