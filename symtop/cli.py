@@ -69,6 +69,7 @@ def _table(header: list[str], rows: list[list[str]]) -> str:
 @click.option("--markdown", is_flag=True, help="Print a Markdown table.")
 def integrators(plugin_files: tuple[str, ...], as_json: bool, markdown: bool) -> None:
     """List every integrator with what it claims about itself."""
+    from symtop.report import markdown as twin  # noqa: PLC0415
     from symtop.report import page  # noqa: PLC0415
 
     _load_plugins(plugin_files)
@@ -76,7 +77,7 @@ def integrators(plugin_files: tuple[str, ...], as_json: bool, markdown: bool) ->
     if as_json:
         click.echo(json.dumps([dict(zip(header, row, strict=True)) for row in rows], indent=1))
     else:
-        click.echo(page.markdown_table(header, rows) if markdown else _table(header, rows))
+        click.echo(twin.table(header, rows) if markdown else _table(header, rows))
 
 
 @main.command()

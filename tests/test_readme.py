@@ -4,7 +4,8 @@ import importlib
 import re
 from pathlib import Path
 
-from symtop.report.page import integrator_table, markdown_table
+from symtop.report.markdown import table
+from symtop.report.page import integrator_table
 
 registry = importlib.import_module("symtop.integrators.registry")
 scenes = importlib.import_module("symtop.scenes")
@@ -16,7 +17,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 def test_the_table_of_integrators_is_the_generated_one():
     shown = re.search(r"<!-- integrators -->\n(.*?)\n<!-- /integrators -->", README, re.DOTALL)
     assert shown is not None
-    assert shown.group(1) == markdown_table(*integrator_table()), "regenerate: symtop integrators --markdown"
+    assert shown.group(1) == table(*integrator_table()), "regenerate: symtop integrators --markdown"
 
 
 def test_every_study_is_explained():

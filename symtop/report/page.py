@@ -4,15 +4,21 @@ import base64
 import datetime
 import json
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from symtop.checks import SymtopError
 from symtop.integrators.registry import integrators
+from symtop.report import charts, markdown
 from symtop.scenes import scenes
 from symtop.study import run as runner
 from symtop.study import store
+
+TITLE = "Integrators on the heavy symmetric top"
+INTRODUCTION = (
+    "One rigid body, one exact solution, and every method measured against it: accuracy, conservation, cost and "
+    "failure. All numbers and sentences below are generated from the datasets beside this page."
+)
 
 
 def _claim(value: bool | int | None) -> str:
@@ -65,14 +71,8 @@ def scene_table() -> tuple[list[str], list[list[str]]]:
     return ["name", "horizon (s)", "nutation period (s)", "observes", "purpose"], rows
 
 
-def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A GitHub-flavoured table."""
-    lines = ["| " + " | ".join(row) + " |" for row in [header, *rows]]
-    return "\n".join([lines[0], "|" + "---|" * len(header), *lines[1:]])
-
-
 def _embedded(path: Path) -> str:
-    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
+    return f"data:image/{path.suffix[1:]};base64," + base64.b64encode(path.read_bytes()).decode()
 
 
 def gather(results: Path) -> list[dict[str, Any]]:
@@ -88,6 +88,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
         except (OSError, KeyError, TypeError) as error:
             msg = f"the findings of {name} in {results} are incomplete ({error}); run it again: symtop study {name}"
             raise SymtopError(msg) from error
+        findings["charts"] = [{**chart, "prepared": charts.prepared(chart)} for chart in findings.get("charts", [])]
         findings["dataset"] = f"{name}.nc" if (results / f"{name}.nc").is_file() else ""
         found.append(findings)
     if not found:
@@ -97,7 +98,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
 
 
 def write(results: Path) -> Path:
-    """Write ``report.html`` into the results folder and return its path."""
+    """Write ``report.html`` and its twin ``report.md`` into the results folder; returns the path of the page."""
     from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415
 
     environment = Environment(
@@ -105,17 +106,28 @@ def write(results: Path) -> Path:
     )
     studies = gather(results)
     provenance = studies[-1]["provenance"]
+    facts = {**provenance, "dependencies": _plain(provenance["dependencies"])}
     text = environment.get_template("report.html").render(
+        title=TITLE,
+        introduction=INTRODUCTION,
+        css=_part("style.css"),
+        script=_part("chart.js"),
         studies=studies,
         integrators=integrator_table(),
         scenes=scene_table(),
-        provenance={**provenance, "dependencies": _plain(provenance["dependencies"])},
+        provenance=facts,
         quick=any(study["quick"] for study in studies),
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
     target = results / "report.html"
     store.write_text(target, text)
+    store.write_text(results / "report.md", markdown.page(studies, ["# " + TITLE, INTRODUCTION], facts))
     return target
+
+
+def _part(name: str) -> str:
+    """A piece of the page that is ours and goes in as it is."""
+    return (Path(__file__).parent / "templates" / name).read_text(encoding="utf-8")
 
 
 def _plain(dependencies: str) -> str:

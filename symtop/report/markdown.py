@@ -1,0 +1,40 @@
+"""The report as Markdown beside its figures: the same words and tables, small enough to keep under version control."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+FEW = 14  # rows of a table that is shown at once; longer ones are folded
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A GitHub-flavoured table."""
+    lines = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in [header, *rows]]
+    return "\n".join([lines[0], "|" + "---|" * len(header), *lines[1:]])
+
+
+def _folded(title: str, body: str, count: int) -> str:
+    if count <= FEW:
+        return f"**{title}**\n\n{body}"
+    return f"<details><summary>{title} ({count} rows)</summary>\n\n{body}\n\n</details>"
+
+
+def section(study: Mapping[str, Any]) -> str:
+    """One study: question, verdict, figures, how to read them, tables."""
+    tables = ((item["title"], table(item["header"], item["rows"]), len(item["rows"])) for item in study["tables"])
+    parts = [
+        f"## {study['title']}",
+        f"*{study['question']}*",
+        "\n".join(f"- {sentence}" for sentence in study["verdict"]),
+        *(f"![{item['alt']}](figures/{item['file']})\n\n{item['caption']}" for item in study["pictures"]),
+        f"**How to read it.** {study['how_to_read']}",
+        *(_folded(*item) for item in tables),
+        *study["failures"],
+    ]
+    return "\n\n".join(part for part in parts if part)
+
+
+def page(studies: Sequence[Mapping[str, Any]], opening: Sequence[str], provenance: Mapping[str, str]) -> str:
+    """The whole report; ``opening`` comes first, provenance last."""
+    facts = table(["what", "which"], [[key, str(value)] for key, value in provenance.items()])
+    body = [*opening, *(section(study) for study in studies), f"## Provenance\n\n{facts}"]
+    return "\n\n".join(body) + "\n"

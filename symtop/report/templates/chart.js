@@ -1,0 +1,134 @@
+// Log-log charts to point at: a tooltip for the nearest point, a choice of panel, a filter by family.
+// Every chart also exists as a figure; this adds nothing that cannot be read without it.
+"use strict";
+(() => {
+  const SVG = "http://www.w3.org/2000/svg";
+  const MARKS = { // outlines in a box of two by two around the point
+    o: "M-1 0a1 1 0 1 0 2 0a1 1 0 1 0 -2 0z", s: "M-.9-.9H.9V.9H-.9z", "^": "M0-1.1L1 .8H-1z", v: "M0 1.1L1-.8H-1z",
+    "<": "M-1.1 0L.8-1V1z", ">": "M1.1 0L-.8-1V1z", D: "M0-1.2L1.2 0L0 1.2L-1.2 0z", d: "M0-1.2L.8 0L0 1.2L-.8 0z",
+    P: "M-.4-1.1H.4V-.4H1.1V.4H.4V1.1H-.4V.4H-1.1V-.4H-.4z", X: "M-1-.5L-.5-1L0-.5L.5-1L1-.5L.5 0L1 .5L.5 1L0 .5L-.5 1L-1 .5L-.5 0z",
+    p: "M0-1.1L1.05-.34L.65 .9H-.65L-1.05-.34z", h: "M0-1.1L.95-.55V.55L0 1.1L-.95 .55V-.55z",
+    H: "M-1.1 0L-.55-.95H.55L1.1 0L.55 .95H-.55z", 8: "M-.45-1.1H.45L1.1-.45V.45L.45 1.1H-.45L-1.1 .45V-.45z",
+    "*": "M0-1.3L.3-.4H1.25L.5 .17L.77 1.06L0 .52L-.77 1.06L-.5 .17L-1.25-.4H-.3z", x: "M-1-1L1 1M-1 1L1-1",
+  };
+  const make = (name, attributes, parent, text) => {
+    const node = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+    if (text !== undefined) node.textContent = text;
+    parent.append(node);
+    return node;
+  };
+  const html = (name, parent, text, kind) => {
+    const node = document.createElement(name);
+    if (text) node.textContent = text;
+    if (kind) node.className = kind;
+    parent.append(node);
+    return node;
+  };
+  const power = (value) => {
+    const raised = [...String(value)].map((digit) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(digit)]).join("");
+    return `10${raised}`;
+  };
+
+  function start(root) {
+    const chart = JSON.parse(root.querySelector("script").textContent);
+    const choices = Object.keys(chart.panels);
+    const controls = html("div", root, "", "controls");
+    let panel = choices[0];
+    if (choices.length > 1) {
+      const label = html("label", controls, "Show ");
+      const select = html("select", label);
+      for (const choice of choices) html("option", select, choice).value = choice;
+      select.addEventListener("change", () => { panel = select.value; draw(); });
+    }
+    const families = [...new Set(choices.flatMap((choice) => chart.panels[choice].map((one) => one.family)))];
+    const shown = new Set(families);
+    const filter = html("fieldset", controls);
+    html("legend", filter, "Families");
+    for (const family of families) {
+      const label = html("label", filter);
+      const box = html("input", label);
+      box.type = "checkbox";
+      box.checked = true;
+      box.value = family;
+      label.append(` ${family}`);
+      box.addEventListener("change", () => { if (box.checked) shown.add(family); else shown.delete(family); draw(); });
+    }
+    const frame = html("div", root, "", "frame");
+    const tip = html("div", frame, "", "tip");
+    tip.setAttribute("role", "status");
+    tip.hidden = true;
+    let places = [];
+
+    function draw() {
+      frame.querySelector("svg")?.remove();
+      tip.hidden = true;
+      const series = chart.panels[panel].filter((one) => shown.has(one.family) && one.points.length);
+      const width = Math.max(280, frame.clientWidth), height = Math.max(320, Math.min(560, 0.62 * width));
+      const [left, right, top, bottom] = [58, 12, 12, 46];
+      const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `${chart.title}: ${panel}` }, frame);
+      places = [];
+      const all = series.flatMap((one) => one.points);
+      if (!all.length) {
+        make("text", { x: width / 2, y: height / 2, "text-anchor": "middle" }, svg, "no method of these families has a point here");
+        return;
+      }
+      const range = (k) => {
+        const logs = all.map((point) => Math.log10(point[k]));
+        return [Math.floor(Math.min(...logs)), Math.max(Math.floor(Math.min(...logs)) + 1, Math.ceil(Math.max(...logs)))];
+      };
+      const [x0, x1] = range(0), [y0, y1] = range(1);
+      const px = (x) => left + (Math.log10(x) - x0) / (x1 - x0) * (width - left - right);
+      const py = (y) => height - bottom - (Math.log10(y) - y0) / (y1 - y0) * (height - top - bottom);
+      const every = (low, high, room) => Math.max(1, Math.ceil((high - low) / Math.max(2, Math.floor(room))));
+      for (let k = x0; k <= x1; k += every(x0, x1, (width - left) / 60)) {
+        make("line", { x1: px(10 ** k), x2: px(10 ** k), y1: top, y2: height - bottom, class: "grid" }, svg);
+        make("text", { x: px(10 ** k), y: height - bottom + 17, "text-anchor": "middle" }, svg, power(k));
+      }
+      for (let k = y0; k <= y1; k += every(y0, y1, (height - top) / 34)) {
+        make("line", { x1: left, x2: width - right, y1: py(10 ** k), y2: py(10 ** k), class: "grid" }, svg);
+        make("text", { x: left - 6, y: py(10 ** k) + 4, "text-anchor": "end" }, svg, power(k));
+      }
+      make("text", { x: (left + width - right) / 2, y: height - 8, "text-anchor": "middle" }, svg, chart.x);
+      make("text", { transform: `translate(13 ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, svg, chart.y);
+      for (const one of series) {
+        const path = one.points.map(([x, y], k) => `${k ? "L" : "M"}${px(x).toFixed(1)} ${py(y).toFixed(1)}`).join("");
+        make("path", { d: path, fill: "none", stroke: one.color, "stroke-width": 1.4, ...(one.dashed ? { "stroke-dasharray": "5 3" } : {}) }, svg);
+        for (const [x, y, words] of one.points) {
+          make("path", {
+            d: MARKS[one.marker] ?? MARKS.o, transform: `translate(${px(x).toFixed(1)} ${py(y).toFixed(1)}) scale(3.6)`,
+            fill: one.marker === "x" ? "none" : one.color, stroke: one.color, "stroke-width": 0.3, class: "mark",
+          }, svg);
+          places.push([px(x), py(y), one, words]);
+        }
+      }
+      const ring = make("circle", { r: 8, fill: "none", stroke: "#1b1f24", "stroke-width": 1.5, visibility: "hidden" }, svg);
+      const point = (event) => {
+        const box = svg.getBoundingClientRect();
+        const [mx, my] = [(event.clientX - box.left) * width / box.width, (event.clientY - box.top) * height / box.height];
+        let best = null, least = 30 ** 2;
+        for (const place of places) {
+          const away = (place[0] - mx) ** 2 + (place[1] - my) ** 2;
+          if (away < least) [best, least] = [place, away];
+        }
+        tip.hidden = best === null;
+        ring.setAttribute("visibility", best === null ? "hidden" : "visible");
+        if (best === null) return;
+        ring.setAttribute("cx", best[0]);
+        ring.setAttribute("cy", best[1]);
+        tip.textContent = `${best[2].name} (${best[2].family}): ${best[3]}`;
+        const side = best[0] * box.width / width;
+        tip.style.left = side > box.width / 2 ? "auto" : `${side + 12}px`;
+        tip.style.right = side > box.width / 2 ? `${box.width - side + 12}px` : "auto";
+        tip.style.top = `${best[1] * box.height / height + 8}px`;
+      };
+      svg.addEventListener("pointermove", point);
+      svg.addEventListener("pointerdown", point);
+      svg.addEventListener("pointerleave", () => { tip.hidden = true; ring.setAttribute("visibility", "hidden"); });
+    }
+    draw();
+    let last = frame.clientWidth;
+    new ResizeObserver(() => { if (frame.clientWidth !== last) { last = frame.clientWidth; draw(); } }).observe(frame);
+  }
+  for (const root of document.querySelectorAll(".chart")) start(root);
+})();
