@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from symtop.checks import SymtopError, label, one_of, positive
+from symtop.shown import Catalogue, record_table
 from symtop.top import Angles, SymmetricTop
 
 if TYPE_CHECKING:
@@ -47,6 +48,9 @@ class Scene:
     def nutation_period(self) -> float:
         """Time of one full nutation; infinite on a separatrix."""
         return self.top.nutation_period(self.start)
+
+    def _repr_html_(self) -> str:
+        return record_table(self, ("name", "purpose", "top", "start", "horizon", "nutation_period", "observes"))
 
 
 @functools.lru_cache(maxsize=256)
@@ -174,9 +178,13 @@ def added_scenes() -> list[str]:
     return list(_added)
 
 
+class _Scenes(Catalogue[Scene]):
+    columns = ("name", "horizon", "nutation_period", "observes", "purpose")
+
+
 def scenes() -> dict[str, Scene]:
     """All known scenes, by name."""
-    return {**_catalogue(), **_added}
+    return _Scenes({**_catalogue(), **_added})
 
 
 def scene(name: "str | Scene") -> Scene:

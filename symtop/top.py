@@ -31,6 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.checks import SymtopError, finite, positive
+from symtop.shown import record_table
 
 LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
 
@@ -131,6 +132,9 @@ class SymmetricTop:
         if self.I3 > 2.0 * self.I1:
             msg = f"I3 must be at most 2 I1 (no rigid body exceeds it), not {self.I3!r} with I1 = {self.I1!r}"
             raise SymtopError(msg)
+
+    def _repr_html_(self) -> str:
+        return record_table(self, ("I1", "I3", "mgl"))
 
     @classmethod
     def from_spheroid(

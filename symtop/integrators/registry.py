@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.checks import SymtopError, SymtopWarning, finite, label, one_of, positive, whole
+from symtop.shown import Catalogue, record_table
 from symtop.top import Angles, SymmetricTop
 
 Array = NDArray[np.float64]
@@ -90,6 +91,9 @@ class Integrator:
             msg = f"solvers must map one of angles, axis, attitude to a function, not {self.solvers!r}"
             raise SymtopError(msg)
         object.__setattr__(self, "solvers", MappingProxyType(dict(self.solvers)))
+
+    def _repr_html_(self) -> str:
+        return record_table(self, (*_Integrators.columns, "charts", "reference"))
 
     def check_tolerance(self, tolerance: object) -> float:
         """The tolerance to use, refused where the arithmetic cannot reach it."""
@@ -170,10 +174,14 @@ def is_built_in(name: str) -> bool:
     return name in _shipped
 
 
+class _Integrators(Catalogue[Integrator]):
+    columns = ("name", "family", "order", "explicit", "symplectic", "symmetric", "conserves", "knob", "tier", "summary")
+
+
 def integrators() -> dict[str, Integrator]:
     """All registered integrators, by name, in order of registration."""
     _load()
-    return dict(_registry)
+    return _Integrators(_registry)
 
 
 def integrator(name: "str | Integrator") -> Integrator:
