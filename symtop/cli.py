@@ -103,16 +103,18 @@ def scenes(plugin_files: tuple[str, ...], as_json: bool) -> None:
 @click.option("--samples", type=int, default=501, show_default=True, help="How many samples to keep.")
 @click.option("--observe", help="nutation, axis or attitude; what the scene is watched for by default.")
 @click.option("--output", type=click.Path(), help="Write the run to this netCDF file.")
+@click.option("--figure", type=click.Path(), help="Draw the run and its errors into this PNG file.")
 @plugin_option
+@json_option
 def run(
     scene: str, integrator: str, step_size: float | None, tolerance: float | None, horizon: float | None, samples: int,
-    observe: str | None, output: str | None, plugin_files: tuple[str, ...],
+    observe: str | None, output: str | None, figure: str | None, plugin_files: tuple[str, ...], as_json: bool,
 ) -> None:  # fmt: skip
     """Run one INTEGRATOR on one SCENE and compare it with the truth.
 
     \b
     symtop run spheroid midpoint --step-size 0.01
-    symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc
+    symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
     """
     from symtop import datasets  # noqa: PLC0415
     from symtop.measure.errors import QUANTITIES, errors  # noqa: PLC0415
@@ -126,17 +128,31 @@ def run(
     )
     if output is not None:
         datasets.write(data, output)
-    outcome = data.attrs["outcome"]
-    click.echo(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
-    click.echo(f"{data.attrs['steps']} steps, {data.attrs['force_evaluations']} force evaluations")
-    found = errors(find_scene(scene), data, reference(scene, data["time"].values, precision="closed-form"))
-    for name, label in QUANTITIES.items():
-        if name in found and found[name].notnull().any():
-            values = found[name].dropna("time")
-            click.echo(f"  {label:<30} largest {float(values.max()):.3e}   last {float(values[-1]):.3e}")
-    if output is not None:
-        click.echo(f"written to {output}")
-    if outcome != "ok":
+    where = find_scene(scene)
+    truth = reference(where, data["time"].values, precision="closed-form")
+    found = errors(where, data, truth)
+    if figure is not None:
+        from symtop.report import single  # noqa: PLC0415
+
+        single.draw(where, data, truth, found, figure)
+    shown = {name: found[name].dropna("time").values for name in QUANTITIES if name in found}
+    shown = {name: values for name, values in shown.items() if values.size}
+    if as_json:
+        facts = {
+            name: data.attrs[name]
+            for name in ("outcome", "outcome_message", "reached_time", "steps", "force_evaluations")
+        }
+        largest = {name: {"largest": float(values.max()), "last": float(values[-1])} for name, values in shown.items()}
+        click.echo(json.dumps({**facts, "errors": largest}, indent=1))
+    else:
+        click.echo(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
+        click.echo(f"{data.attrs['steps']} steps, {data.attrs['force_evaluations']} force evaluations")
+        for name, values in shown.items():
+            click.echo(f"  {QUANTITIES[name]:<30} largest {float(values.max()):.3e}   last {float(values[-1]):.3e}")
+        for file in (output, figure):
+            if file is not None:
+                click.echo(f"written to {file}")
+    if data.attrs["outcome"] != "ok":
         sys.exit(3)
 
 

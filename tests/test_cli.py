@@ -96,3 +96,15 @@ def test_help_starts_fast():
 
     bare = best(sys.executable, "-c", "import click")
     assert best(sys.executable, "-m", "symtop.cli", "--help") < 3.0 * bare + 0.05
+
+
+def test_a_run_is_drawn_and_printed_as_json(tmp_path):
+    picture = tmp_path / "deeper" / "run.png"
+    command = ["run", "spheroid", "midpoint", "--step-size", "0.01", "--figure", str(picture), "--json"]
+    result = CliRunner().invoke(main, command)
+    assert result.exit_code == 0
+    found = json.loads(result.output)
+    assert found["steps"] == 800
+    assert 1e-3 < found["errors"]["axis"]["largest"] < 2e-2
+    assert found["errors"]["p_psi"]["largest"] < 1e-14
+    assert picture.read_bytes().startswith(b"\x89PNG")

@@ -4,6 +4,8 @@ Colours are those of Okabe and Ito, told apart by readers with any common colour
 marker or a line style of its own, and methods that run in plain Python are dashed wherever cost is drawn.
 """
 
+import os
+import tempfile
 import zlib
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -124,6 +126,21 @@ def compact(path: str | Path) -> None:
         places[(pixels == getrgb(color)).all(axis=-1)] = k
     drawn.putdata(places.ravel())
     drawn.save(path, optimize=True)
+
+
+def save(figure: Any, target: Path) -> None:
+    """Write a figure as a compact PNG, whole or not at all, and close it."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, partial = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part.png", dir=target.parent)
+    os.close(handle)
+    try:
+        figure.savefig(partial, metadata={"Software": None})
+        compact(partial)
+        Path(partial).chmod(0o644)
+        Path(partial).replace(target)
+    finally:
+        Path(partial).unlink(missing_ok=True)
+    plt.close(figure)
 
 
 def panels(rows: int, columns: int, width: float = 9.6, height: float = 3.4, **options: Any) -> Any:

@@ -11,7 +11,6 @@ import multiprocessing
 import os
 import signal
 import sys
-import tempfile
 import threading
 import time
 import traceback
@@ -206,21 +205,8 @@ def _forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
 
 
 def _save(results: Path, study: Study, picture: Picture) -> dict[str, str]:
-    import matplotlib.pyplot as plt  # noqa: PLC0415
-
     from symtop.report import style  # noqa: PLC0415
 
     file = f"{study.name}-{picture.name}.png"
-    target = results / "figures" / file
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, partial = tempfile.mkstemp(prefix=f".{file}.", suffix=".part.png", dir=target.parent)
-    os.close(handle)
-    try:
-        picture.figure.savefig(partial, metadata={"Software": None})
-        style.compact(partial)
-        Path(partial).chmod(0o644)
-        Path(partial).replace(target)
-    finally:
-        Path(partial).unlink(missing_ok=True)
-    plt.close(picture.figure)
+    style.save(picture.figure, results / "figures" / file)
     return {"name": picture.name, "file": file, "caption": picture.caption, "alt": picture.alt}

@@ -1,0 +1,45 @@
+"""One run as a picture: its motion beside the truth's, its errors, and what it does to the constants of the motion."""
+
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure.conservation import residuals
+from symtop.measure.errors import QUANTITIES
+from symtop.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, legend_below, panels, save
+from symtop.scenes import Scene
+
+COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
+LEAST = 1e-17
+
+
+def draw(scene: Scene, run: xr.Dataset, truth: xr.Dataset, found: xr.Dataset, path: str | Path) -> Path:
+    """Three panels into a PNG: theta and the truth's, errors in angles, residuals of energy and momenta."""
+    figure, axes = panels(3, 1, height=2.3, sharex=True)
+    times = run["time"].values
+    motion, angles, constants = axes[:, 0]
+    motion.plot(times, np.degrees(truth["theta"].values), color=ORANGE, lw=3.0, alpha=0.6, label="true theta")
+    motion.plot(times, np.degrees(run["theta"].values), color=BLUE, lw=1.0, label=f"theta of {run.attrs['integrator']}")
+    motion.set_ylabel("theta (degrees)")
+    motion.set_title(textwrap.fill(f"{run.attrs['title']}: {run.attrs['outcome_message']}", 110))
+    for name in ("axis", "attitude", "theta"):
+        if name in found:
+            _line(angles, times, found[name].values, COLORS[name], QUANTITIES[name])
+    for name, values in residuals(scene, run).items():
+        _line(constants, times, np.abs(values), COLORS[name], f"residual of {name}, relative")
+    angles.set(yscale="log", ylabel="error (rad)")
+    constants.set(yscale="log", ylabel="|change| since the start", xlabel="time")
+    if run.attrs["outcome"] != "ok":
+        for axis in axes[:, 0]:
+            axis.axvline(run.attrs["reached_time"], color=VERMILLION, ls="--", label="stopped here")
+    legend_below(figure, axes)
+    target = Path(path)
+    save(figure, target)
+    return target
+
+
+def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
+    axis.plot(times[1:], np.maximum(values[1:], LEAST), color=color, lw=1.0, label=label)
