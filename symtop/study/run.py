@@ -1,7 +1,8 @@
 """The runner: measures the cases that are missing, combines them, draws, and writes down what it found.
 
 A case is computed only if no file holds its digest, so that an interrupted study resumes and an unchanged one
-ends in seconds. Untimed cases share all cores through spawned processes; timed ones run alone.
+ends in seconds. Untimed cases share all cores through spawned processes; timed ones run alone. A study may have
+a second round of cases, made from what the first one found.
 """
 
 import contextlib
@@ -132,7 +133,8 @@ def _job_count(study: Study, cases: Iterable[Case], jobs: int | None) -> int:
     """One process for timed studies, few cases, and methods or scenes that only this process knows."""
     chosen = list(cases)
     ours = {name for case in chosen for name in (case.scene, case.integrator)}
-    if study.timed or len(chosen) < WORTH_A_POOL or any(plugins.is_local(name) for name in ours):
+    alone = study.timed or any(case.timed for case in chosen)
+    if alone or len(chosen) < WORTH_A_POOL or any(plugins.is_local(name) for name in ours):
         return 1
     return max(1, min(jobs or os.cpu_count() or 1, len(chosen)))
 
@@ -140,6 +142,8 @@ def _job_count(study: Study, cases: Iterable[Case], jobs: int | None) -> int:
 def _stamp(study: Study, digests: Iterable[str]) -> str:
     """Hash of what the drawings depend on: the cases, the script and the drawing code."""
     digest = hashlib.sha256("".join(digests).encode())
+    if study.follow_up is not None:  # its cases are timed
+        digest.update(datasets.provenance()["processor"].encode())
     package = Path(__file__).resolve().parents[1]
     for path in [
         folder() / f"{study.name}.py",
@@ -172,6 +176,12 @@ def run(study: Study, results: Path, *, quick: bool = False, fresh: bool = False
         msg = f"study {study.name}: no case could be measured; {failures[0] if failures else 'the grid is empty'}"
         raise SymtopError(msg)
     found = [(case, done[path]) for path, case in paths.items() if path in done]
+    if study.follow_up is not None:
+        later = {store.case_path(results, study, case): case for case in study.follow_up(store.combine(found))}
+        undone = {path: case for path, case in later.items() if fresh or store.load_case(path) is None}
+        failures += _measure_all(study, undone, _job_count(study, undone.values(), jobs), quiet)
+        found += [(case, data) for path, case in later.items() if (data := store.load_case(path)) is not None]
+        paths, missing = paths | later, missing | undone
     combined = datasets.describe(store.combine(found), study.title, question=study.question)
     datasets.write(combined, results / f"{study.name}.nc")
     _forget(results, study, paths)

@@ -10,6 +10,7 @@ import json
 import math
 import os
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,7 @@ def load_case(path: Path) -> xr.Dataset | None:
 
 def combine(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
     """One dataset over scene and integrator; a cell nobody measured is NaN (or an empty string)."""
+    cases = [one for case, data in cases for one in _apart(case, data)]
     scenes = list(dict.fromkeys(case.scene for case, _ in cases))
     methods = list(dict.fromkeys(case.integrator for case, _ in cases))
     sizes: dict[str, int] = {}
@@ -70,6 +72,14 @@ def combine(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
         for name, (dims, values, attrs) in filled.items()
     }
     return xr.Dataset(variables, coords=coordinates)
+
+
+def _apart(case: Case, data: xr.Dataset) -> list[tuple[Case, xr.Dataset]]:
+    """A case that measured several integrators, as one case for each of them."""
+    if "integrator" not in data.dims:
+        return [(case, data)]
+    names = [str(name) for name in data["integrator"].values]
+    return [(replace(case, integrator=name), data.sel(integrator=name, drop=True)) for name in names]
 
 
 def write_text(path: Path, text: str) -> None:

@@ -71,11 +71,16 @@ class Table(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold."""
+    """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold.
+
+    A case may measure several integrators against each other: then its dataset has a dimension ``integrator``,
+    `integrator` names the group and ``settings["integrators"]`` lists them.
+    """
 
     scene: str
     integrator: str
     settings: Mapping[str, Any] = field(default_factory=dict)
+    timed: bool = False  # it runs by itself, on a machine that does nothing else
 
     @property
     def label(self) -> str:
@@ -97,7 +102,8 @@ class Study:
     verdict: Callable[[xr.Dataset], list[str]]
     tables: Callable[[xr.Dataset], list[Table]] = lambda _: []
     charts: Callable[[xr.Dataset], list[Chart]] = lambda _: []
-    timed: bool = False  # timed cases run one at a time, on a machine that does nothing else
+    timed: bool = False  # all cases are
+    follow_up: Callable[[xr.Dataset], list[Case]] | None = None  # a second round, made from what the first one found
 
     def digest(self, case: Case) -> str:
         """Hash of everything the case's numbers depend on: settings, the way of measuring, sources, versions."""
@@ -109,8 +115,9 @@ class Study:
             numerics_digest(),
             plugins.digest_of(case.scene),
             plugins.digest_of(case.integrator),
+            *(plugins.digest_of(name) for name in case.settings.get("integrators", ())),
             datasets.provenance()["dependencies"],
-            datasets.provenance()["processor"] if self.timed else "",
+            datasets.provenance()["processor"] if self.timed or case.timed else "",
         ]
         return hashlib.sha256("\n".join(content).encode()).hexdigest()[:20]
 
