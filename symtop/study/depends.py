@@ -37,13 +37,13 @@ if TYPE_CHECKING:
     from symtop.study.study import Case, Study
 
 PACKAGE = Path(__file__).resolve().parents[1]
-PLUMBING = {PACKAGE / name for name in ("__init__.py", "checks.py", "datasets.py", "integrators/citations.py")}
+PLUMBING = {PACKAGE / name for name in ("checks.py", "datasets.py")} | set(PACKAGE.rglob("__init__.py"))
 RESOLVERS = {PACKAGE / name for name in ("simulate.py", "integrators/registry.py")}  # they look up what they are given
 WORDS = ("summary", "reference")  # of an Integrator: said, not computed
 EVERY = "*"  # in place of an integrator's name: all of them
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def _tree(file: Path) -> ast.Module:
     return ast.parse(file.read_bytes())
 
@@ -68,7 +68,7 @@ def _imported(file: Path) -> Iterator[tuple[str, list[str]]]:
             yield ".".join([*base, *([node.module] if node.module else [])]), [alias.name for alias in node.names]
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def imports_of(file: Path) -> frozenset[Path]:
     """The files of this package that a file of it imports."""
     found = set()
@@ -78,7 +78,7 @@ def imports_of(file: Path) -> frozenset[Path]:
     return frozenset(found - PLUMBING)
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def all_imports(files: frozenset[Path]) -> frozenset[Path]:
     """Those files, the files they import, and so on."""
     found: set[Path] = set()
@@ -87,6 +87,15 @@ def all_imports(files: frozenset[Path]) -> frozenset[Path]:
         found |= ahead
         ahead = {path for file in ahead for path in imports_of(file)} - found
     return frozenset(found)
+
+
+_CONTAINERS: tuple[tuple[Any, Callable[[Any], Iterable[Any]]], ...] = (
+    (functools.partial, lambda thing: (thing.func, thing.args, thing.keywords)),
+    (MethodType, lambda thing: (thing.__func__, thing.__self__)),
+    (Mapping, lambda thing: [part for key in sorted(thing, key=repr) for part in (key, thing[key])]),
+    ((set, frozenset), lambda thing: sorted(thing, key=repr)),
+    ((tuple, list), lambda thing: (type(thing), *thing)),
+)
 
 
 @dataclass
@@ -103,40 +112,39 @@ class Ingredients:
         """Walk anything that a solver or a measure may hold."""
         if isinstance(thing, (type(None), bool, int, float, complex, str, bytes, np.generic)):
             self.values.append(repr(thing))
-            return
-        if id(thing) in self._seen:
-            return
-        self._seen[id(thing)] = thing
-        if hasattr(thing, "py_func"):  # compiled by numba
-            self.add(thing.py_func)
-        elif isinstance(thing, functools.partial):
-            self._add_all((thing.func, thing.args, thing.keywords))
-        elif isinstance(thing, MethodType):
-            self._add_all((thing.__func__, thing.__self__))
-        elif isinstance(thing, FunctionType):
+        elif id(thing) not in self._seen:
+            self._seen[id(thing)] = thing
+            thing = getattr(thing, "py_func", thing)  # compiled by numba
+            parts = next((parts(thing) for kind, parts in _CONTAINERS if isinstance(thing, kind)), None)
+            if parts is None:
+                self._add_one(thing)
+            else:
+                self._add_all(parts)
+
+    def _add_one(self, thing: Any) -> None:
+        if isinstance(thing, FunctionType):
             self._add_function(thing)
         elif isinstance(thing, ModuleType):
-            self._add_file(getattr(thing, "__file__", None))
+            self._is_ours(thing)
         elif isinstance(thing, type):
             self.values.append(f"{thing.__module__}.{thing.__qualname__}")
-            self._add_file(getattr(sys.modules.get(thing.__module__), "__file__", None))
+            self._is_ours(sys.modules.get(thing.__module__))
         elif isinstance(thing, np.ndarray):
             self.values.append(f"{thing.dtype}{thing.shape}{hashlib.sha256(thing.tobytes()).hexdigest()}")
-        elif isinstance(thing, Mapping):
-            self._add_all(part for key in sorted(thing, key=repr) for part in (key, thing[key]))
-        elif isinstance(thing, (set, frozenset)):
-            self._add_all(sorted(thing, key=repr))
-        elif isinstance(thing, (tuple, list)):
-            self._add_all((type(thing), *thing))
         elif is_dataclass(thing):
             spoken = WORDS if isinstance(thing, Integrator) else ()
             self._add_all((type(thing), *(getattr(thing, f.name) for f in fields(thing) if f.name not in spoken)))
         else:
             self.add(type(thing))
+            if self._is_ours(sys.modules.get(type(thing).__module__)):
+                self.add(getattr(thing, "__dict__", None))
 
     def _add_all(self, things: Iterable[Any]) -> None:
         for thing in things:
             self.add(thing)
+
+    def _is_ours(self, module: ModuleType | None) -> bool:
+        return self._add_file(getattr(module, "__file__", None))
 
     def _add_file(self, name: str | None) -> bool:
         path = Path(name).resolve() if name else None
@@ -207,7 +215,7 @@ class Basis(NamedTuple):
     every: bool  # it asks the registry, so that it may run any
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def basis(measure: Callable[..., Any]) -> Basis:
     """The basis of a study's measure."""
     found = Ingredients()
@@ -219,7 +227,7 @@ def basis(measure: Callable[..., Any]) -> Basis:
     return Basis(tuple(found.values), files, names, found.lists or any(_looks_up(file) for file in ours))
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def _of_integrator(name: str, made: int) -> tuple[tuple[str, ...], frozenset[Path]]:  # noqa: ARG001
     found = Ingredients()
     found.add(integrators()[name])
@@ -233,7 +241,7 @@ def used(study: "Study", case: "Case") -> list[str]:
         names = set(study.uses(case))
     else:
         base = basis(study.measure)
-        names = {case.integrator, *base.names, *([EVERY] if base.every else [])}
+        names = {case.integrator, *case.settings.get("integrators", ()), *base.names, *([EVERY] if base.every else [])}
     return sorted(known) if EVERY in names else sorted(names & set(known))
 
 
@@ -258,11 +266,11 @@ def digest(study: "Study", case: "Case") -> str:
         *(f"{path.relative_to(PACKAGE)} {_hash(path)}" for path in sorted(files(study, case))),
         *(plugins.digest_of(name) for name in (case.scene, *names)),
         datasets.provenance()["dependencies"],
-        datasets.provenance()["processor"] if study.timed else "",
+        datasets.provenance()["processor"] if study.is_timed(case) else "",
     ]
     return hashlib.sha256("\n".join(content).encode()).hexdigest()[:20]
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def _hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -13,6 +13,7 @@ import xarray as xr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+
 class Picture(NamedTuple):
     """A figure of the report: its file name, caption and text for those who cannot see it."""
 
@@ -32,11 +33,16 @@ class Table(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold."""
+    """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold.
+
+    A case may measure several integrators against each other: then its dataset has a dimension ``integrator``,
+    `integrator` names the group and ``settings["integrators"]`` lists them.
+    """
 
     scene: str
     integrator: str
     settings: Mapping[str, Any] = field(default_factory=dict)
+    timed: bool = False  # it runs by itself, on a machine that does nothing else
 
     @property
     def label(self) -> str:
@@ -57,8 +63,8 @@ class Study:
     pictures: Callable[[xr.Dataset], list[Picture]]
     verdict: Callable[[xr.Dataset], list[str]]
     tables: Callable[[xr.Dataset], list[Table]] = lambda _: []
-    timed: bool = False  # timed cases run one at a time, on a machine that does nothing else
-
+    timed: bool = False  # all cases are
+    follow_up: Callable[[xr.Dataset], list[Case]] | None = None  # a second round, made from what the first one found
     uses: Callable[[Case], Sequence[str]] | None = None  # integrators a case runs; "*" for all; None: found out
     limit: float = 3600.0  # seconds after which a case counts as hanging
 
@@ -67,3 +73,7 @@ class Study:
         from symtop.study import depends  # noqa: PLC0415
 
         return depends.digest(self, case)
+
+    def is_timed(self, case: Case) -> bool:
+        """Must the case run alone, on a machine that does nothing else?"""
+        return self.timed or case.timed
