@@ -145,9 +145,7 @@ def run(
 @click.option("--all", "every", is_flag=True, help="Run every study.")
 @click.option("--quick", is_flag=True, help="Coarse grids, a few seconds a study; kept apart from the full results.")
 @click.option("--fresh", is_flag=True, help="Compute every case again; with --check, check every case.")
-@click.option(
-    "--status", "only_status", is_flag=True, help="Say what is done, stale, failed or missing; compute nothing."
-)
+@click.option("--status", "only_status", is_flag=True, help="Say what is done, stale or missing; compute nothing.")
 @click.option("--check", "only_check", is_flag=True, help="Compute stored cases again, elsewhere, and compare.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes for untimed cases; all cores by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute untimed cases on the dask cluster of this scheduler.")
@@ -163,7 +161,8 @@ def study(
     """Run studies by NAME: datasets, figures and findings into the results folder.
 
     A run that is interrupted (code 130) or terminated (143) loses what it was computing and nothing else; the same
-    command goes on from there. Two runs may share a folder. A case that fails is recorded and the others go on (code 1).
+    command goes on from there. Two runs may share a folder. A case that fails is recorded and the others go on (code
+    1). NAME is also a path, for a script of your own anywhere.
 
     \b
     symtop study convergence drift

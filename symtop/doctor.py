@@ -181,7 +181,7 @@ def _self_check() -> list[Finding]:
     checks = [("midpoint", {"step_size": 1e-3}, 1e-2)]
     checks += [("taylor", {}, AGREE)] if importlib.util.find_spec("heyoka") else []
     for name, knob, least in checks:
-        run = simulate("spheroid", known[name], samples=41, observe="attitude", **knob)  # type: ignore[arg-type]
+        run = simulate("spheroid", known[name], samples=41, observe="attitude", **knob)
         gap = float(np.max(np.abs(run["axis"].values - exact["axis"].values)))
         said = f"{gap:.1e} rad from the closed form on spheroid (allowed {least:g})"
         found.append(Finding(name, said, gap <= least, wrong))

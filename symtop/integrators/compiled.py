@@ -2,8 +2,8 @@
 
 numba stamps a cached kernel with the file of the function itself and does not see edits in the files it
 calls, so an old kernel can return old numbers in silence. The cache folder is therefore named after a hash of
-every source file of this package that a kernel may come from, and of the file that a plug-in kernel comes from. A kernel found on disk
-loads in a few milliseconds; a cold one compiles in about half a second.
+every source file of this package that a kernel may come from, and of the file that a plug-in kernel comes from.
+A kernel found on disk loads in a few milliseconds; a cold one compiles in about half a second.
 """
 
 import functools

@@ -16,6 +16,7 @@ from symtop.study import plugins, store
 from symtop.study.execute import execute
 from symtop.study.pools import Workers
 from symtop.study.run import Round
+from symtop.study.scripts import file_of
 from symtop.study.study import Case, Study
 from symtop.study.work import Result, Task
 
@@ -51,11 +52,9 @@ def differences(stored: xr.Dataset, again: xr.Dataset) -> list[str]:
             found.append(f"{name} has another shape: {dict(one.sizes)} and {dict(other.sizes)}")
         elif not is_clocked(name) and not _same(one, other):
             found.append(f"{name} differs{_how_much(one, other)}")
-    aside = set(datasets.provenance()) | {"content"}
-    for key in sorted((set(stored.attrs) | set(again.attrs)) - aside):
-        if stored.attrs.get(key) != again.attrs.get(key):
-            found.append(f"attribute {key} differs: {stored.attrs.get(key)!r} and {again.attrs.get(key)!r}")
-    return found
+    kept = sorted((set(stored.attrs) | set(again.attrs)) - set(datasets.provenance()) - {"content"})
+    pairs = [(key, stored.attrs.get(key), again.attrs.get(key)) for key in kept]
+    return [*found, *(f"attribute {key} differs: {one!r} and {other!r}" for key, one, other in pairs if one != other)]
 
 
 def _same(one: xr.DataArray, other: xr.DataArray) -> bool:
@@ -74,7 +73,7 @@ def _how_much(one: xr.DataArray, other: xr.DataArray) -> str:
 
 
 def check(study: Study, results: Path, workers: Workers, *, quick: bool, everything: bool) -> Checked:
-    """Compute `SAMPLE` stored cases of a study again, or every one, and compare; also the dataset they make together."""
+    """Compute `SAMPLE` stored cases again, or every one, and compare; likewise the dataset that they make together."""
     known = Round(study, results.resolve())
     if not known.add(study.cases(quick), fresh=False) and study.follow_up is not None:
         known.add(study.follow_up(known.combined()), fresh=False)
@@ -96,7 +95,8 @@ def check(study: Study, results: Path, workers: Workers, *, quick: bool, everyth
 
 
 def _recompute(study: Study, cases: dict[Path, Case], workers: Workers) -> list[str]:
-    tasks = [Task(study.name, case, str(path), tuple(plugins.loaded()), study.limit) for path, case in cases.items()]
+    script = str(file_of(study.name))
+    tasks = [Task(script, case, str(path), tuple(plugins.loaded()), study.limit) for path, case in cases.items()]
     failures: list[str] = []
 
     def heard(_: Task, result: Result) -> None:

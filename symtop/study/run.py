@@ -22,7 +22,7 @@ from symtop.checks import SymtopError, positive
 from symtop.study import plugins, store
 from symtop.study.execute import execute
 from symtop.study.pools import Workers
-from symtop.study.scripts import folder, load, names
+from symtop.study.scripts import file_of, folder, load, names
 from symtop.study.study import Case, Picture, Study
 from symtop.study.work import Result, Task
 
@@ -56,10 +56,8 @@ class Round:
 
     def compute(self, missing: dict[Path, Case], workers: Workers, limit: float, *, fresh: bool, quiet: bool) -> None:
         """Have cases computed, with a progress bar where somebody is watching."""
-        tasks = [
-            Task(self.study.name, case, str(path), tuple(plugins.loaded()), limit, fresh)
-            for path, case in missing.items()
-        ]
+        script = str(file_of(self.study.name))
+        tasks = [Task(script, case, str(path), tuple(plugins.loaded()), limit, fresh) for path, case in missing.items()]
         with _bar(self.study.name, len(tasks), quiet=quiet) as bar:
 
             def heard(_: Task, result: Result) -> None:
@@ -97,7 +95,7 @@ def _stamp(study: Study, digests: Iterable[str]) -> str:
         digest.update(datasets.provenance()["processor"].encode())
     package = Path(__file__).resolve().parents[1]
     for path in [
-        folder() / f"{study.name}.py",
+        file_of(study.name),
         package / "study" / "store.py",
         *sorted((package / "report").glob("*.py")),
     ]:
