@@ -120,6 +120,9 @@ def replacing(path: str | os.PathLike[str], suffix: str = "") -> Iterator[Path]:
     """
     target = Path(path)
     partial = ""
+    if "\0" in str(target):
+        msg = f"a path must not hold a null character, as {str(target)!r} does"
+        raise SymtopError(msg)
     try:
         if target.is_dir():
             msg = f"cannot write {target}: it is a folder"

@@ -263,7 +263,7 @@ def digest(study: "Study", case: "Case") -> str:
         *basis(study.measure).values,
         *scene.values,
         *(value for name in names for value in (name, *_of_integrator(name, id(known[name]))[0])),
-        *(f"{path.relative_to(PACKAGE)} {_hash(path)}" for path in sorted(files(study, case))),
+        *(f"{path.relative_to(PACKAGE)} {file_hash(path)}" for path in sorted(files(study, case))),
         *(plugins.digest_of(name) for name in (case.scene, *names)),
         datasets.provenance()["dependencies"],
         datasets.provenance()["processor"] if study.is_timed(case) else "",
@@ -272,5 +272,6 @@ def digest(study: "Study", case: "Case") -> str:
 
 
 @functools.cache
-def _hash(path: Path) -> str:
+def file_hash(path: Path) -> str:
+    """Hash of a file as it was when it was first asked for."""
     return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -36,8 +36,12 @@ def file_of(name: str) -> Path:
     """The script of a study: one of the folder's by its name, or any by its path, which ends in .py."""
     if not name.endswith(".py"):
         return _elsewhere.get(name) or folder() / f"{one_of('study', name, names())}.py"
-    path = Path(name).resolve()
-    if not path.is_file():
+    try:
+        path = Path(name).resolve()
+        there = path.is_file()
+    except (OSError, ValueError):  # a name that is too long, or holds a null character
+        there = False
+    if not there:
         msg = f"study must be a name or a Python file that is there, not {name!r}"
         raise SymtopError(msg)
     return path
