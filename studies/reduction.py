@@ -11,7 +11,7 @@ from symtop.integrators.registry import integrator, integrators
 from symtop.measure.accuracy import ladder
 from symtop.measure.commutation import commutation_table, reduced_first
 from symtop.measure.order import power_law
-from symtop.measure.reduction import chart_ratios, chart_table, several_charts, twin_cost, twin_history, twins
+from symtop.measure.reduction import TWIN, chart_ratios, chart_table, several_charts, twin_cost, twin_history, twins
 from symtop.report import style
 from symtop.scenes import added_scenes, scene
 from symtop.study.study import Case, Picture, Study, Table
@@ -65,6 +65,12 @@ def measure(case: Case) -> xr.Dataset:
         history = twin_history(where, case.integrator, plan["horizon"], STEPS)
         return history.merge(twin_cost(where, case.integrator, plan["step_sizes"], plan["batches"]))
     return commutation_table(where, integrator(case.integrator), plan["horizon"], plan["counts"])
+
+
+def uses(case: Case) -> list[str]:
+    """The integrators that a case runs: both twins, or the midpoint rule as a witness of commutation."""
+    also = {"charts": [], "twins": [case.integrator + TWIN], "commutation": ["midpoint"]}
+    return [case.integrator, *also[case.settings["part"]]]
 
 
 def rows(data: xr.Dataset, variable: str) -> list[tuple[str, str, xr.Dataset]]:
@@ -275,4 +281,5 @@ STUDY = Study(
     tables=tables,
     verdict=verdict,
     timed=True,
+    uses=uses,
 )

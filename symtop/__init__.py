@@ -36,6 +36,8 @@ _HOME = {
     "simulate": "simulate",
     "reference": "reference",
     "ClosedForm": "exact",
+    "recommend": "advise",
+    "Advice": "advise",
 }
 
 __all__ = ["__version__", *_HOME]  # noqa: PLE0604  (strings all)

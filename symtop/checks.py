@@ -20,7 +20,7 @@ class SymtopWarning(UserWarning):
 
 def finite(name: str, value: object) -> float:
     """Return `value` as a float; refuse anything that is not one finite real number."""
-    if isinstance(value, bool):
+    if isinstance(value, (bool, str, bytes, bytearray)):  # float() would read a number in them
         msg = f"{name} must be a finite number, not {value!r}"
         raise SymtopError(msg)
     try:

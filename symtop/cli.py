@@ -1,6 +1,7 @@
-"""The command line: ``symtop integrators | scenes | run | study | report``.
+"""The command line: ``symtop integrators | scenes | run | study | report | doctor``.
 
-Exit codes: 0 fine, 1 a case or a check failed, 2 bad input, 3 a run ended early by its outcome (what it had was kept).
+Exit codes: 0 fine; 1 a case or a check failed; 2 bad input, or a place that cannot be written; 3 a run ended early by
+its outcome (what it had was kept); 130 and 143 a study was interrupted or terminated (what was computed is kept).
 Heavy packages are imported by the command that needs them.
 """
 
@@ -160,39 +161,60 @@ def run(
 @click.argument("names", nargs=-1)
 @click.option("--all", "every", is_flag=True, help="Run every study.")
 @click.option("--quick", is_flag=True, help="Coarse grids, a few seconds a study; kept apart from the full results.")
-@click.option("--fresh", is_flag=True, help="Compute every case again.")
+@click.option("--fresh", is_flag=True, help="Compute every case again; with --check, check every case.")
+@click.option("--status", "only_status", is_flag=True, help="Say what is done, stale or missing; compute nothing.")
+@click.option("--check", "only_check", is_flag=True, help="Compute stored cases again, elsewhere, and compare.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes for untimed cases; all cores by default.")
+@click.option("--scheduler", metavar="ADDRESS", help="Compute untimed cases on the dask cluster of this scheduler.")
+@click.option("--limit", type=float, metavar="SECONDS", help="Time a case may take; an hour by default.")
 @click.option("--results", type=click.Path(file_okay=False), default="results", show_default=True)
+@json_option
 @plugin_option
 def study(
-    names: tuple[str, ...], every: bool, quick: bool, fresh: bool, jobs: int | None, results: str,
+    names: tuple[str, ...], every: bool, quick: bool, fresh: bool, only_status: bool, only_check: bool,
+    jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool,
     plugin_files: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Run studies by NAME: datasets, figures and findings into the results folder.
+
+    A run that is interrupted (code 130) or terminated (143) loses what it was computing and nothing else; the same
+    command goes on from there. Two runs may share a folder. A case that fails is recorded and the others go on (code
+    1). NAME is also a path, for a script of your own anywhere.
 
     \b
     symtop study convergence drift
     symtop study --all --quick
     symtop study stability --plugin my_methods.py
+    symtop study --all --status
+    symtop study convergence --scheduler tcp://10.0.0.1:8786
     """
-    from symtop.study import run as runner  # noqa: PLC0415
+    from symtop.study import command  # noqa: PLC0415
 
     _load_plugins(plugin_files)
-    chosen = runner.names() if every else list(names)
-    if not chosen:
-        msg = f"name a study or use --all; known: {', '.join(runner.names())}"
-        raise SymtopError(msg)
     folder = Path(results) / "quick" if quick else Path(results)
-    failed = False
-    for study_ in [runner.load(name) for name in chosen]:
-        found = runner.run(study_, folder, quick=quick, fresh=fresh, jobs=jobs)
-        click.echo(
-            f"{study_.name}: {found['computed']} of {found['cases']} cases computed, {len(found['pictures'])} figures"
-        )
-        for failure in found["failures"]:
-            click.echo(f"  {failure}", err=True)
-            failed = True
-    if failed:
+    chosen = command.choose(names, every=every)
+    if only_status:
+        code = command.show_status(chosen, folder, quick=quick, as_json=as_json)
+    else:
+        options = command.Options(folder, quick, fresh, jobs, scheduler, limit, as_json)
+        code = command.conduct(command.check_all if only_check else command.run_all, chosen, options)
+    if code:
+        sys.exit(code)
+
+
+@main.command()
+@click.option("--results", type=click.Path(file_okay=False), default="results", show_default=True)
+@json_option
+def doctor(results: str, as_json: bool) -> None:
+    """Look at what is installed, cached and writable, check a few numbers, and say what to do about each problem."""
+    from symtop import doctor as doctor_  # noqa: PLC0415
+
+    findings = doctor_.examine(Path(results))
+    if as_json:
+        click.echo(json.dumps([finding._asdict() for finding in findings], indent=1))
+    else:
+        click.echo(doctor_.page(findings))
+    if not all(finding.healthy for finding in findings):
         sys.exit(1)
 
 
@@ -205,6 +227,36 @@ def report(results: str, plugin_files: tuple[str, ...]) -> None:
 
     _load_plugins(plugin_files)
     click.echo(f"report: {page.write(Path(results))}")
+
+
+@main.command()
+@click.argument("scene")
+@click.option("--accuracy", type=float, required=True, help="The largest error you accept, for example 1e-6.")
+@click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
+@click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
+@click.option("--results", type=click.Path(file_okay=False), help="Folder with a stored work-precision study.")
+@plugin_option
+@json_option
+def recommend(
+    scene: str, accuracy: float, quantity: str, horizon: float | None, results: str | None,
+    plugin_files: tuple[str, ...], as_json: bool,
+) -> None:  # fmt: skip
+    """Find the cheapest integrator and step that meet an accuracy on a SCENE.
+
+    \b
+    symtop recommend spheroid --accuracy 1e-6
+    symtop recommend goldstein --accuracy 1e-3 --quantity attitude --horizon 1e4
+    symtop recommend mine --plugin my_scene.py --accuracy 1e-9
+    """
+    import dataclasses  # noqa: PLC0415
+
+    from symtop import advise  # noqa: PLC0415
+
+    _load_plugins(plugin_files)
+    advice = advise.recommend(scene, accuracy=accuracy, quantity=quantity, horizon=horizon, results=results)
+    click.echo(json.dumps(dataclasses.asdict(advice), indent=1) if as_json else str(advice))
+    if advice.integrator is None:
+        sys.exit(1)
 
 
 if __name__ == "__main__":

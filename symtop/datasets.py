@@ -4,16 +4,22 @@ Conventions are CF-1.11 where it applies. No compression: round-off does not com
 inside, so that equal inputs give equal bytes.
 """
 
+import contextlib
 import functools
+import glob
+import hashlib
 import importlib.metadata
 import json
 import os
 import platform
+import shutil
 import subprocess
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from symtop import __version__
@@ -33,6 +39,7 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "p_psi": ("momentum conjugate to psi, recomputed from the trajectory", "kg m2 s-1"),
 }
 
+LITTLE = 1_000_000  # bytes of a disk that count as none
 _DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")
 
 
@@ -105,30 +112,72 @@ def _plain(value: Any) -> Any:
     return json.dumps(value, sort_keys=True, default=str)
 
 
-def write(data: xr.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write a netCDF file so that it is whole or not there, whatever happens meanwhile."""
+@contextlib.contextmanager
+def replacing(path: str | os.PathLike[str], suffix: str = "") -> Iterator[Path]:
+    """A file to write to in place of `path`, which it replaces in one move if all goes well and not at all if not.
+
+    Raises SymtopError if the disk is full, the folder cannot be written to, or `path` is a folder.
+    """
     target = Path(path)
-    temporary = ""
+    partial = ""
+    if "\0" in str(target):
+        msg = f"a path must not hold a null character, as {str(target)!r} does"
+        raise SymtopError(msg)
     try:
         if target.is_dir():
             msg = f"cannot write {target}: it is a folder"
             raise SymtopError(msg)
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+        handle, partial = tempfile.mkstemp(prefix=f".{target.name}.", suffix=f".part{suffix}", dir=target.parent)
         os.close(handle)
-        encoding = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}
-        data.to_netcdf(temporary, engine="netcdf4", encoding=encoding)
-        with open(temporary, "rb") as written:  # noqa: PTH123
+        yield Path(partial)
+        with open(partial, "rb") as written:  # noqa: PTH123
             os.fsync(written.fileno())
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(target)
+        Path(partial).chmod(0o644)
+        Path(partial).replace(target)
     except OSError as error:
         msg = f"cannot write {target}: {error.strerror or error}"
         raise SymtopError(msg) from error
     finally:
-        if temporary:
-            Path(temporary).unlink(missing_ok=True)
-    return target
+        if partial:
+            Path(partial).unlink(missing_ok=True)
+
+
+def sweep(path: Path) -> None:
+    """Remove what writers that were killed have left of a file; for one who knows that nobody else is writing it."""
+    for left in path.parent.glob(f".{glob.escape(path.name)}.*.part*"):
+        left.unlink(missing_ok=True)
+
+
+def write(data: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write a netCDF file so that it is whole or not there, whatever happens meanwhile."""
+    encoding = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}
+    with replacing(path) as partial:
+        try:
+            data.to_netcdf(partial, engine="netcdf4", encoding=encoding)
+        except RuntimeError as error:  # the netCDF library's own word for a disk that is full
+            raise OSError(None, _room(partial.parent) or str(error)) from error
+    return Path(path)
+
+
+def _room(folder: Path) -> str:
+    """What to say if there is no room left in a folder; empty if there is."""
+    free = shutil.disk_usage(folder).free
+    return f"no room is left in {folder}" if free < LITTLE else ""
+
+
+def fingerprint(data: xr.Dataset) -> str:
+    """Hash of all values and their dimensions, so that a damaged or foreign file cannot pass for a good one."""
+    digest = hashlib.sha256()
+    for name in sorted(str(name) for name in data.variables):
+        variable = data[name]
+        values = np.ascontiguousarray(variable.values)
+        digest.update(f"{name}{variable.dims}{values.shape}".encode())
+        if values.dtype.kind in "OUT":  # text: kept as it is written, however it is stored
+            digest.update("\0".join(map(str, values.ravel())).encode())
+        else:
+            digest.update(values.dtype.kind.encode() + values.tobytes())
+    return digest.hexdigest()
 
 
 def read(path: str | os.PathLike[str]) -> xr.Dataset:

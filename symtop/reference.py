@@ -294,7 +294,7 @@ def _cached(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
     if path.is_file():
         try:
             found = datasets.read(path)
-            if found.attrs.pop("content", "") == _content(found):
+            if found.attrs.pop("content", "") == datasets.fingerprint(found):
                 return found
         except SymtopError:
             pass
@@ -302,19 +302,10 @@ def _cached(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
         warnings.warn(said, SymtopWarning, stacklevel=3)
     data = _compute(scene, times, precision)
     try:
-        datasets.write(data.assign_attrs(content=_content(data)), path)
+        datasets.write(data.assign_attrs(content=datasets.fingerprint(data)), path)
     except SymtopError as error:
         warnings.warn(f"the reference is not kept: {error}", SymtopWarning, stacklevel=3)
     return data
-
-
-def _content(data: xr.Dataset) -> str:
-    """Hash of all values, so that a damaged file cannot pass for a good one."""
-    digest = hashlib.sha256()
-    for name in sorted(str(name) for name in data.data_vars):
-        digest.update(name.encode())
-        digest.update(np.ascontiguousarray(data[name].values).tobytes())
-    return digest.hexdigest()
 
 
 def _cache_path(scene: Scene, times: charts.Array, precision: str) -> Path:

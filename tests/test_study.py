@@ -1,10 +1,15 @@
 """The runner: resumes, recomputes nothing, survives damaged files, and runs a user's plug-in through every study."""
 
 import dataclasses
+import importlib
 import json
+import linecache
+import shutil
+import sys
 from pathlib import Path
 
 import pytest
+import xarray as xr
 from click.testing import CliRunner
 
 import symtop
@@ -12,7 +17,11 @@ from symtop import datasets
 from symtop.cli import main
 from symtop.integrators import registry
 from symtop.integrators.registry import Integrator
+from symtop.measure import commutation
+from symtop.study import check, depends
 from symtop.study import run as runner
+from tests.commands import PROBE, ended
+from tests.commands import symtop as symtop_command
 
 PLUGIN = """\
 import symtop
@@ -79,6 +88,213 @@ def test_the_report_is_one_page_without_outside_references(results):
         assert outside not in text
     for name in runner.names():
         assert f'id="{name}"' in text
+
+
+# ---- what a case depends on ------------------------------------------------------------------------------------------
+
+
+def stale_after(edited: str, study) -> set[str]:
+    """Integrators of a study's cases whose digest changes with one file of the package."""
+    path = depends.PACKAGE / edited
+    assert path.is_file()
+    cases = study.cases(True)
+    before = [study.digest(case) for case in cases]
+    real = depends.file_hash
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(depends, "file_hash", lambda file: real(file) + ("edited" if file == path else ""))
+        after = [study.digest(case) for case in cases]
+    assert before == [study.digest(case) for case in cases]
+    return {case.integrator for case, one, two in zip(cases, before, after, strict=True) if one != two}
+
+
+GAUSS = {f"gauss-{order}" for order in (2, 4, 6, 8, 10, 12)}
+SCIPY = {"rk45", "dop853", "lsoda", "radau"}
+STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "trapezoidal-unreduced"}
+
+
+@pytest.mark.parametrize(
+    ("edited", "stale"),
+    [
+        ("integrators/gauss.py", GAUSS),
+        ("integrators/galerkin.py", {"galerkin-simpson"}),
+        ("integrators/unreduced.py", {"midpoint-unreduced", "trapezoidal-unreduced"}),
+        ("integrators/discrete_lagrangian.py", STRAIGHT | {"galerkin-simpson"}),
+        ("integrators/scipy_ivp.py", SCIPY),
+        ("integrators/dormand_prince.py", {"rk45-compiled"}),
+        ("integrators/runge_kutta.py", {"rk4", "rk45-compiled"}),
+        ("integrators/euler_lagrange.py", {"rk4", "rk45-compiled"} | SCIPY),
+        ("integrators/closed_form.py", {"exact"}),
+        ("integrators/taylor.py", {"taylor", "taylor-longdouble", "taylor-quad", "exact"}),
+        ("cli.py", set()),
+        ("report/figures.py", set()),
+        ("measure/accuracy.py", set()),
+    ],
+)
+def test_editing_a_kernel_makes_the_cases_that_use_it_stale_and_no_others(edited, stale):
+    """The drift study runs every integrator and compares with no reference, which is made by `taylor.py`."""
+    assert stale_after(edited, runner.load("drift")) == stale
+
+
+def test_what_all_cases_depend_on_makes_all_stale():
+    drift, convergence = runner.load("drift"), runner.load("convergence")
+    everyone = {case.integrator for case in drift.cases(True)}
+    for edited in ("top.py", "scenes.py", "simulate.py", "measure/conservation.py", "integrators/registry.py"):
+        assert stale_after(edited, drift) == everyone, edited
+    for edited in ("reference.py", "integrators/taylor.py", "measure/accuracy.py"):
+        assert stale_after(edited, convergence) == {case.integrator for case in convergence.cases(True)}, edited
+
+
+def test_a_study_that_asks_the_registry_depends_on_all_of_it_unless_it_says_what_it_uses():
+    reduction = runner.load("reduction")
+    twins = next(case for case in reduction.cases(True) if case.settings["part"] == "twins")
+    assert depends.used(reduction, twins) == sorted([twins.integrator, f"{twins.integrator}-unreduced"])
+    silent = dataclasses.replace(reduction, uses=None)
+    assert depends.used(silent, twins) == sorted(symtop.integrators())
+    drift = runner.load("drift")
+    starred = dataclasses.replace(drift.cases(True)[0], integrator="*")
+    assert depends.used(drift, starred) == sorted(symtop.integrators())
+
+
+LOOKUPS = ("convergence", "drift", "stability", "reduction", "truth")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LOOKUPS)
+def test_no_case_runs_an_integrator_that_it_is_not_said_to_depend_on(name, monkeypatch):
+    """Every quick case is measured with a registry that notes who is run."""
+    study, ran = runner.load(name), set()
+
+    def noting(method):
+        def solver(chart):
+            def solve(top, start, plan):
+                ran.add(method.name)
+                return method.solvers[chart](top, start, plan)
+
+            return solve
+
+        return dataclasses.replace(method, solvers={chart: solver(chart) for chart in method.solvers})
+
+    cases = study.cases(True)[::7]
+    allowed = {case.label: set(depends.used(study, case)) for case in cases}
+    known = registry.integrators()
+    rules = {n: m for n, m in known.items() if commutation.rule_of(m) is not None}  # told by the type of their solver
+    monkeypatch.setattr(registry, "_registry", {n: m if n in rules else noting(m) for n, m in known.items()})
+    for case in cases:
+        ran.clear()
+        study.measure(case)
+        assert ran <= allowed[case.label], case
+
+
+def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
+    script = tmp_path / "counted.py"
+    text = PROBE.read_text()
+    digests = set()
+    for version in (
+        text,
+        text.replace('"Energy."', '"Another caption."'),
+        text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 51\nMETHODS = ("),
+        text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 52\nMETHODS = ("),
+        text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(51)\n",
+        text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(53)\n",
+    ):
+        script.write_text(version)
+        sys.modules.pop("symtop_study_counted", None)
+        linecache.checkcache()
+        importlib.invalidate_caches()
+        shutil.rmtree(tmp_path / "__pycache__", ignore_errors=True)
+        study = runner.load(str(script))
+        digests.add(study.digest(study.cases(True)[0]))
+    assert len(digests) == 5
+
+
+@pytest.mark.slow
+def test_a_copy_of_the_package_with_one_kernel_edited(tmp_path):
+    """Through the command line: an edit, the status, and a run that computes what is stale and nothing else."""
+    for name in ("symtop", "studies"):
+        shutil.copytree(depends.PACKAGE.parent / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    words = ["study", PROBE, "--results", tmp_path / "r"]
+    assert ended(symtop_command(*words, PYTHONPATH=tmp_path))[0] == 0
+    with (tmp_path / "symtop" / "integrators" / "gauss.py").open("a") as file:
+        file.write("\n# edited\n")
+    code, out, _ = ended(symtop_command(*words, "--status", "--json", PYTHONPATH=tmp_path))
+    assert code == 0
+    rows = json.loads(out)["probe"]
+    assert {row["integrator"] for row in rows if row["state"] == "stale"} == {"gauss-4"}
+    assert sum(row["state"] == "done" for row in rows) == 10
+    code, out, _ = ended(symtop_command(*words, PYTHONPATH=tmp_path))
+    assert "2 of 12 cases computed" in out
+    code, out, _ = ended(symtop_command(*words, "--status", PYTHONPATH=tmp_path))
+    assert out == "probe: 12 done\n"
+
+
+# ---- status, fresh, check --------------------------------------------------------------------------------------------
+
+
+def probe(results, *words):
+    return CliRunner().invoke(main, ["study", str(PROBE), "--quick", "--results", str(results), *words])
+
+
+def test_status_says_what_is_missing_done_and_stale(tmp_path):
+    assert probe(tmp_path, "--status").output.startswith("probe: 4 missing\n")
+    assert not (tmp_path / "quick").exists()  # looking leaves nothing behind
+    assert probe(tmp_path).exit_code == 0
+    assert probe(tmp_path, "--status").output == "probe: 4 done\n"
+    case = next((tmp_path / "quick" / "cases" / "probe").glob("loop--midpoint*.nc"))
+    case.rename(case.with_name(f"loop--midpoint--{'0' * 20}.nc"))
+    rows = json.loads(probe(tmp_path, "--status", "--json").output)["probe"]
+    assert [row["state"] for row in rows] == ["done", "done", "stale", "done"]
+    assert "1 of 4 cases computed" in probe(tmp_path).output
+    assert not case.with_name(f"loop--midpoint--{'0' * 20}.nc").exists()
+
+
+def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_path):
+    assert probe(tmp_path).exit_code == 0
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    done = probe(tmp_path, "--fresh", "--json")
+    assert done.exit_code == 0
+    (said,) = json.loads(done.output)
+    assert said["computed"] == said["cases"] == 4
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+
+def test_every_file_says_where_it_comes_from(tmp_path):
+    assert probe(tmp_path).exit_code == 0
+    for path in (tmp_path / "quick").rglob("*.nc"):
+        data = datasets.read(path)
+        asked = set(datasets.provenance())
+        if path.parent.name == "probe":
+            asked |= {"study", "settings", "sources", "seed", "content"}
+            assert data.attrs["sources"] in path.name
+        assert asked <= set(data.attrs), path.name
+        assert not any("time" in key or "date" in key for key in data.attrs)
+
+
+def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
+    assert probe(tmp_path, "--check").exit_code == 2  # nothing is stored
+    assert probe(tmp_path).exit_code == 0
+    done = probe(tmp_path, "--check", "--fresh")
+    assert done.exit_code == 0, done.output
+    assert "4 of 4 cases computed again, the same to the last bit" in done.output
+    victim = next((tmp_path / "quick" / "cases" / "probe").glob("*.nc"))
+    data = datasets.read(victim)
+    data["energy"][3] += 1e-15
+    datasets.write(data.assign_attrs(content=datasets.fingerprint(data)), victim)  # well made, and wrong
+    done = probe(tmp_path, "--check", "--fresh")
+    assert done.exit_code == 1
+    assert "energy differs by up to" in done.output
+
+
+def test_differences_leave_out_times_and_nothing_else():
+    one = xr.Dataset({"axis": ("x", [1.0, float("nan")]), "seconds": ("x", [1.0, 2.0])}, attrs={"seed": 0})
+    assert check.differences(one, one.copy(deep=True)) == []
+    assert check.differences(one, one.assign(seconds=one["seconds"] * 2)) == []
+    assert check.differences(one, one.assign(axis=one["axis"] * 2)) == ["axis differs by up to 1"]
+    assert check.differences(one, one.drop_vars("axis")) == ["axis is in one of them only"]
+    assert check.differences(one, one.assign_attrs(seed=1)) == ["attribute seed differs: 0 and 1"]
+    assert len(check.differences(one, one.isel(x=[0]))) == 2  # also of the times: their shape
+
+
+# ---- failures --------------------------------------------------------------------------------------------------------
 
 
 def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):

@@ -2,8 +2,8 @@
 
 numba stamps a cached kernel with the file of the function itself and does not see edits in the files it
 calls, so an old kernel can return old numbers in silence. The cache folder is therefore named after a hash of
-every source file of this package, and of the file that a plug-in kernel comes from. A kernel found on disk
-loads in a few milliseconds; a cold one compiles in about half a second.
+every source file of this package that a kernel may come from, and of the file that a plug-in kernel comes from.
+A kernel found on disk loads in a few milliseconds; a cold one compiles in about half a second.
 """
 
 import functools
@@ -25,6 +25,7 @@ set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new
 
 PACKAGE = Path(__file__).resolve().parent.parent
 MOST_NEIGHBOURS = 100
+WITHOUT_KERNELS = ("study", "report", "cli.py", "doctor.py")  # a new caption need not compile anything again
 KEPT = 6  # cache folders of older sources that are kept, a few megabytes each
 
 
@@ -41,7 +42,10 @@ def source_digest() -> str:
     """Hash of the package's sources, 16 hexadecimal digits."""
     digest = hashlib.sha256()
     for path in sorted(PACKAGE.rglob("*.py")):
-        digest.update(str(path.relative_to(PACKAGE)).encode())
+        place = path.relative_to(PACKAGE)
+        if place.parts[0] in WITHOUT_KERNELS:
+            continue
+        digest.update(str(place).encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 

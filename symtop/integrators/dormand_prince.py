@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from symtop.integrators.angles import chart_outcome
 from symtop.integrators.compiled import compile_kernel, register_jitable
-from symtop.integrators.euler_lagrange import field_angles, momenta, to_angles, unreduced
+from symtop.integrators.euler_lagrange import LEAST_TOLERANCE, as_run, field_angles, unreduced
 from symtop.integrators.outcomes import NOT_FINITE, OK, OUT_OF_BUDGET, OUTCOMES, STEP_TOO_SMALL
 from symtop.integrators.registry import Array, Integrator, Plan, Run
 from symtop.integrators.runge_kutta import later_stages, store, weighted
@@ -30,7 +30,6 @@ from symtop.top import Angles, SymmetricTop
 
 BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
 EVALUATIONS = 2_000_000_000  # a run's limit: about two minutes
-LEAST_TOLERANCE = 2.3e-14  # 100 eps, where SciPy draws the line
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 
@@ -186,14 +185,6 @@ def walk(top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_
         if outcome == OK and t < plan.horizon and evaluations > EVALUATIONS:
             outcome = OUT_OF_BUDGET
     return Walk(found, ends[:steps], steps, evaluations, OUTCOMES[outcome], plan.horizon if outcome == OK else t)
-
-
-def as_run(
-    top: SymmetricTop, times: Array, found: Array, steps: int, evaluations: int, outcome: str, reached: float
-) -> Run:
-    """Samples of the unreduced state, shape (samples, 6), with p_theta and both momenta recomputed from the rates."""
-    p_phi, p_psi = momenta(top, found[:, 0], found[:, 4], found[:, 5])
-    return Run(to_angles(top, times, found), p_phi, p_psi, steps, evaluations, 0, outcome, reached)
 
 
 def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:

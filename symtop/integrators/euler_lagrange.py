@@ -18,8 +18,10 @@ import numpy as np
 
 from symtop.integrators.angles import require_chart
 from symtop.integrators.compiled import register_jitable
-from symtop.integrators.registry import Array
+from symtop.integrators.registry import Array, Run
 from symtop.top import Angles, SymmetricTop
+
+LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws the line
 
 
 class UnreducedTop(NamedTuple):
@@ -72,3 +74,11 @@ def observe_angles(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> A
 def to_angles(par: Any, times: Array, states: Array) -> Array:
     """Unreduced states, shape (samples, 6), as (theta, p_theta, phi, psi), the angles chart of `simulate`."""
     return np.stack([states[:, 0], par.I1 * states[:, 3], states[:, 1], states[:, 2]], axis=-1)
+
+
+def as_run(
+    top: SymmetricTop, times: Array, found: Array, steps: int, evaluations: int, outcome: str, reached: float
+) -> Run:
+    """Samples of the unreduced state, shape (samples, 6), with p_theta and both momenta recomputed from the rates."""
+    p_phi, p_psi = momenta(top, found[:, 0], found[:, 4], found[:, 5])
+    return Run(to_angles(top, times, found), p_phi, p_psi, steps, evaluations, 0, outcome, reached)

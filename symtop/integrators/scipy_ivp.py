@@ -20,8 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from symtop.integrators.dormand_prince import LEAST_TOLERANCE, as_run
-from symtop.integrators.euler_lagrange import accelerations, unreduced
+from symtop.integrators.euler_lagrange import LEAST_TOLERANCE, accelerations, as_run, unreduced
 from symtop.integrators.registry import Integrator, Plan, Run, Solver
 from symtop.top import Angles, SymmetricTop
 

@@ -4,8 +4,6 @@ Colours are those of Okabe and Ito, told apart by readers with any common colour
 marker or a line style of its own, and methods that run in plain Python are dashed wherever cost is drawn.
 """
 
-import os
-import tempfile
 import zlib
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +11,8 @@ from typing import Any, NamedTuple
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+
+from symtop import datasets
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
@@ -130,16 +130,10 @@ def compact(path: str | Path) -> None:
 
 def save(figure: Any, target: Path) -> None:
     """Write a figure as a compact PNG, whole or not at all, and close it."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, partial = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part.png", dir=target.parent)
-    os.close(handle)
-    try:
+    datasets.sweep(target)
+    with datasets.replacing(target, ".png") as partial:
         figure.savefig(partial, metadata={"Software": None})
         compact(partial)
-        Path(partial).chmod(0o644)
-        Path(partial).replace(target)
-    finally:
-        Path(partial).unlink(missing_ok=True)
     plt.close(figure)
 
 

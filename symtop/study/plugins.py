@@ -16,10 +16,15 @@ _owners: dict[str, str] = {}
 
 def load(path: str | Path) -> None:
     """Run a plug-in file once; what it registers is then known to every study and command."""
-    file = Path(path).resolve()
+    file = Path(path).absolute()
+    try:
+        file = file.resolve()
+        there = file.is_file()
+    except (OSError, ValueError):  # a name that is too long, or holds a null character
+        there = False
     if file in _loaded:
         return
-    if not file.is_file():
+    if not there:
         msg = f"plugin must be a Python file, not {str(path)!r}"
         raise SymtopError(msg)
     before = set(integrators()) | set(scenes())

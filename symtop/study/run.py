@@ -1,22 +1,16 @@
 """The runner: measures the cases that are missing, combines them, draws, and writes down what it found.
 
 A case is computed only if no file holds its digest, so that an interrupted study resumes and an unchanged one
-ends in seconds. Untimed cases share all cores through spawned processes; timed ones run alone. A study may have
-a second round of cases, made from what the first one found.
+ends in seconds. Untimed cases share all cores; timed ones run alone. A study may have a second round of cases, made
+from what the first one found. Two runs may share one folder: each case is computed by one of them.
 """
 
 import contextlib
 import hashlib
-import importlib.util
-import multiprocessing
-import os
-import signal
 import sys
-import threading
 import time
-import traceback
 from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,119 +18,74 @@ import xarray as xr
 from tqdm import tqdm
 
 from symtop import datasets
-from symtop.checks import SymtopError, one_of
+from symtop.checks import SymtopError, positive
 from symtop.study import plugins, store
+from symtop.study.execute import execute
+from symtop.study.pools import Workers
+from symtop.study.scripts import file_of, folder, load, names
 from symtop.study.study import Case, Picture, Study
+from symtop.study.work import Result, Task
 
-WORTH_A_POOL = 8  # cases; starting a worker costs two seconds
+__all__ = ["folder", "load", "names", "run", "status"]
 
-
-def folder() -> Path:
-    """The folder of study scripts: beside the package, or in the working directory."""
-    for place in (Path(__file__).resolve().parents[2] / "studies", Path.cwd() / "studies"):
-        if place.is_dir():
-            return place
-    msg = "no folder of study scripts was found beside the package or in the working directory"
-    raise SymtopError(msg)
+DONE, FAILED, STALE, MISSING = STATES = ("done", "failed", "stale", "missing")
 
 
-def names() -> list[str]:
-    """Names of all studies, in the order of the report."""
-    order = ["truth", "convergence", "work_precision", "drift", "stability", "reduction"]
-    found = sorted(path.stem for path in folder().glob("*.py") if not path.stem.startswith("_"))
-    return [name for name in order if name in found] + [name for name in found if name not in order]
+@dataclass
+class Round:
+    """Cases of a study, what is known of them, and what computing them has brought."""
 
+    study: Study
+    results: Path
+    done: dict[Path, tuple[Case, xr.Dataset]] = field(default_factory=dict)
+    paths: dict[Path, Case] = field(default_factory=dict)
+    failures: list[str] = field(default_factory=list)
+    computed: int = 0
 
-def load(name: str) -> Study:
-    """The study of that name."""
-    file = folder() / f"{one_of('study', name, names())}.py"
-    module_name = f"symtop_study_{name}"
-    if module_name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(module_name, file)
-        if spec is None or spec.loader is None:
-            msg = f"study {name!r} cannot be loaded"
+    def add(self, cases: Iterable[Case], *, fresh: bool) -> dict[Path, Case]:
+        """Take cases in; returns those that have to be computed."""
+        new = {store.case_path(self.results, self.study, case): case for case in cases}
+        self.paths |= new
+        if not fresh:
+            self._look(new)
+        return {path: case for path, case in new.items() if path not in self.done}
+
+    def _look(self, paths: dict[Path, Case]) -> None:
+        found = {path: data for path in paths if (data := store.load_case(path)) is not None}
+        self.done |= {path: (paths[path], data) for path, data in found.items()}
+
+    def compute(self, missing: dict[Path, Case], workers: Workers, limit: float, *, fresh: bool, quiet: bool) -> None:
+        """Have cases computed, with a progress bar where somebody is watching."""
+        script = str(file_of(self.study.name))
+        tasks = [Task(script, case, str(path), tuple(plugins.loaded()), limit, fresh) for path, case in missing.items()]
+        with _bar(self.study.name, len(tasks), quiet=quiet) as bar:
+
+            def heard(_: Task, result: Result) -> None:
+                if result.state == "failed":
+                    self.failures.append(result.message)
+                    bar.set_postfix_str(f"{len(self.failures)} failed", refresh=False)
+                self.computed += result.state == "computed"
+                bar.update()
+
+            execute(self.study, tasks, workers, heard)
+        self._look(missing)
+
+    def in_order(self) -> list[tuple[Case, xr.Dataset]]:
+        """Cases and what they measured, in the order of the grid."""
+        return [self.done[path] for path in self.paths if path in self.done]
+
+    def combined(self) -> xr.Dataset:
+        """One dataset of all that was measured."""
+        if not self.done:
+            why = self.failures[0] if self.failures else "the grid is empty"
+            msg = f"study {self.study.name}: no case could be measured; {why}"
             raise SymtopError(msg)
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[module_name] = module
-        spec.loader.exec_module(module)
-    found = sys.modules[module_name].STUDY
-    assert isinstance(found, Study)  # noqa: S101
-    return found
+        return store.combine(self.in_order())
 
 
-def _measure(name: str, case: Case, path: str, plugin_files: list[str]) -> None:
-    """Compute one case and store it; runs in a worker process as well as in this one."""
-    for file in plugin_files:
-        plugins.load(file)
-    study = load(name)
-    data = study.measure(case)
-    title = f"{study.name}: {case.integrator} on {case.scene}"
-    datasets.write(datasets.describe(data, title, settings=dict(case.settings)), path)
-
-
-def _measure_all(study: Study, missing: dict[Path, Case], jobs: int, quiet: bool) -> list[str]:
-    """Compute all missing cases; returns one sentence for each that failed."""
-    failures: list[str] = []
-    with tqdm(total=len(missing), desc=study.name, unit="case", disable=quiet or None, leave=False) as bar:
-        if jobs == 1:
-            for path, case in missing.items():
-                bar.set_postfix_str(case.label)
-                try:
-                    _measure(study.name, case, str(path), plugins.loaded())
-                except Exception as error:  # noqa: BLE001  (a failing case must not stop the others)
-                    failures.append(_failure(case, error))
-                bar.update()
-            return failures
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(jobs, context, _obey, (os.getpid(),)) as pool, _dropping(pool):
-            futures: dict[Future[None], Case] = {
-                pool.submit(_measure, study.name, case, str(path), plugins.loaded()): case
-                for path, case in missing.items()
-            }
-            for future in as_completed(futures):
-                problem = future.exception()
-                if problem is not None:
-                    failures.append(_failure(futures[future], problem))
-                bar.update()
-    return failures
-
-
-def _obey(parent: int) -> None:
-    """In a worker: leave interrupts to the parent, and end with it however it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-@contextlib.contextmanager
-def _dropping(pool: ProcessPoolExecutor) -> Iterator[None]:
-    """On an interrupt, finish what is being computed and drop the rest of the queue."""
-    try:
-        yield
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
-
-
-def _failure(case: Case, error: BaseException) -> str:
-    shown = str(error) if isinstance(error, SymtopError) else "".join(traceback.format_exception_only(error))
-    last = " ".join(shown.split())
-    return f"{case.integrator} on {case.scene} failed: {last}"
-
-
-def _job_count(study: Study, cases: Iterable[Case], jobs: int | None) -> int:
-    """One process for timed studies, few cases, and methods or scenes that only this process knows."""
-    chosen = list(cases)
-    ours = {name for case in chosen for name in (case.scene, case.integrator)}
-    alone = study.timed or any(case.timed for case in chosen)
-    if alone or len(chosen) < WORTH_A_POOL or any(plugins.is_local(name) for name in ours):
-        return 1
-    return max(1, min(jobs or os.cpu_count() or 1, len(chosen)))
+def _bar(name: str, total: int, *, quiet: bool) -> Any:
+    unseen = quiet or sys.stderr is None or not sys.stderr.isatty() or total == 0
+    return tqdm(total=total, desc=name, unit="case", disable=unseen, leave=False)
 
 
 def _stamp(study: Study, digests: Iterable[str]) -> str:
@@ -146,7 +95,7 @@ def _stamp(study: Study, digests: Iterable[str]) -> str:
         digest.update(datasets.provenance()["processor"].encode())
     package = Path(__file__).resolve().parents[1]
     for path in [
-        folder() / f"{study.name}.py",
+        file_of(study.name),
         package / "study" / "store.py",
         *sorted((package / "report").glob("*.py")),
     ]:
@@ -154,38 +103,64 @@ def _stamp(study: Study, digests: Iterable[str]) -> str:
     return digest.hexdigest()[:20]
 
 
+def _drawn(study: Study, results: Path, stamp: str) -> dict[str, Any] | None:
+    """The findings of an earlier run, if they and all their pictures are still good."""
+    before = store.read_json(results / f"{study.name}.json")
+    if not isinstance(before, dict) or before.get("stamp") != stamp:
+        return None
+    try:
+        pictures = [results / "figures" / picture["file"] for picture in before["pictures"]]
+    except (KeyError, TypeError):
+        return None
+    return before if all(file.is_file() for file in [*pictures, results / f"{study.name}.nc"]) else None
+
+
+@contextlib.contextmanager
+def _hired(workers: Workers | None, jobs: int | None) -> Iterator[Workers]:
+    """Those workers, or some of our own for as long as it takes."""
+    if workers is not None:
+        yield workers
+        return
+    with Workers(jobs) as own:
+        yield own
+
+
 def run(study: Study, results: Path, *, quick: bool = False, fresh: bool = False, jobs: int | None = None,
-        quiet: bool = False) -> dict[str, Any]:  # fmt: skip
-    """Bring a study's dataset, figures and findings up to date; returns the findings."""
-    cases = study.cases(quick)
-    paths = {store.case_path(results, study, case): case for case in cases}
-    done: dict[Path, xr.Dataset] = {}
-    if not fresh:
-        done = {path: data for path in paths if (data := store.load_case(path)) is not None}
-    missing = {path: case for path, case in paths.items() if path not in done}
-    findings_path = results / f"{study.name}.json"
-    stamp = _stamp(study, sorted(path.name for path in paths))
-    before = store.read_json(findings_path)
-    drawn = before is not None and before.get("stamp") == stamp
-    drawn = drawn and all((results / "figures" / picture["file"]).is_file() for picture in before["pictures"])
-    if drawn and not missing and (results / f"{study.name}.nc").is_file():
-        return {**before, "computed": 0}
-    failures = _measure_all(study, missing, _job_count(study, missing.values(), jobs), quiet)
-    done |= {path: data for path in missing if (data := store.load_case(path)) is not None}
-    if not done:
-        msg = f"study {study.name}: no case could be measured; {failures[0] if failures else 'the grid is empty'}"
-        raise SymtopError(msg)
-    found = [(case, done[path]) for path, case in paths.items() if path in done]
-    if study.follow_up is not None:
-        later = {store.case_path(results, study, case): case for case in study.follow_up(store.combine(found))}
-        undone = {path: case for path, case in later.items() if fresh or store.load_case(path) is None}
-        failures += _measure_all(study, undone, _job_count(study, undone.values(), jobs), quiet)
-        found += [(case, data) for path, case in later.items() if (data := store.load_case(path)) is not None]
-        paths, missing = paths | later, missing | undone
-    combined = datasets.describe(store.combine(found), study.title, question=study.question)
+        quiet: bool = False, workers: Workers | None = None, limit: float | None = None) -> dict[str, Any]:  # fmt: skip
+    """Bring a study's dataset, figures and findings up to date; returns the findings.
+
+    `limit` is the time a case may take, in seconds (the study's own by default). Cases that fail are named in
+    ``failures``, recorded beside the others with their traceback, and tried again the next time.
+    Raises SymtopError if the results cannot be written or nothing could be measured.
+    """
+    began = time.monotonic()
+    results = results.resolve()
+    seconds = study.limit if limit is None else positive("limit", limit)
+    store.prepare(results, study)
+    known = Round(study, results)
+    missing = known.add(study.cases(quick), fresh=fresh)
+    stamp = _stamp(study, sorted(path.name for path in known.paths))
+    before = _drawn(study, results, stamp)
+    if before is not None and not missing:
+        return {**before, "computed": 0, "seconds": time.monotonic() - began}
+    with _hired(workers, jobs) as hired:
+        known.compute(missing, hired, seconds, fresh=fresh, quiet=quiet)
+        if study.follow_up is not None:
+            later = known.add(study.follow_up(known.combined()), fresh=fresh)
+            known.compute(later, hired, seconds, fresh=fresh, quiet=quiet)
+    with store.claim(results / f"{study.name}.nc", wait=True):
+        findings = _conclude(known, stamp, quick=quick)
+    return {**findings, "computed": known.computed, "seconds": time.monotonic() - began}
+
+
+def _conclude(known: Round, stamp: str, *, quick: bool) -> dict[str, Any]:
+    """Combine, draw, judge and write."""
+    study, results = known.study, known.results
+    for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
+        datasets.sweep(file)
+    combined = datasets.describe(known.combined(), study.title, question=study.question)
     datasets.write(combined, results / f"{study.name}.nc")
-    _forget(results, study, paths)
-    pictures = [_save(results, study, picture) for picture in study.pictures(combined)]
+    store.forget(results, study, known.paths)
     findings = {
         "study": study.name,
         "title": study.title,
@@ -193,25 +168,43 @@ def run(study: Study, results: Path, *, quick: bool = False, fresh: bool = False
         "how_to_read": study.how_to_read,
         "verdict": study.verdict(combined),
         "tables": [table._asdict() for table in study.tables(combined)],
-        "pictures": pictures,
         "charts": [chart._asdict() for chart in study.charts(combined)],
-        "failures": failures,
-        "cases": len(paths),
+        "pictures": [_save(results, study, picture) for picture in study.pictures(combined)],
+        "failures": known.failures,
+        "cases": len(known.paths),
         "quick": quick,
-        "stamp": stamp if not failures else "",
+        "stamp": stamp if not known.failures else "",
         "provenance": datasets.provenance(),
     }
-    store.write_json(findings_path, findings)
-    return {**findings, "computed": len(missing)}
+    store.write_json(results / f"{study.name}.json", findings)
+    return findings
 
 
-def _forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
-    """Remove what newer files of the same scene and method replace; cases that were not asked for stay."""
-    wanted = {path.name: path.name.rpartition("--")[0] for path in keep}
-    labels = set(wanted.values())
-    for path in (results / "cases" / study.name).glob("*.nc"):
-        if path.name not in wanted and path.name.rpartition("--")[0] in labels:
-            path.unlink(missing_ok=True)
+def status(study: Study, results: Path, *, quick: bool = False) -> list[dict[str, str]]:
+    """What is known of every case: ``done``, ``failed``, ``stale`` (its sources have changed) or ``missing``.
+
+    The second round of a study is known only when its first is done.
+    """
+    known = Round(study, results.resolve())
+    missing = known.add(study.cases(quick), fresh=False)
+    if study.follow_up is not None and not missing:
+        known.add(study.follow_up(known.combined()), fresh=False)
+    older = {store.label_of(path) for path in store.superseded(known.results, study, known.paths)}
+    rows = []
+    for path, case in known.paths.items():
+        record = store.read_json(store.failure_path(path))
+        state = (
+            DONE
+            if path in known.done
+            else FAILED
+            if isinstance(record, dict)
+            else STALE
+            if store.label_of(path) in older
+            else MISSING
+        )
+        message = str(record.get("message", "")) if state == FAILED and isinstance(record, dict) else ""
+        rows.append({"scene": case.scene, "integrator": case.integrator, "state": state, "message": message})
+    return rows
 
 
 def _save(results: Path, study: Study, picture: Picture) -> dict[str, str]:

@@ -1,15 +1,22 @@
 """Where a study's results live: one file a case, one dataset a study, written whole or not at all.
 
-results/cases/STUDY/SCENE--INTEGRATOR--DIGEST.nc     what one case measured
-results/STUDY.nc                                     all of them, with labelled dimensions
-results/STUDY.json                                   verdict, tables and captions for the report
+results/cases/STUDY/SCENE--INTEGRATOR--DIGEST.nc             what one case measured
+results/cases/STUDY/SCENE--INTEGRATOR--DIGEST.failed.json    or how it failed, with its traceback
+results/cases/STUDY/.SCENE--INTEGRATOR--DIGEST.lock          while it is being computed
+results/STUDY.nc                                             all of them, with labelled dimensions
+results/STUDY.json                                           verdict, tables and captions for the report
 results/figures/STUDY-NAME.png
+
+A case's file holds the digest of what it was made from and a hash of its values: a truncated, damaged or foreign file
+counts as none. The lock is the operating system's, so that it ends with the process that holds it, however that ends.
 """
 
+import contextlib
 import json
 import math
 import os
 import tempfile
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,10 +28,58 @@ from symtop import datasets
 from symtop.checks import SymtopError
 from symtop.study.study import Case, Study
 
+try:
+    import fcntl
+except ImportError:  # no such locks here: two runs may then compute a case twice, and write the same file
+    fcntl = None  # type: ignore[assignment]
+
+SEED = 0  # of the order in which batches are timed; nothing else here is random
+
 
 def case_path(results: Path, study: Study, case: Case) -> Path:
     """The file of a case; its name holds the digest of everything the numbers depend on."""
     return results / "cases" / study.name / f"{case.label}--{study.digest(case)}.nc"
+
+
+def digest_of(path: Path) -> str:
+    """The digest in the name of a case's file."""
+    return path.name.partition(".nc")[0].rpartition("--")[2]
+
+
+def label_of(path: Path) -> str:
+    """The scene and integrator in the name of a case's file."""
+    return path.name.rpartition("--")[0]
+
+
+def prepare(results: Path, study: Study) -> None:
+    """Make the folders of a study and see that they can be written to, before hours are spent on computing."""
+    for folder in (results / "cases" / study.name, results / "figures"):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder) as trial:
+                trial.write(b"symtop")
+        except OSError as error:
+            msg = f"cannot write into {folder}: {error.strerror or error}"
+            raise SymtopError(msg) from error
+    for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
+        if file.is_dir():
+            msg = f"cannot write {file}: it is a folder"
+            raise SymtopError(msg)
+
+
+def save_case(data: xr.Dataset, path: Path, study: Study, case: Case) -> None:
+    """Store what a case measured, with what it was made from."""
+    described = datasets.describe(
+        data,
+        f"{study.name}: {case.integrator} on {case.scene}",
+        study=study.name,
+        settings=dict(case.settings),
+        sources=digest_of(path),
+        seed=SEED,
+        content=datasets.fingerprint(data),
+    )
+    datasets.write(described, path)
+    failure_path(path).unlink(missing_ok=True)
 
 
 def load_case(path: Path) -> xr.Dataset | None:
@@ -32,9 +87,85 @@ def load_case(path: Path) -> xr.Dataset | None:
     if not path.is_file():
         return None
     try:
-        return datasets.read(path)
+        data = datasets.read(path)
     except SymtopError:
         return None
+    whole = data.attrs.get("sources") == digest_of(path) and data.attrs.get("content") == datasets.fingerprint(data)
+    return data if whole else None
+
+
+def failure_path(path: Path) -> Path:
+    """Where the failure of a case is recorded."""
+    return path.with_name(f"{path.name.removesuffix('.nc')}.failed.json")
+
+
+def save_failure(path: Path, case: Case, message: str, trace: str) -> None:
+    """Record how a case failed; a file that an earlier run may have left is no longer its result."""
+    write_json(
+        failure_path(path),
+        {
+            "scene": case.scene,
+            "integrator": case.integrator,
+            "settings": dict(case.settings),
+            "message": message,
+            "traceback": trace.splitlines(),
+        },
+    )
+    path.unlink(missing_ok=True)
+
+
+def lock_path(path: Path) -> Path:
+    """The lock of a case, or of a study's dataset."""
+    return path.with_name(f".{path.name.removesuffix('.nc')}.lock")
+
+
+@contextlib.contextmanager
+def claim(path: Path, *, wait: bool) -> Iterator[bool]:
+    """Hold a file's lock, so that nobody else computes it; yields False if somebody else holds it and `wait` is false.
+
+    The lock's file is there while it is held, and afterwards if its holder was killed (see `was_begun`).
+    """
+    if fcntl is None:
+        yield True
+        return
+    lock = lock_path(path)
+    while True:
+        try:
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            handle = os.open(lock, os.O_CREAT | os.O_RDWR, 0o644)
+        except OSError as error:
+            msg = f"cannot write {lock}: {error.strerror or error}"
+            raise SymtopError(msg) from error
+        try:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            except BlockingIOError:
+                yield False
+                return
+            if not _is_file(handle, lock):  # its holder removed it while we waited
+                continue
+            try:
+                yield True
+            finally:
+                lock.unlink(missing_ok=True)
+            return
+        finally:
+            os.close(handle)
+
+
+def _is_file(handle: int, path: Path) -> bool:
+    try:
+        return os.fstat(handle).st_ino == path.stat().st_ino
+    except FileNotFoundError:
+        return False
+
+
+def was_begun(path: Path) -> bool:
+    """Did somebody begin to compute a case, and end before it was done?"""
+    if fcntl is None or not lock_path(path).is_file():
+        return False
+    with claim(path, wait=False) as ours:
+        return ours
 
 
 def combine(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
@@ -84,15 +215,8 @@ def _apart(case: Case, data: xr.Dataset) -> list[tuple[Case, xr.Dataset]]:
 
 def write_text(path: Path, text: str) -> None:
     """Replace a small text file in one move."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    finally:
-        Path(name).unlink(missing_ok=True)
+    with datasets.replacing(path) as partial:
+        partial.write_text(text, encoding="utf-8")
 
 
 def write_json(path: Path, content: Any) -> None:
@@ -106,3 +230,31 @@ def read_json(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
+
+
+def superseded(results: Path, study: Study, keep: Iterable[Path]) -> list[Path]:
+    """Files of the same scene and integrator with another digest; cases that were not asked for are none of them."""
+    wanted = {path.name for path in keep}
+    labels = {label_of(path) for path in keep}
+    found = sorted((results / "cases" / study.name).glob("[!.]*.nc"))
+    return [path for path in found if path.name not in wanted and label_of(path) in labels]
+
+
+def forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
+    """Remove what newer files replace, and what killed writers left."""
+    keep = list(keep)
+    for path in superseded(results, study, keep):
+        path.unlink(missing_ok=True)
+        failure_path(path).unlink(missing_ok=True)
+    wanted = {failure_path(path).name for path in keep}
+    labels = {label_of(path) for path in keep}
+    cases = results / "cases" / study.name
+    for path in cases.glob("[!.]*.failed.json"):
+        if path.name not in wanted and label_of(path) in labels:
+            path.unlink(missing_ok=True)
+    for lock in cases.glob(".*.lock"):  # each of them is held, or was by somebody who was killed
+        path = lock.with_name(f"{lock.name[1:].removesuffix('.lock')}.nc")
+        with claim(path, wait=False) as ours:
+            if ours:
+                datasets.sweep(path)
+                path.with_name(f".{path.name.removesuffix('.nc')}.trace").unlink(missing_ok=True)

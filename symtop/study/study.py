@@ -4,32 +4,14 @@ A study is a question, a grid of cases, a function that measures one case, and f
 dataset into figures, tables and sentences. It holds no numerics of its own.
 """
 
-import hashlib
-import inspect
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import xarray as xr
 
-from symtop import datasets
-
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-NUMERICS = (
-    "top.py",
-    "charts.py",
-    "scenes.py",
-    "exact*.py",
-    "pairs.py",
-    "reference.py",
-    "simulate.py",
-    "integrators/*.py",
-    "measure/*.py",
-)
 
 
 class Picture(NamedTuple):
@@ -104,41 +86,15 @@ class Study:
     charts: Callable[[xr.Dataset], list[Chart]] = lambda _: []
     timed: bool = False  # all cases are
     follow_up: Callable[[xr.Dataset], list[Case]] | None = None  # a second round, made from what the first one found
+    uses: Callable[[Case], Sequence[str]] | None = None  # integrators a case runs; "*" for all; None: found out
+    limit: float = 3600.0  # seconds after which a case counts as hanging
 
     def digest(self, case: Case) -> str:
         """Hash of everything the case's numbers depend on: settings, the way of measuring, sources, versions."""
-        from symtop.study import plugins  # noqa: PLC0415
+        from symtop.study import depends  # noqa: PLC0415
 
-        content = [
-            json.dumps([self.name, case.scene, case.integrator, dict(case.settings)], sort_keys=True),
-            _source(self.measure),
-            numerics_digest(),
-            plugins.digest_of(case.scene),
-            plugins.digest_of(case.integrator),
-            *(plugins.digest_of(name) for name in case.settings.get("integrators", ())),
-            datasets.provenance()["dependencies"],
-            datasets.provenance()["processor"] if self.timed or case.timed else "",
-        ]
-        return hashlib.sha256("\n".join(content).encode()).hexdigest()[:20]
+        return depends.digest(self, case)
 
-
-def _source(function: Callable[..., Any]) -> str:
-    try:
-        return inspect.getsource(function)
-    except (OSError, TypeError):
-        return repr(function)
-
-
-_digests: dict[Path, str] = {}
-
-
-def numerics_digest() -> str:
-    """Hash of the package's numerical sources."""
-    package = Path(__file__).resolve().parent.parent
-    if package not in _digests:
-        digest = hashlib.sha256()
-        for pattern in NUMERICS:
-            for path in sorted(package.glob(pattern)):
-                digest.update(path.read_bytes())
-        _digests[package] = digest.hexdigest()
-    return _digests[package]
+    def is_timed(self, case: Case) -> bool:
+        """Must the case run alone, on a machine that does nothing else?"""
+        return self.timed or case.timed

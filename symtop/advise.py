@@ -1,0 +1,279 @@
+"""Which integrator, with which step: the cheapest method that meets an accuracy, found in stored data and then tried.
+
+    1. A stored work-precision study lists the methods that were cheapest on the scene most like this one. Scenes are
+       compared by dimensionless numbers that fix the motion of the axis: cos(theta) of both turning points and both
+       momenta over sqrt(I1 mgl). Without stored data every compiled method is a candidate.
+    2. Each candidate's setting is sought on a dozen nutations of the scene itself, against the closed form, for a
+       target lowered by the law of growth (see `symtop.measure.meet`), and its run is timed.
+    3. The cheapest are run to the whole horizon, as far as a budget of evaluations allows, and their settings
+       corrected.
+
+Advice that was run to the end and met the accuracy with a margin is ``checked``; what was not run to the end is
+``extrapolated``; when nothing meets the accuracy there is no integrator and the confidence is ``none``.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.checks import SymtopError, one_of, positive
+from symtop.integrators.registry import Integrator, integrators
+from symtop.measure import meet
+from symtop.measure.errors import QUANTITIES
+from symtop.measure.phase import FREQUENCIES
+from symtop.scenes import Scene, scene, scenes
+from symtop.simulate import MOST_STEPS
+
+ASKED = (*QUANTITIES, *FREQUENCIES)
+STORED = Path("results") / "work_precision.nc"
+CANDIDATES = 8  # of the stored study that are tried
+FINALISTS = 3  # that are run to the whole horizon
+TOO_DEAR = 40.0  # times the evaluations of the cheapest candidate so far: not tried
+MARGIN = 0.8  # of the accuracy that a checked run must meet at its samples; between them the error may be larger
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What to use: an integrator with its step or tolerance, and how sure that is.
+
+    `expected_error` is the largest error of `quantity` expected over `horizon`, `seconds` the wall time of the bare
+    run on this machine. `fails` says of methods that were tried why they are not the answer.
+    """
+
+    scene: str
+    quantity: str
+    accuracy: float
+    horizon: float
+    integrator: str | None
+    step_size: float | None
+    tolerance: float | None
+    expected_error: float
+    seconds: float
+    confidence: str
+    reason: str
+    runner_up: str = ""
+    fails: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return "\n".join(
+            [
+                self.reason,
+                *([f"Runner-up: {self.runner_up}"] if self.runner_up else []),
+                *(["Not: " + "; ".join(self.fails) + "."] if self.fails else []),
+            ]
+        )
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A candidate with its setting, its error as expected at the horizon, and the cost of the whole run."""
+
+    met: meet.Met
+    error: float
+    seconds: float
+    checked: bool
+
+    @property
+    def name(self) -> str:
+        return self.met.integrator.name
+
+    def words(self) -> str:
+        knob = "step size" if self.met.integrator.knob == "step_size" else "tolerance"
+        return f"{self.name} with {knob} {self.met.setting:.4g}"
+
+
+def regime(where: Scene) -> np.ndarray:
+    """Dimensionless numbers of a scene's motion: cos(theta) of both turning points, both momenta in asinh."""
+    top, start = where.top, where.start
+    low, high = sorted(top.turning_cosines(start))
+    unit = math.sqrt(top.I1 * max(abs(top.mgl), np.finfo(float).tiny))
+    momenta = top.momenta(start)
+    return np.array([low, high, math.asinh(momenta.p_psi / unit), math.asinh(momenta.p_phi / unit)])
+
+
+def recommend(
+    where: "str | Scene",
+    *,
+    accuracy: float,
+    quantity: str = "axis",
+    horizon: float | None = None,
+    results: str | Path | None = None,
+) -> Advice:
+    """The cheapest method, with its step or tolerance, that keeps the error of `quantity` below `accuracy`.
+
+    `where` is a Scene or the name of one; `horizon` its own by default; `results` a folder with a stored
+    ``work_precision.nc`` (default: ``results`` if it is there). Raises SymtopError for arguments that make no sense;
+    when no method is good enough, the advice says so. It runs what it recommends, which takes from a tenth of a second
+    to half a minute.
+    """
+    chosen = where if isinstance(where, Scene) else scene(where)
+    wanted = positive("accuracy", accuracy)
+    if wanted >= math.pi:
+        msg = f"accuracy must be below pi, beyond which every angle is right, not {wanted!r}"
+        raise SymtopError(msg)
+    one_of("quantity", quantity, ASKED)
+    end = chosen.horizon if horizon is None else positive("horizon", horizon)
+    data = _stored(results)
+    names, source = _candidates(chosen, wanted, quantity, end, data)
+    trials: list[_Trial] = []
+    fails: list[str] = []
+    known, patience = integrators(), math.inf
+    for name in sorted(names, key=lambda name: -(known[name].order or 0)):  # the cheap ones first, to bound the others
+        found = _try(chosen, known[name], wanted, quantity, end, names[name], patience)
+        if isinstance(found, _Trial):
+            trials.append(found)
+            patience = min(patience, TOO_DEAR * found.met.evaluations)
+        else:
+            fails.append(found)
+    trials.sort(key=lambda trial: trial.seconds)
+    finalists = [_confirm(chosen, trial, wanted, quantity, end) for trial in trials[:FINALISTS]]
+    best = sorted((trial for trial in finalists if trial is not None), key=lambda trial: trial.seconds)
+    ranked = best or trials[FINALISTS:]
+    return _advice(chosen, wanted, quantity, end, ranked, tuple(fails), source)
+
+
+def _stored(results: str | Path | None) -> xr.Dataset | None:
+    file = STORED if results is None else Path(results) / STORED.name
+    if not file.is_file():
+        if results is not None:
+            msg = f"results holds no {STORED.name}: {str(results)!r}; run symtop study work_precision first"
+            raise SymtopError(msg)
+        return None
+    try:
+        with xr.open_dataset(file) as data:
+            return data.load()
+    except (OSError, ValueError) as error:
+        msg = f"{file} cannot be read ({error}); run symtop study work_precision --fresh"
+        raise SymtopError(msg) from error
+
+
+def _usable(quantity: str) -> dict[str, Integrator]:
+    """Methods that can be recommended: compiled, with a knob, showing what is asked."""
+    needed = meet.observed(quantity)
+    return {
+        name: method
+        for name, method in integrators().items()
+        if method.knob is not None and method.tier == "compiled" and (needed == "axis" or _shows_attitude(method))
+    }
+
+
+def _shows_attitude(method: Integrator) -> bool:
+    return bool({"angles", "attitude"} & set(method.solvers))
+
+
+def _candidates(
+    where: Scene, accuracy: float, quantity: str, horizon: float, data: xr.Dataset | None
+) -> tuple[dict[str, float | None], str]:
+    """Names to try, each with a setting to begin with, and where they came from."""
+    usable = _usable(quantity)
+    everyone: dict[str, float | None] = dict.fromkeys(usable)
+    if data is None or quantity not in data:
+        return everyone, f"tried all {len(everyone)} compiled methods (no stored study was found)"
+    known = {name: scenes()[name] for name in map(str, data["scene"].values) if name in scenes()}
+    if not known:
+        return everyone, f"tried all {len(everyone)} compiled methods (the stored study holds no known scene)"
+    here = regime(where)
+    nearest = min(known, key=lambda name: float(np.sum((regime(known[name]) - here) ** 2)))
+    cell = data.sel(scene=nearest)
+    if "horizon" in cell.dims:
+        periods = horizon / where.nutation_period
+        cell = cell.isel(horizon=int(np.argmin(np.abs(np.log(cell["periods"].values / max(periods, 1e-3))))))
+    ranked: list[tuple[float, str, float | None]] = []
+    for name in map(str, cell["integrator"].values):
+        if name not in usable:
+            continue
+        row = cell.sel(integrator=name)
+        good = np.flatnonzero((row[quantity].values <= accuracy) & np.isfinite(row["seconds"].values))
+        if good.size:
+            best = good[np.argmin(row["seconds"].values[good])]
+            ranked.append((float(row["seconds"].values[best]), name, _setting(row, int(best), where, known[nearest])))
+    if not ranked:
+        return (
+            everyone,
+            f"tried all {len(everyone)} compiled methods (none met it on {nearest}, the nearest stored scene)",
+        )
+    chosen = {name: guess for _, name, guess in sorted(ranked)[:CANDIDATES]}
+    return chosen, f"tried the {len(chosen)} methods that are cheapest on {nearest}, the nearest stored scene"
+
+
+def _setting(row: xr.Dataset, place: int, where: Scene, stored: Scene) -> float:
+    """A stored setting in the time scale of this scene."""
+    step = float(row["step_size"].values[place])
+    if not math.isfinite(step):
+        return float(row["tolerance"].values[place])
+    scale = where.nutation_period / stored.nutation_period
+    return step * scale if math.isfinite(scale) and scale > 0.0 else step
+
+
+def _try(
+    where: Scene,
+    method: Integrator,
+    accuracy: float,
+    quantity: str,
+    horizon: float,
+    guess: float | None,
+    patience: float,
+) -> "_Trial | str":
+    """A candidate's setting and cost from a short run, or a sentence on why it has none."""
+    period = where.nutation_period
+    short = min(horizon, meet.SHORT * period) if math.isfinite(period) else horizon
+    law = (short / horizon) ** meet.growth(method, quantity)
+    found = meet.search(where, method, accuracy * law, quantity, short, guess, patience)
+    if found is None:
+        return f"{method.name} does not get there within {TOO_DEAR:g} times the work"
+    if method.knob == "step_size" and horizon / found.setting > MOST_STEPS:
+        return f"{method.name} would need {horizon / found.setting:.0e} steps"
+    return _Trial(found, found.error / law, meet.seconds(where, found, quantity, horizon), checked=False)
+
+
+def _confirm(where: Scene, trial: _Trial, accuracy: float, quantity: str, horizon: float) -> _Trial | None:
+    """The trial run to the whole horizon, its setting corrected; as it was if that is too long, None if it fails."""
+    met = trial.met
+    if met.evaluations * horizon / met.horizon > meet.MOST_EVALUATIONS[met.integrator.tier]:
+        return trial
+    found = meet.search(where, met.integrator, MARGIN * accuracy, quantity, horizon, met.setting)
+    if found is None:
+        return None
+    sure = found.error + found.bound <= accuracy
+    return _Trial(found, found.error, meet.seconds(where, found, quantity, horizon), checked=sure)
+
+
+def _advice(
+    where: Scene,
+    accuracy: float,
+    quantity: str,
+    horizon: float,
+    ranked: Sequence[_Trial],
+    fails: tuple[str, ...],
+    source: str,
+) -> Advice:
+    asked: dict[str, Any] = {"scene": where.name, "quantity": quantity, "accuracy": accuracy, "horizon": horizon}
+    goal = f"{quantity} error {accuracy:g} on {where.name} to t = {horizon:g}"
+    if not ranked:
+        reason = f"Nothing that was tried meets {goal}; {source}. The closed form, integrator exact, takes no steps."
+        nothing: dict[str, Any] = {"integrator": None, "step_size": None, "tolerance": None, "confidence": "none"}
+        return Advice(**asked, **nothing, expected_error=math.nan, seconds=math.nan, reason=reason, fails=fails)
+    best = ranked[0]
+    how = "measured to the end" if best.checked else "extrapolated from a short run"
+    reason = f"{best.words()} meets {goal}: error {best.error:.2g} ({how}) in {best.seconds:.2g} s; {source}."
+    runner = ""
+    if len(ranked) > 1:
+        runner = f"{ranked[1].words()}, {ranked[1].seconds / best.seconds:.2g} times the time."
+    step = best.met.integrator.knob == "step_size"
+    return Advice(
+        **asked,
+        integrator=best.name,
+        step_size=best.met.setting if step else None,
+        tolerance=None if step else best.met.setting,
+        expected_error=best.error,
+        seconds=best.seconds,
+        confidence="checked" if best.checked else "extrapolated",
+        reason=reason,
+        runner_up=runner,
+        fails=fails,
+    )

@@ -1,0 +1,133 @@
+"""The coarsest setting at which a method meets an accuracy on a scene: found by running it, on a short horizon first.
+
+The error of a quantity over a horizon T follows C T^a h^p: p the order, a the law of growth (energy and momenta 0 and
+angles 1 for maps that are symplectic or symmetric, 1 and 2 for the others). So a setting is sought in a few secant
+steps on log error against log setting; over a short horizon first, with the target scaled by that law, then over all.
+"""
+
+import math
+from typing import NamedTuple
+
+from symtop.integrators.registry import Integrator
+from symtop.measure.accuracy import error_row
+from symtop.measure.timing import bare_run, timings
+from symtop.scenes import Scene
+from symtop.simulate import choose_chart
+
+SHORT = 12.37  # nutations of a trial run
+AIM = 0.5  # of the target: what the secant steers for
+LEAST, TRIES = 0.3, 9  # an error between LEAST times the target and the target ends the search
+COARSEST = 0.25  # of the horizon: the longest step that is tried
+LOOSEST = 0.4
+MOST_EVALUATIONS = {"compiled": 3e8, "python": 3e5}  # of one run
+FLAT = 1.3  # a halved setting that gains less has met rounding
+
+
+class Met(NamedTuple):
+    """A setting, the largest error measured with it over `horizon`, what the reference can judge, and how it ended."""
+
+    integrator: Integrator
+    setting: float
+    error: float
+    bound: float
+    horizon: float
+    evaluations: float
+    outcome: str
+
+
+def observed(quantity: str) -> str:
+    """What must be observed to see a quantity: the attitude only for itself."""
+    return "attitude" if quantity == "attitude" else "axis"
+
+
+def growth(method: Integrator, quantity: str) -> int:
+    """The exponent a of the error's growth with the horizon that the method's traits promise."""
+    angles = quantity in ("axis", "attitude", "theta")
+    rates = quantity in ("nutation_period", "precession_rate")
+    structured = bool(method.symplectic) or bool(method.symmetric)
+    return (1 if angles else 0) + (0 if structured else 1) - (1 if rates and not structured else 0)
+
+
+def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Met:
+    """One run; the error of a run that failed is infinite."""
+    phases = quantity in ("nutation_period", "precession_rate")
+    row = error_row(scene, method, setting, horizon, observed(quantity), phases=phases)
+    error, outcome = float(row[quantity]), str(row["outcome"])
+    error = error if outcome == "ok" and math.isfinite(error) else math.inf
+    return Met(
+        method, setting, error, float(row[f"{quantity}_bound"]), horizon, float(row["force_evaluations"]), outcome
+    )
+
+
+def first_guess(scene: Scene, method: Integrator, horizon: float, accuracy: float) -> float:
+    """A setting to begin with when nothing is known: error about (h/period)^p, or about the tolerance."""
+    if method.knob == "tolerance":
+        return min(max(0.1 * accuracy, method.least_tolerance * 1.01), LOOSEST)
+    period = scene.nutation_period if math.isfinite(scene.nutation_period) else horizon / 8.0
+    return float(min(0.2 * period * accuracy ** (1.0 / (method.order or 2)), COARSEST * horizon))
+
+
+def search(
+    scene: Scene,
+    method: Integrator,
+    accuracy: float,
+    quantity: str,
+    horizon: float,
+    guess: float | None = None,
+    patience: float = math.inf,
+) -> Met | None:
+    """The coarsest setting found that meets the accuracy over the horizon; None if rounding or the budget forbid it.
+
+    No run is begun that would take more than `patience` force evaluations.
+    """
+    patience = min(patience, MOST_EVALUATIONS[method.tier])
+    step = method.knob == "step_size"
+    power = float(method.order or 2) if step else 1.0
+    least, most = (0.0, COARSEST * horizon) if step else (method.least_tolerance * 1.001, LOOSEST)
+    setting = min(max(guess or first_guess(scene, method, horizon, accuracy), least), most)
+    if step and horizon / setting > patience:
+        return None
+    best, last, failing = None, None, math.inf  # failing: the finest setting known to miss the target
+    for _ in range(TRIES):
+        found = attempt(scene, method, setting, horizon, quantity)
+        if found.error <= accuracy:
+            best = found if best is None or setting > best.setting else best
+            if found.error >= LEAST * accuracy or setting >= most:
+                break
+        else:
+            failing = min(failing, setting)
+            if last is not None and last.setting > setting and last.error < FLAT * found.error:
+                break  # a finer setting that gains nothing has met rounding
+        power = _slope(last, found, power, float(method.order or 12))
+        last, setting = found, min(max(setting * _factor(found.error, accuracy, power, step=step), least), most)
+        if best is not None and setting >= failing:
+            setting = math.sqrt(best.setting * failing)
+            if failing < 1.15 * best.setting:
+                break
+        work = found.evaluations * (last.setting / setting if step else 1.0)
+        if setting == last.setting or work > patience:
+            break
+    return best
+
+
+def _slope(last: Met | None, found: Met, power: float, order: float) -> float:
+    """The local order between two runs, where they show one."""
+    if last is None or last.setting == found.setting or not 0.0 < found.error < math.inf or not last.error < math.inf:
+        return power
+    seen = math.log(max(last.error, 1e-300) / found.error) / math.log(last.setting / found.setting)
+    return float(min(max(seen, 0.5), 2.0 * order))
+
+
+def _factor(error: float, accuracy: float, power: float, *, step: bool) -> float:
+    """By how much to change a setting whose error is known."""
+    if math.isinf(error):
+        return 0.4 if step else 0.01
+    factor = (AIM * accuracy / max(error, 1e-3 * accuracy)) ** (1.0 / power)
+    return float(min(max(factor, 0.02 if step else 1e-5), 8.0 if step else 1e4))
+
+
+def seconds(scene: Scene, found: Met, quantity: str, horizon: float) -> float:
+    """Wall time of a bare run to a horizon with a setting: measured, or scaled from the run it was found by."""
+    chart = choose_chart(found.integrator, observed(quantity))
+    run = timings([bare_run(scene, found.integrator, chart, found.setting, found.horizon)], batches=3, batch=0.004)
+    return float(run[0].best) * horizon / found.horizon
