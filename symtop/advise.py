@@ -60,13 +60,8 @@ class Advice:
     fails: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        return "\n".join(
-            [
-                self.reason,
-                *([f"Runner-up: {self.runner_up}"] if self.runner_up else []),
-                *(["Not: " + "; ".join(self.fails) + "."] if self.fails else []),
-            ]
-        )
+        runner = [f"Runner-up: {self.runner_up}"] if self.runner_up else []
+        return "\n".join([self.reason, *runner, *self.fails])
 
 
 @dataclass(frozen=True)
@@ -121,7 +116,7 @@ def recommend(
     data = _stored(results)
     names, source = _candidates(chosen, wanted, quantity, end, data)
     trials: list[_Trial] = []
-    fails: list[str] = []
+    fails: dict[str, list[str]] = {}
     known, patience = integrators(), math.inf
     for name in sorted(names, key=lambda name: -(known[name].order or 0)):  # the cheap ones first, to bound the others
         found = _try(chosen, known[name], wanted, quantity, end, names[name], patience)
@@ -129,12 +124,13 @@ def recommend(
             trials.append(found)
             patience = min(patience, TOO_DEAR * found.met.evaluations)
         else:
-            fails.append(found)
+            fails.setdefault(found, []).append(name)
     trials.sort(key=lambda trial: trial.seconds)
     finalists = [_confirm(chosen, trial, wanted, quantity, end) for trial in trials[:FINALISTS]]
     best = sorted((trial for trial in finalists if trial is not None), key=lambda trial: trial.seconds)
     ranked = best or trials[FINALISTS:]
-    return _advice(chosen, wanted, quantity, end, ranked, tuple(fails), source)
+    why = tuple(f"{reason}: {', '.join(which)}." for reason, which in fails.items())
+    return _advice(chosen, wanted, quantity, end, ranked, why, source)
 
 
 def _stored(results: str | Path | None) -> xr.Dataset | None:
@@ -225,9 +221,9 @@ def _try(
     law = (short / horizon) ** meet.growth(method, quantity)
     found = meet.search(where, method, accuracy * law, quantity, short, guess, patience)
     if found is None:
-        return f"{method.name} does not get there within {TOO_DEAR:g} times the work"
+        return f"Not within {TOO_DEAR:g} times the work of the best"
     if method.knob == "step_size" and horizon / found.setting > MOST_STEPS:
-        return f"{method.name} would need {horizon / found.setting:.0e} steps"
+        return f"Would need more than {MOST_STEPS:.0e} steps"
     return _Trial(found, found.error / law, meet.seconds(where, found, quantity, horizon), checked=False)
 
 
