@@ -166,8 +166,9 @@ class Crossing(NamedTuple):
     first: str
     second: str
     share: float  # of the common range, in the logarithm of cost
-    cheapest_won: float  # seconds of the cheapest and
-    dearest_won: float  # of the dearest cost at which the first is better; NaN if none
+    at_least: bool  # is the first better at the least common cost,
+    at_most: bool  # at the largest?
+    dearest_won: float  # the largest cost at which the first is better; NaN if none
     error: float  # energy error of the first where its lead is largest (or its lag smallest)
     gain: float  # ratio of the energy errors there, second over first
 
@@ -197,10 +198,9 @@ def crossing(
     ahead, best = ours < theirs, int(np.argmax(theirs - ours))
     won = np.exp(at[ahead]) if ahead.any() else np.array([np.nan])
     name = str(cell["scene"].values)
-    gain = float(np.exp(theirs[best] - ours[best]))
-    return Crossing(
-        name, first, second, float(ahead.mean()), float(won[0]), float(won[-1]), float(np.exp(ours[best])), gain
-    )
+    gain, error = float(np.exp(theirs[best] - ours[best])), float(np.exp(ours[best]))
+    ends = bool(ahead[0]), bool(ahead[-1])
+    return Crossing(name, first, second, float(ahead.mean()), *ends, float(won[-1]), error, gain)
 
 
 def growth_at_equal_settings(own: xr.Dataset, quantity: str, far: int = -1) -> float:
