@@ -272,7 +272,8 @@ def test_kill_9_at_random_moments(tmp_path, studies, longest):
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(draw.uniform(0.5, longest))
         if process.returncode is None:
-            (process.kill if draw.random() < 0.5 else lambda: os.killpg(process.pid, signal.SIGKILL))()
+            alone = draw.random() < 0.5
+            (os.kill if alone else os.killpg)(process.pid, signal.SIGKILL)
             kills += 1
         process.communicate()
         time.sleep(1.5)  # workers whose parent was killed have ended by then
