@@ -275,6 +275,7 @@ def _from_axis(scene: Scene, plan: Plan, run: Run) -> dict[str, Any]:
 def _from_attitude(scene: Scene, plan: Plan, run: Run) -> dict[str, Any]:
     quaternion, momentum = run.states[:, :4], run.states[:, 4:]
     theta, phi, psi = charts.angles_from_quaternion(quaternion)
+    node = momentum[:, 0] * np.cos(phi) + momentum[:, 1] * np.sin(phi)  # before phi grows and loses digits
     truth = closed_form(scene)(plan.times)
     phi, psi = charts.unwrapped(phi, truth.phi), charts.unwrapped(psi, truth.psi)
     axis = charts.axis_from_quaternion(quaternion)
@@ -285,7 +286,7 @@ def _from_attitude(scene: Scene, plan: Plan, run: Run) -> dict[str, Any]:
         "axis": axis,
         "quaternion": quaternion,
         "energy": space_energy(scene.top, axis, momentum, run.p_psi),
-        "p_theta": momentum[:, 0] * np.cos(phi) + momentum[:, 1] * np.sin(phi),
+        "p_theta": node,
         "p_phi": run.p_phi,
         "p_psi": run.p_psi,
     }

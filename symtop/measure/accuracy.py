@@ -1,13 +1,14 @@
 """Error against step or tolerance: the table that convergence and work-precision studies are made of."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 
 from symtop.integrators.registry import Integrator
-from symtop.measure.errors import QUANTITIES, energy_scale, errors, momentum_scale
+from symtop.measure.errors import QUANTITIES, attitude_error, energy_scale, errors, momentum_scale
+from symtop.measure.phase import phase
 from symtop.reference import reference
 from symtop.scenes import Scene
 from symtop.simulate import simulate
@@ -63,20 +64,48 @@ def error_table(
         if enough:
             rows.append(dict.fromkeys(rows[-1], math.nan) | {"outcome": "not_run", "tier": method.tier})
             continue
-        knob = knobs(method, setting)
-        run = simulate(scene, method, **knob, horizon=horizon, samples=SAMPLES, observe=observe, guard=False)
-        truth = reference(scene, run["time"].values, precision="closed-form")
-        found = errors(scene, run, truth)
-        row: dict[str, float | str] = {name: run.attrs[name] for name in _COUNTS}
-        failed = run.attrs["outcome"] != "ok"
-        for name in QUANTITIES:
-            values = found[name].values if name in found else np.array([math.nan])
-            row[name] = math.nan if failed else float(np.max(values))
-            row[f"{name}_end"] = math.nan if failed else float(values[-1])
-            row[f"{name}_bound"] = judge_limit(scene, truth, name)
-        rows.append(row)
-        enough = run.attrs["force_evaluations"] > ENOUGH[method.tier]
+        rows.append(error_row(scene, method, setting, horizon, observe))
+        enough = float(rows[-1]["force_evaluations"]) > ENOUGH[method.tier]
+    return as_table(rows)
+
+
+def as_table(rows: Sequence[Mapping[str, float | str]]) -> xr.Dataset:
+    """Rows with the same entries as one dataset over ``setting``."""
     return xr.Dataset({name: ("setting", [row[name] for row in rows]) for name in rows[0]})
+
+
+def error_row(
+    scene: Scene,
+    method: Integrator,
+    setting: float,
+    horizon: float,
+    observe: str | None = None,
+    *,
+    phases: bool = False,
+) -> dict[str, float | str]:
+    """One run's entries in an error table.
+
+    With `phases` also its frequencies, shape error and lags (see `phase`), and, if the chart that shows what is
+    observed does not show the attitude, the attitude error of a second run in the chart that does.
+    """
+    knob = knobs(method, setting)
+    run = simulate(scene, method, **knob, horizon=horizon, samples=SAMPLES, observe=observe, guard=False)
+    truth = reference(scene, run["time"].values, precision="closed-form")
+    found = errors(scene, run, truth)
+    row: dict[str, float | str] = {name: run.attrs[name] for name in _COUNTS}
+    failed = run.attrs["outcome"] != "ok"
+    for name in QUANTITIES:
+        values = found[name].values if name in found else np.array([math.nan])
+        row[name] = math.nan if failed else float(np.max(values))
+        row[f"{name}_end"] = math.nan if failed else float(values[-1])
+        row[f"{name}_bound"] = judge_limit(scene, truth, name)
+    if not phases:
+        return row
+    if not failed and "attitude" not in found:
+        wide = simulate(scene, method, **knob, horizon=horizon, samples=SAMPLES, observe="attitude", guard=False)
+        values = attitude_error(wide, truth)
+        row["attitude"], row["attitude_end"] = float(np.max(values)), float(values[-1])
+    return row | phase(scene, run, truth)._asdict()
 
 
 _COUNTS = (

@@ -54,15 +54,15 @@ def _found(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> dict[str, charts
         "p_phi": np.abs(run["p_phi"].values - truth["p_phi"].values) / momentum_scale(scene),
         "p_psi": np.abs(run["p_psi"].values - truth["p_psi"].values) / momentum_scale(scene),
     }
-    attitude = _quaternion(run)
-    if attitude is not None:
-        found["attitude"] = charts.attitude_distance(attitude, truth["quaternion"].values)
+    if "quaternion" in run or "psi" in run:
+        found["attitude"] = attitude_error(run, truth)
     return found
 
 
-def _quaternion(run: xr.Dataset) -> charts.Array | None:
+def attitude_error(run: xr.Dataset, truth: xr.Dataset) -> charts.Array:
+    """Angle between the attitudes of a run that shows them and of the truth, at every sample."""
     if "quaternion" in run:
-        return run["quaternion"].values
-    if "psi" in run:
-        return charts.quaternion_from_angles(run["theta"].values, run["phi"].values, run["psi"].values)
-    return None
+        attitude = run["quaternion"].values
+    else:
+        attitude = charts.quaternion_from_angles(run["theta"].values, run["phi"].values, run["psi"].values)
+    return charts.attitude_distance(attitude, truth["quaternion"].values)

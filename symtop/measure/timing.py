@@ -3,23 +3,25 @@
 The first call (compilation, caches) is stored apart. After it, calls are made in batches that last at least
 `BATCH` seconds, several functions interleaved in random order so that a slow spell of the machine hits all of
 them; every batch is kept. The minimum is the estimate (noise only adds), the spread says how far to trust it.
+Batches come in rounds: one of every function, shuffled, then the next round. Samples of one round are neighbours in
+time, and the ratio of two of them is worth more than the ratio of two minima.
 """
 
+import math
 import random
 import statistics
 import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import xarray as xr
-
 from symtop.integrators.registry import Integrator, Run
 from symtop.measure.accuracy import knobs
 from symtop.scenes import Scene
-from symtop.simulate import choose_chart, make_plan
+from symtop.simulate import make_plan
 
 BATCH = 0.02  # seconds
-CLEAR = 2e-4  # seconds
+CLEAR = 1e-3  # seconds: a trial that long shows how many calls make a batch
+STRIDE = 16  # the calls of a trial grow at most so much
 NOISY = 0.25  # relative spread beyond which a timing is not called reliable
 
 
@@ -52,6 +54,14 @@ def _batch(function: Callable[[], object], calls: int) -> float:
     return time.perf_counter() - start
 
 
+def _calibrate(function: Callable[[], object], batch: float) -> int:
+    """How many calls last at least `batch` seconds, and a little more."""
+    count = 1
+    while (elapsed := _batch(function, count)) < min(CLEAR, batch):
+        count *= max(2, min(STRIDE, int(1.2 * CLEAR / max(elapsed, 1e-9))))
+    return max(1, math.ceil(1.15 * count * batch / elapsed)) if elapsed < batch else count
+
+
 def timings(
     functions: Sequence[Callable[[], object]], batches: int = 5, batch: float = BATCH, seed: int = 0
 ) -> list[Timing]:
@@ -59,17 +69,12 @@ def timings(
     firsts, calls = [], []
     for function in functions:
         firsts.append(_batch(function, 1))
-        count = 1
-        while (elapsed := _batch(function, count)) < batch:
-            count = max(2 * count, int(1.2 * count * batch / max(elapsed, 1e-9)))
-            if elapsed > CLEAR:  # long enough to trust the estimate without a trial
-                break
-        calls.append(count)
-    order = [index for index in range(len(functions)) for _ in range(batches)]
-    random.Random(seed).shuffle(order)  # noqa: S311
+        calls.append(_calibrate(function, batch))
+    draw = random.Random(seed)  # noqa: S311
     samples: list[list[float]] = [[] for _ in functions]
-    for index in order:
-        samples[index].append(_batch(functions[index], calls[index]) / calls[index])
+    for _ in range(batches):
+        for index in draw.sample(range(len(functions)), len(functions)):
+            samples[index].append(_batch(functions[index], calls[index]) / calls[index])
     return [Timing(tuple(found), first) for found, first in zip(samples, firsts, strict=True)]
 
 
@@ -78,28 +83,3 @@ def bare_run(scene: Scene, method: Integrator, chart: str, setting: float, horiz
     plan, _ = make_plan(scene, method, horizon=horizon, samples=2, **knobs(method, setting))
     solve = method.solvers[chart]
     return lambda: solve(scene.top, scene.start, plan)
-
-
-def time_settings(
-    scene: Scene,
-    method: Integrator,
-    settings: Sequence[float],
-    horizon: float,
-    observe: str,
-    batches: int = 5,
-    batch: float = BATCH,
-) -> xr.Dataset:
-    """Seconds of one run at each setting, without any observables: dimension ``setting`` (and ``batch``).
-
-    ``seconds`` is the smallest batch, ``seconds_samples`` are all of them, ``reliable`` 1 where the spread allows a
-    verdict. The settings of one method are interleaved; other methods are timed before and after.
-    """
-    chart = choose_chart(method, observe)
-    found = timings([bare_run(scene, method, chart, setting, horizon) for setting in settings], batches, batch)
-    return xr.Dataset(
-        {
-            "seconds": ("setting", [timing.best for timing in found]),
-            "seconds_samples": (("setting", "batch"), [timing.samples for timing in found]),
-            "reliable": ("setting", [float(timing.reliable) for timing in found]),
-        }
-    )

@@ -1,0 +1,174 @@
+"""What kind of error it is: the wrong shape, the right shape too early, or the right shape turned too far.
+
+The height u = cos(theta) of the axis obeys u'^2 = (1 - u^2)(alpha - beta u) - (b - a u)^2, so (u, u'/omega), with
+omega = 2 pi/T, runs round one closed curve, smooth even where the axis grazes a pole. From a sample (t; u, u', phi):
+
+    tau             time at which the true motion is nearest to (u, u'/omega): Gauss-Newton from a table of one nutation
+    shape           the distance that is left, in units of the axis's length: no shift in time and no turn removes it
+    nutation lag    omega (tau - t), rad
+    precession lag  sin(theta) (phi - phi_true(tau)), rad: how far the axis is turned about the vertical, lag apart
+
+To first order the axis error is made of these three. If the run's mean frequencies are wrong by constants, then tau - t
+= s t + ..., phi - phi_true(tau) = r t + ... and, with W the true mean precession,
+
+    nutation period   |1/(1 + s) - 1|              precession rate   |W s + r| / |W|,
+
+where s and r are slopes of least-squares lines over all samples, that of r weighted by sin^2(theta) because phi means
+little near a pole. A steady precession has no nutation: its period and its nutation lag are NaN. Between samples the
+nutation lag must change by less than half a nutation, or it is counted on the wrong branch; whether a pole is passed on
+its right or left is not told apart. Not to be confused with the
+error at equal times, which for a periodic motion is mostly lag and grows with the horizon while the shape does not.
+"""
+
+import functools
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure.verdicts import STEADY
+from symtop.scenes import Scene, closed_form
+from symtop.top import Angles, SymmetricTop
+
+FREQUENCIES: dict[str, str] = {
+    "nutation_period": "relative error of nutation period",
+    "precession_rate": "relative error of precession rate",
+}
+PARTS: dict[str, str] = {
+    "shape": "shape error (axis lengths)",
+    "nutation_lag": "nutation lag (rad)",
+    "precession_lag": "precession lag (rad)",
+}
+TABLE = 256  # points of the true curve from which the search for tau starts
+SWEEPS = 4  # of Gauss-Newton: the error falls from 1e-2 to rounding in three
+CLEAR = 0.25  # of the largest sin(theta): nearer to a pole, the branch of phi is taken from the neighbours
+LEAST_RATE = 1e-3  # of omega: below it a mean precession is an accident, and its errors are relative to this
+EPSILON = float(np.finfo(float).eps)
+Array = Any
+
+
+class Phase(NamedTuple):
+    """Largest shape error and lags of a run, errors of its frequencies, and what the reference can judge of these."""
+
+    shape: float
+    nutation_lag: float
+    precession_lag: float
+    nutation_period: float
+    precession_rate: float
+    nutation_period_bound: float
+    precession_rate_bound: float
+
+
+class Split(NamedTuple):
+    """Shape error, nutation lag (time, the sign of early) and precession lag (of phi, rad) at every sample."""
+
+    shape: Array
+    lag: Array
+    turn: Array
+
+
+def _curve(scene: Scene, times: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """u, u', u'', phi and phi' of the true motion."""
+    motion = closed_form(scene)(times)
+    momenta, top = scene.top.momenta(scene.start), scene.top
+    u, sine = np.cos(motion.theta), np.sin(motion.theta)
+    a, b, beta = momenta.p_psi / top.I1, momenta.p_phi / top.I1, 2.0 * top.mgl / top.I1
+    alpha = (2.0 * top.energy(scene.start) - momenta.p_psi**2 / top.I3) / top.I1
+    bend = a * (b - a * u) - u * (alpha - beta * u) - 0.5 * beta * (1.0 - u * u)
+    return u, -sine * motion.theta_dot, bend, motion.phi, motion.phi_dot
+
+
+@functools.lru_cache(maxsize=64)
+def _table(top: SymmetricTop, start: Angles) -> tuple[Array, Array, Array]:
+    """Times of one nutation and the true curve there."""
+    scene = Scene("table", top, start, 1.0)
+    period = scene.nutation_period
+    times = period * np.arange(TABLE) / TABLE
+    u, du, *_ = _curve(scene, times)
+    return times, u, du * period / (2.0 * math.pi)
+
+
+def nutates(scene: Scene) -> bool:
+    """Does the true motion have a nutation to speak of, and one that returns?"""
+    low, high = closed_form(scene).theta_range
+    return high - low > STEADY and math.isfinite(scene.nutation_period)
+
+
+def split(scene: Scene, run: xr.Dataset) -> Split:
+    """Shape error and lags at every sample (n,) of a run without failures."""
+    t, phi = run["time"].values, run["phi"].values
+    u = np.cos(run["theta"].values)
+    du = -np.sin(run["theta"].values) * run["p_theta"].values / scene.top.I1
+    period = scene.nutation_period
+    omega = 2.0 * math.pi / period if math.isfinite(period) else 1.0
+    if not nutates(scene):
+        u_true, du_true, _, phi_true, _ = _curve(scene, t)
+        return Split(np.hypot(u - u_true, (du - du_true) / omega), np.full(t.size, math.nan), phi - phi_true)
+    times, u_table, w_table = _table(scene.top, scene.start)
+    w = du / omega
+    nearest = np.argmin((u[:, None] - u_table) ** 2 + (w[:, None] - w_table) ** 2, axis=1)
+    early = times[nearest] - t
+    early -= period * np.rint(early / period)
+    tau, rest = t + early, np.zeros(t.size)
+    for _ in range(SWEEPS):
+        tau = tau + np.clip(rest, -period / 16.0, period / 16.0)
+        u_true, du_true, bend, phi_true, rate = _curve(scene, tau)
+        x, y, along, across = u - u_true, w - du_true / omega, du_true, bend / omega
+        rest = (x * along + y * across) / (along * along + across * across)
+    lag = (tau - t) + rest  # the last correction is not added to tau, whose last digit is too coarse for it
+    turns = np.rint((np.unwrap(lag, period=period) - lag) / period)
+    off = np.abs(x * across - y * along) / np.hypot(along, across)
+    turn = phi - phi_true - rate * rest - turns * closed_form(scene).phi_per_period
+    return Split(off, lag + turns * period, _steadied(t, turn, np.sqrt(np.maximum(1.0 - u_true * u_true, 0.0))))
+
+
+def _steadied(t: Array, turn: Array, sine: Array) -> Array:
+    """The lag without whole turns that it seems to make while the axis is next to a pole, where phi may jump by pi."""
+    clear = sine > CLEAR * np.max(sine)
+    guide = np.interp(t, t[clear], np.unwrap(turn[clear]))
+    steadied: Array = turn - 2.0 * math.pi * np.rint((turn - guide) / (2.0 * math.pi))
+    return steadied
+
+
+def _slope(t: Array, values: Array, weights: Array) -> float:
+    """Weighted least-squares slope."""
+    middle = t - np.average(t, weights=weights)
+    return float(np.sum(weights * middle * values) / np.sum(weights * middle * middle))
+
+
+def _doubt(t: Array, bound: Array, weights: Array) -> float:
+    """The largest slope that values within a bound can have."""
+    middle = np.abs(t - np.average(t, weights=weights))
+    return float(np.sum(weights * middle * bound) / np.sum(weights * middle * middle))
+
+
+def phase(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> Phase:
+    """Shape, lags and frequencies of a run; all NaN if it failed or has fewer than three samples."""
+    if run.attrs["outcome"] != "ok" or run.sizes["time"] < 3:
+        return Phase(*[math.nan] * 7)
+    form, t = closed_form(scene), run["time"].values
+    sine = np.maximum(np.sin(run["theta"].values), EPSILON)
+    with np.errstate(over="ignore", invalid="ignore"):  # a run may be far from anything
+        parts = split(scene, run)
+    period = scene.nutation_period if math.isfinite(scene.nutation_period) else float(t[-1])
+    omega, swings, even = 2.0 * math.pi / period, nutates(scene), np.ones(t.size)
+    mean_rate = form.phi_per_period / form.nutation_period if math.isfinite(form.nutation_period) else 0.0
+    scale = max(abs(mean_rate), LEAST_RATE * omega)
+    radius = 0.5 * abs(math.cos(form.theta_range[0]) - math.cos(form.theta_range[1]))
+    grain = truth["axis_error_bound"].values + 4.0 * EPSILON
+    faster = _slope(t, parts.lag, even) if swings else 0.0
+    doubt = _doubt(t, grain / (radius * omega), even) + EPSILON if swings else 0.0
+    weights = sine * sine
+    turned = _slope(t, parts.turn, weights)
+    rounding = grain / sine + EPSILON * np.abs(truth["phi"].values)
+    turn_doubt = _doubt(t, rounding, weights) + abs(mean_rate) * (doubt + EPSILON)
+    return Phase(
+        shape=float(np.max(parts.shape)),
+        nutation_lag=omega * float(np.max(np.abs(parts.lag))) if swings else math.nan,
+        precession_lag=float(np.max(np.abs(sine * parts.turn))),
+        nutation_period=abs(1.0 / (1.0 + faster) - 1.0) if swings else math.nan,
+        precession_rate=abs(mean_rate * faster + turned) / scale,
+        nutation_period_bound=doubt if swings else math.nan,
+        precession_rate_bound=turn_doubt / scale + EPSILON,
+    )

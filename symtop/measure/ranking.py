@@ -1,0 +1,216 @@
+"""Who is fastest at an accuracy, and whether the lead is more than noise.
+
+The cost of a target is that of the cheapest run that met it. Two methods are compared by the ratios of their samples
+round by round, which were taken within a second of each other: a slow spell of the machine hits both. A lead is sure
+if every round agrees on it and its median is at least `MARGIN`, the most by which two processes that
+run the same code differed here (code and data lie elsewhere in memory); otherwise the two are level. A rival that was
+not timed itself, because it was foreseen behind, is behind for sure if it is so by `FAR`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure.race import WITHIN
+from symtop.measure.work import TARGETS, meeting
+
+MARGIN = 1.1
+FAR = 0.9 * WITHIN
+LEAST_ROUNDS = 3
+
+
+class Place(NamedTuple):
+    """A method's cheapest run that meets a target."""
+
+    cost: float
+    integrator: str
+    tier: str
+    setting: int
+    error: float
+
+
+class Lead(NamedTuple):
+    """How far the first of two is ahead: median and extremes of the paired ratios."""
+
+    ratio: float
+    low: float
+    high: float
+    sure: bool
+
+
+class Win(NamedTuple):
+    """The fastest method at one target, who is level with it, and the lead over the first who is not."""
+
+    best: Place
+    level: tuple[str, ...]
+    behind: Place | None
+    lead: Lead | None
+
+    @property
+    def reliable(self) -> bool:
+        """Is it alone in front, beyond the noise?"""
+        return not self.level
+
+
+def cheapest(
+    cell: xr.Dataset, target: float, quantity: str = "axis", cost: str = "seconds", tier: str | None = None
+) -> list[Place]:
+    """Methods that meet a target, cheapest first; `cell` is one scene and one horizon of the study's dataset."""
+    found = []
+    for name in cell["integrator"].values:
+        own = cell.sel(integrator=name)
+        spent = np.where(meeting(own, target, quantity) & (own["outcome"].values == "ok"), own[cost].values, np.nan)
+        if not np.isfinite(spent).any():
+            continue
+        k = int(np.nanargmin(spent))
+        kind = str(own["tier"].values.flat[0])
+        if tier in (None, kind):
+            found.append(Place(float(spent[k]), str(name), kind, k, float(own[quantity].values[k])))
+    return sorted(found)
+
+
+def lead(cell: xr.Dataset, first: Place, second: Place) -> Lead:
+    """By how much the first place is ahead of the second."""
+    ours, theirs = (
+        cell["seconds_samples"].sel(integrator=place.integrator).values[place.setting] for place in (first, second)
+    )
+    races = [cell["seconds_race"].sel(integrator=p.integrator).values[p.setting] for p in (first, second)]
+    both = np.isfinite(ours) & np.isfinite(theirs) & (races[0] == races[1]) & (races[0] > 0.0)
+    if both.sum() < LEAST_ROUNDS:
+        ratio = second.cost / first.cost
+        return Lead(ratio, np.nan, np.nan, bool(ratio >= FAR))
+    ratios = theirs[both] / ours[both]
+    middle, low, high = float(np.median(ratios)), float(ratios.min()), float(ratios.max())
+    return Lead(middle, low, high, low > 1.0 and min(middle, second.cost / first.cost) >= MARGIN)
+
+
+def win(
+    cell: xr.Dataset, target: float, quantity: str = "axis", tier: str = "compiled", without: tuple[str, ...] = ()
+) -> Win | None:
+    """The fastest method of a tier at a target, or None if nobody met it."""
+    places = [place for place in cheapest(cell, target, quantity, tier=tier) if place.integrator not in without]
+    if not places:
+        return None
+    best, *others = places
+    leads = [(other, lead(cell, best, other)) for other in others]
+    level = tuple(other.integrator for other, ahead in leads if not ahead.sure)
+    behind, ahead = next(((other, ahead) for other, ahead in leads if ahead.sure), (None, None))
+    return Win(best, level, behind, ahead)
+
+
+def winners(data: xr.Dataset, targets: tuple[float, ...] = TARGETS) -> dict[tuple[str, int, float], Win | None]:
+    """The compiled winners in axis error of every scene, horizon (by index) and target."""
+    return {
+        (str(scene), far, target): win(data.sel(scene=scene).isel(horizon=far), target)
+        for scene in data["scene"].values
+        for far in range(data.sizes["horizon"])
+        for target in targets
+    }
+
+
+def agreement(first: xr.Dataset, second: xr.Dataset) -> tuple[int, list[str]]:
+    """How many winners that both runs of a study call reliable there are, and the ones on which they contradict.
+
+    A winner that one run calls reliable contradicts the other run if that one has it neither first nor level.
+    """
+    ours, theirs = winners(first), winners(second)
+    sure, wrong = 0, []
+    for key, one in ours.items():
+        other = theirs.get(key)
+        if one is None or other is None:
+            continue
+        sure += one.reliable and other.reliable
+        for a, b in ((one, other), (other, one)):
+            if a.reliable and a.best.integrator not in (b.best.integrator, *b.level):
+                wrong.append(f"{key}: {a.best.integrator} against {b.best.integrator}")
+    return sure, wrong
+
+
+def costs(
+    data: xr.Dataset, targets: tuple[float, ...] = TARGETS, quantity: str = "axis", cost: str = "seconds"
+) -> xr.DataArray:
+    """Cost of the cheapest run of every method that meets each target, infinite where none does.
+
+    Dimensions target, integrator, problem; a problem is a scene with a horizon.
+    """
+    names = [str(name) for name in data["integrator"].values]
+    problems = [(str(scene), far) for scene in data["scene"].values for far in range(data.sizes["horizon"])]
+    table = np.full((len(targets), len(names), len(problems)), np.inf)
+    for number, target in enumerate(targets):
+        for k, (scene, far) in enumerate(problems):
+            for place in cheapest(data.sel(scene=scene).isel(horizon=far), target, quantity, cost):
+                table[number, names.index(place.integrator), k] = place.cost
+    return xr.DataArray(
+        table, dims=("target", "integrator", "problem"), coords={"target": list(targets), "integrator": names}
+    )
+
+
+def relative(table: xr.DataArray, among: list[str]) -> xr.DataArray:
+    """Costs over the least cost that any method of `among` has on a problem; problems nobody solved are infinite."""
+    best = table.sel(integrator=among).min("integrator")
+    return (table / best.where(np.isfinite(best))).fillna(np.inf)
+
+
+def leaders(ratios: xr.DataArray, count: int) -> list[str]:
+    """The methods that come closest to the best most often: by the mean of 1/ratio over problems and targets."""
+    merit = (1.0 / ratios).mean(("target", "problem"))
+    order = np.argsort(-merit.values, kind="stable")
+    return [str(merit["integrator"].values[k]) for k in order[:count] if merit.values[k] > 0.0]
+
+
+class Crossing(NamedTuple):
+    """Energy at equal cost: the share of the common range of costs in which the first of two methods is better."""
+
+    scene: str
+    first: str
+    second: str
+    share: float  # of the common range, in the logarithm of cost
+    cheapest_won: float  # seconds of the cheapest and
+    dearest_won: float  # of the dearest cost at which the first is better; NaN if none
+    error: float  # energy error of the first where its lead is largest (or its lag smallest)
+    gain: float  # ratio of the energy errors there, second over first
+
+
+def crossing(
+    cell: xr.Dataset, first: str, second: str, quantity: str = "energy", cost: str = "seconds"
+) -> Crossing | None:
+    """Compare the best error that each of two methods has for a cost; None if their costs do not overlap.
+
+    The error for a cost is that of the most accurate run that is no dearer, joined by straight lines in the logarithms.
+    """
+    curves = []
+    for name in (first, second):
+        own = cell.sel(integrator=name)
+        x, y = own[cost].values, own[quantity].values
+        good = np.isfinite(x) & np.isfinite(y) & (own["outcome"].values == "ok")
+        order = np.argsort(x[good])
+        x, y = x[good][order], np.minimum.accumulate(np.maximum(y[good][order], 1e-17))
+        if x.size < 2:
+            return None
+        curves.append((np.log(x), np.log(y)))
+    low, high = (pick(ends) for pick, ends in ((max, [c[0][0] for c in curves]), (min, [c[0][-1] for c in curves])))
+    if high <= low:
+        return None
+    at = np.linspace(low, high, 201)
+    ours, theirs = (np.interp(at, *curve) for curve in curves)
+    ahead, best = ours < theirs, int(np.argmax(theirs - ours))
+    won = np.exp(at[ahead]) if ahead.any() else np.array([np.nan])
+    name = str(cell["scene"].values)
+    gain = float(np.exp(theirs[best] - ours[best]))
+    return Crossing(
+        name, first, second, float(ahead.mean()), float(won[0]), float(won[-1]), float(np.exp(ours[best])), gain
+    )
+
+
+def growth_at_equal_settings(own: xr.Dataset, quantity: str, far: int = -1) -> float:
+    """Median ratio of an error at a long horizon to that at the first one, over settings that were run at both."""
+    near, later = own.isel(horizon=0), own.isel(horizon=far)
+    ratios = [
+        later[quantity].values[j] / near[quantity].values[k]
+        for k, setting in enumerate(near["setting_value"].values)
+        for j in np.flatnonzero(np.isclose(later["setting_value"].values, setting, rtol=1e-9))
+        if near[quantity].values[k] > 1e-12
+    ]
+    good = [ratio for ratio in ratios if np.isfinite(ratio)]
+    return float(np.median(good)) if good else np.nan

@@ -1,0 +1,182 @@
+"""The least work that reaches an accuracy: settings that are found, not guessed.
+
+A fixed ladder of steps gives a method the first rung below a target, up to a rung's ratio too expensive; a ranking of
+such costs ranks the rungs. So each method walks from coarse to fine, about `DECADES` of error a step, until the
+finest target is met, rounding stops it, or the next run would exceed a budget of force evaluations. Then each target is
+approached from the two runs around it: log error is close to a straight line in log step, so that one or two more runs
+come within a `CLOSE` part of the target. Every run is kept. What was not tried is said: `stopped` names the reason.
+
+A method that shows the axis in one chart and the attitude only in a larger one is run in both, for what each is for.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.integrators.registry import Integrator
+from symtop.measure.accuracy import as_table, error_row
+from symtop.measure.errors import QUANTITIES
+from symtop.measure.phase import FREQUENCIES
+from symtop.scenes import Scene
+
+Row = dict[str, Any]
+
+QUANTITY_LABELS = {**QUANTITIES, **FREQUENCIES}  # the eight quantities an accuracy is asked in
+TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
+DECADES = 1.6  # of error between neighbours of the first walk
+NOTCHES = 2.0  # decades of tolerance likewise
+CLOSE = 0.6  # an error between CLOSE times the target and the target is near enough
+AIM = 0.85
+REFINEMENTS = 2
+COARSER = 4  # doublings of the first setting, while it meets the loosest target
+MOST = 24  # runs of one walk
+FLAT = 1.5  # two steps in a row that gain less than this, below `ROUNDED`, have met rounding
+ROUNDED = 1e-8
+STOPS = ("all targets met", "rounding", "budget", "least tolerance", "nothing to set", "too many runs")
+
+
+def first_setting(method: Integrator, scene: Scene, horizon: float) -> float:
+    """The coarsest setting that is tried at first; incommensurate with the nutation."""
+    if method.knob == "tolerance":
+        return 1e-2
+    period = scene.nutation_period if math.isfinite(scene.nutation_period) else horizon / 8.0
+    power = method.order or 2
+    return period / (7.37 if power <= 2 else 5.37 if power <= 4 else 2.37)
+
+
+def least_setting(method: Integrator) -> float:
+    """The finest setting the method allows."""
+    tedious = method.tier == "python" and method.explicit is False  # radau at 1e-12: a minute for ten nutations
+    return max(method.least_tolerance, 1e-8 if tedious else 0.0) * 1.001 if method.knob == "tolerance" else 0.0
+
+
+class Walk:
+    """All runs of one method on one scene to one horizon, by setting."""
+
+    def __init__(self, scene: Scene, method: Integrator, horizon: float, budget: float) -> None:
+        self.scene, self.method, self.horizon, self.budget = scene, method, horizon, budget
+        self.rows: dict[float, Row] = {}
+        self.stopped = ""
+        self.power = float(method.order or (2 if method.knob == "step_size" else 8))
+
+    def run(self, setting: float) -> Row:
+        """Measure a setting, once."""
+        if setting not in self.rows:
+            row = error_row(self.scene, self.method, setting, self.horizon, "axis", phases=True)
+            self.rows[setting] = row | {"setting_value": setting}
+        return self.rows[setting]
+
+    def error(self, setting: float) -> float:
+        """Largest axis error at a setting, infinite after a failure."""
+        error = float(self.run(setting)["axis"])
+        return error if math.isfinite(error) else math.inf
+
+    def growth(self, ratio: float) -> float:
+        """How the work grows if the setting is divided by `ratio`."""
+        return ratio if self.method.knob == "step_size" else ratio ** (1.0 / min(self.power + 1.0, 20.0))
+
+    def descend(self, targets: Sequence[float], expected: float) -> None:
+        """Walk from coarse to fine; `expected` is the work of the first run, if known."""
+        setting, finest = first_setting(self.method, self.scene, self.horizon), least_setting(self.method)
+        stepping = self.method.knob == "step_size"
+        setting = min(setting, 0.25 * self.horizon) if stepping else setting
+        ratio = min(max(10.0 ** (DECADES / self.power), 1.35), 3.5) if stepping else 10.0**NOTCHES
+        flat, last, work = 0, math.inf, expected
+        while True:
+            if work > self.budget:
+                self.stopped = "budget"
+                return
+            error = self.error(setting)
+            work = float(self.rows[setting]["force_evaluations"])
+            flat = flat + 1 if error < ROUNDED and error > last / FLAT else 0
+            if error <= min(targets) or flat == 2 or setting <= finest or len(self.rows) >= MOST:
+                met, stuck = error <= min(targets), flat == 2
+                least = setting <= finest
+                self.stopped = STOPS[0] if met else STOPS[1] if stuck else STOPS[3] if least else STOPS[5]
+                return
+            last = error
+            room = self.budget / max(work, 1.0)
+            if self.growth(ratio) > room > self.growth(1.3) and stepping:
+                setting, work = setting / room, self.budget  # the last run that can be afforded
+            else:
+                setting, work = max(setting / ratio, finest), work * self.growth(ratio)
+
+    def coarsen(self, target: float) -> None:
+        """Coarser settings, as long as they meet the loosest target."""
+        for _ in range(COARSER):
+            setting = 2.0 * max(self.rows)
+            most = 0.25 * self.horizon if self.method.knob == "step_size" else 0.4
+            if setting > most or self.error(max(self.rows)) > target:
+                return
+            self.run(setting)
+
+    def approach(self, target: float) -> None:
+        """Come close to a target between the coarsest run that meets it and its coarser neighbour."""
+        for _ in range(REFINEMENTS):
+            settings = sorted(self.rows, reverse=True)
+            met = [k for k, setting in enumerate(settings) if self.error(setting) <= target]
+            if not met or met[0] == 0 or self.error(settings[met[0]]) >= CLOSE * target:
+                return
+            fine, coarse = settings[met[0]], settings[met[0] - 1]
+            low, high = self.error(fine), self.error(coarse)
+            if math.isinf(high) or low <= 0.0 or high > 1e6 * low:
+                part = 0.5
+            else:
+                part = min(max(math.log(AIM * target / low) / math.log(high / low), 0.1), 0.9)
+            setting = fine * (coarse / fine) ** part
+            if self.method.knob == "step_size" and round(self.horizon / setting) in {
+                round(self.horizon / fine), round(self.horizon / coarse)
+            }:  # fmt: skip
+                return
+            self.run(setting)
+
+
+def work_table(
+    scene: Scene, method: Integrator, horizons: Sequence[float], budget: float, targets: Sequence[float] = TARGETS
+) -> xr.Dataset:
+    """Errors and work of every setting that was tried: dimensions ``horizon`` (whole numbers) and ``setting``.
+
+    Horizons increase; the cost of a run is foreseen from the horizon before. Settings go from coarse to fine. Variables
+    are those of `error_table`, those of `phase`, and ``stopped(horizon)``: one of `STOPS`, why there is nothing finer.
+    """
+    tables: list[list[Row]] = []
+    stops: list[str] = []
+    spent: dict[float, float] = {}
+    before = math.inf
+    for horizon in horizons:
+        walk = Walk(scene, method, horizon, budget)
+        expected = min(spent.values(), default=0.0) * (horizon / before if math.isfinite(before) else 1.0)
+        if method.knob is None:
+            walk.run(math.nan)
+            walk.stopped = "nothing to set"
+        else:
+            walk.descend(targets, expected)
+            if walk.rows:
+                walk.coarsen(max(targets))
+                for target in targets:
+                    walk.approach(target)
+        spent = {setting: float(row["force_evaluations"]) for setting, row in walk.rows.items()} or spent
+        before = horizon if walk.rows else before
+        tables.append([walk.rows[setting] for setting in sorted(walk.rows, reverse=True)])
+        stops.append(walk.stopped)
+    return _stack(tables, method.tier).assign(stopped=("horizon", stops))
+
+
+def _stack(tables: Sequence[Sequence[Row]], tier: str) -> xr.Dataset:
+    """One dataset over horizon and setting; settings that were not tried are NaN, their outcome "not_run"."""
+    names = next(rows for rows in tables if rows)[0]
+    blank = {
+        name: value if name == "tier" else "not_run" if name == "outcome" else math.nan for name, value in names.items()
+    } | {"tier": tier}
+    size = max(len(rows) for rows in tables)
+    filled = [as_table([*rows, *[blank] * (size - len(rows))]) for rows in tables]
+    return xr.concat(filled, dim="horizon") if len(filled) > 1 else filled[0].expand_dims("horizon")
+
+
+def meeting(data: xr.Dataset, target: float, quantity: str = "axis") -> np.ndarray:
+    """Which runs reach a target."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(data[quantity].values <= target)
