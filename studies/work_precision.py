@@ -111,8 +111,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
             "winners",
             figures.winner_strips(wins, scenes, spans, DECADES),
             f"The fastest compiled method for each decade of axis error. Most often: {most}, of {len(wins)} cells. "
-            "Pale and with a tilde: level with at least one other method. Methods were raced at 1e-3, 1e-6, 1e-9 and 1e-12; "
-            "in between some times are foreseen.",
+            "Pale and with a tilde: level with at least one other method. Methods were raced at 1e-3, 1e-6, 1e-9 and "
+            "1e-12; in between some times are foreseen.",
             "Coloured strips naming the fastest method, a row a scene, a column a decade of accuracy.",
         )
     )

@@ -151,6 +151,7 @@ def run(
 @click.argument("names", nargs=-1)
 @click.option("--all", "every", is_flag=True, help="Run every study.")
 @click.option("--quick", is_flag=True, help="Coarse grids, a few seconds a study; kept apart from the full results.")
+@click.option("--full", is_flag=True, help="The longest grid of a study that has one.")
 @click.option("--fresh", is_flag=True, help="Compute every case again; with --check, check every case.")
 @click.option("--status", "only_status", is_flag=True, help="Say what is done, stale or missing; compute nothing.")
 @click.option("--check", "only_check", is_flag=True, help="Compute stored cases again, elsewhere, and compare.")
@@ -161,7 +162,7 @@ def run(
 @json_option
 @plugin_option
 def study(
-    names: tuple[str, ...], every: bool, quick: bool, fresh: bool, only_status: bool, only_check: bool,
+    names: tuple[str, ...], every: bool, quick: bool, full: bool, fresh: bool, only_status: bool, only_check: bool,
     jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool,
     plugin_files: tuple[str, ...],
 ) -> None:  # fmt: skip
@@ -181,12 +182,15 @@ def study(
     from symtop.study import command  # noqa: PLC0415
 
     _load_plugins(plugin_files)
+    if quick and full:
+        msg = "quick and full must not be given together"
+        raise SymtopError(msg)
     folder = Path(results) / "quick" if quick else Path(results)
     chosen = command.choose(names, every=every)
+    options = command.Options(folder, quick, full, fresh, jobs, scheduler, limit, as_json)
     if only_status:
-        code = command.show_status(chosen, folder, quick=quick, as_json=as_json)
+        code = command.show_status(chosen, options)
     else:
-        options = command.Options(folder, quick, fresh, jobs, scheduler, limit, as_json)
         code = command.conduct(command.check_all if only_check else command.run_all, chosen, options)
     if code:
         sys.exit(code)

@@ -130,7 +130,7 @@ def test_a_step_map_in_space_turns_a_small_step_by_omega(name):
 
 
 def test_the_limits_of_verlet_and_rk4_are_found():
-    """F1: Verlet loses small nutations at h omega = 2, rk4 at 2 sqrt 2, the midpoint rule never; in one sentence each."""
+    """F1: Verlet loses small nutations at h omega = 2, rk4 at 2 sqrt 2, the midpoint rule never; one sentence each."""
     scene = steady(20.0)
     frequency = landmarks(scene).frequency
     for name, limit in (("stormer-verlet", 2.0), ("rk4", 2.0 * math.sqrt(2.0))):
