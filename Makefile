@@ -1,6 +1,7 @@
 # make studies   every study: datasets, figures and results/report.html     make test      the fast tests
 # make quick     the same on coarse grids, into results/quick               make test-all  all tests
 # make bench     kernels against C                                          make lint      ruff and mypy
+# make check-results   compute some stored cases again and compare, to the last bit (FRESH=1: every one)
 # Each target sets up .venv first; the second time that takes no time.
 
 PYTHON ?= python3
@@ -9,10 +10,10 @@ READY := .venv/.ready
 STUDIES := $(patsubst studies/%.py,%,$(wildcard studies/[!_]*.py))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup studies quick report test test-all lint bench clean
+.PHONY: help setup studies quick report check-results test test-all lint bench clean
 
 help:
-	@sed -n '1,4s/^# //p' Makefile
+	@sed -n '1,5s/^# //p' Makefile
 
 setup: $(READY)
 
@@ -35,6 +36,10 @@ quick: $(READY)
 
 report: $(READY)
 	@$(BIN)/symtop report
+
+check-results: $(READY)
+	@echo "symtop: computing stored cases again, elsewhere, and comparing (FRESH=1 checks every case)"
+	@$(BIN)/symtop study --all --check $(if $(FRESH),--fresh)
 
 test: $(READY)
 	@echo "symtop: running the tests (make test-all runs the slow ones too)"

@@ -229,4 +229,5 @@ STUDY = Study(
     tables=tables,
     verdict=verdict,
     follow_up=follow_up,
+    uses=lambda case: case.settings.get("integrators", [case.integrator]),
 )

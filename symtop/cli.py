@@ -95,6 +95,10 @@ def scenes(plugin_files: tuple[str, ...], as_json: bool) -> None:
     )
 
 
+def _say(warning: str) -> None:
+    click.echo(f"symtop: {warning}", err=True)
+
+
 @main.command()
 @click.argument("scene")
 @click.argument("integrator")
@@ -103,13 +107,16 @@ def scenes(plugin_files: tuple[str, ...], as_json: bool) -> None:
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
 @click.option("--samples", type=int, default=501, show_default=True, help="How many samples to keep.")
 @click.option("--observe", help="nutation, axis or attitude; what the scene is watched for by default.")
+@click.option("--budget", type=float, help="Most steps, or force evaluations of an adaptive method.")
+@click.option("--guard/--no-guard", default=True, help="Say before the run what it will be worth, if that is little.")
 @click.option("--output", type=click.Path(), help="Write the run to this netCDF file.")
 @click.option("--figure", type=click.Path(), help="Draw the run and its errors into this PNG file.")
 @plugin_option
 @json_option
 def run(
     scene: str, integrator: str, step_size: float | None, tolerance: float | None, horizon: float | None, samples: int,
-    observe: str | None, output: str | None, figure: str | None, plugin_files: tuple[str, ...], as_json: bool,
+    observe: str | None, budget: float | None, guard: bool, output: str | None, figure: str | None,
+    plugin_files: tuple[str, ...], as_json: bool,
 ) -> None:  # fmt: skip
     """Run one INTEGRATOR on one SCENE and compare it with the truth.
 
@@ -125,8 +132,9 @@ def run(
 
     _load_plugins(plugin_files)
     data = simulate(
-        scene, integrator, step_size=step_size, tolerance=tolerance, horizon=horizon, samples=samples, observe=observe
-    )
+        scene, integrator, step_size=step_size, tolerance=tolerance, horizon=horizon, samples=samples, observe=observe,
+        guard=_say if guard else False, budget=budget,
+    )  # fmt: skip
     if output is not None:
         datasets.write(data, output)
     where = find_scene(scene)
@@ -161,6 +169,7 @@ def run(
 @click.argument("names", nargs=-1)
 @click.option("--all", "every", is_flag=True, help="Run every study.")
 @click.option("--quick", is_flag=True, help="Coarse grids, a few seconds a study; kept apart from the full results.")
+@click.option("--full", is_flag=True, help="The longest grid of a study that has one.")
 @click.option("--fresh", is_flag=True, help="Compute every case again; with --check, check every case.")
 @click.option("--status", "only_status", is_flag=True, help="Say what is done, stale or missing; compute nothing.")
 @click.option("--check", "only_check", is_flag=True, help="Compute stored cases again, elsewhere, and compare.")
@@ -171,7 +180,7 @@ def run(
 @json_option
 @plugin_option
 def study(
-    names: tuple[str, ...], every: bool, quick: bool, fresh: bool, only_status: bool, only_check: bool,
+    names: tuple[str, ...], every: bool, quick: bool, full: bool, fresh: bool, only_status: bool, only_check: bool,
     jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool,
     plugin_files: tuple[str, ...],
 ) -> None:  # fmt: skip
@@ -191,12 +200,15 @@ def study(
     from symtop.study import command  # noqa: PLC0415
 
     _load_plugins(plugin_files)
+    if quick and full:
+        msg = "quick and full must not be given together"
+        raise SymtopError(msg)
     folder = Path(results) / "quick" if quick else Path(results)
     chosen = command.choose(names, every=every)
+    options = command.Options(folder, quick, full, fresh, jobs, scheduler, limit, as_json)
     if only_status:
-        code = command.show_status(chosen, folder, quick=quick, as_json=as_json)
+        code = command.show_status(chosen, options)
     else:
-        options = command.Options(folder, quick, fresh, jobs, scheduler, limit, as_json)
         code = command.conduct(command.check_all if only_check else command.run_all, chosen, options)
     if code:
         sys.exit(code)

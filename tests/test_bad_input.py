@@ -199,7 +199,7 @@ BAD_NAME = st.one_of(
     st.sampled_from(["spheroyd", "midpont", "", "é", "../x", "a" * 3000]),
 )
 PLUGINS = ["no-such.py", "", ".", "/", "/dev/null/x.py", "/etc/hostname", "é.py", "x" * 5000]
-RUN = ["run", "spheroid", "midpoint", "--step-size", "0.1", "--samples", "5"]
+RUN = ["run", "spheroid", "midpoint", "--step-size", "0.002", "--horizon", "0.5", "--samples", "5"]
 
 
 def known() -> set[str]:

@@ -109,6 +109,7 @@ def stale_after(edited: str, study) -> set[str]:
 
 GAUSS = {f"gauss-{order}" for order in (2, 4, 6, 8, 10, 12)}
 SCIPY = {"rk45", "dop853", "lsoda", "radau"}
+SPLITTING = {name for name, method in symtop.integrators().items() if method.family == "splitting"}
 STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "trapezoidal-unreduced"}
 
 
@@ -124,6 +125,7 @@ STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "
         ("integrators/runge_kutta.py", {"rk4", "rk45-compiled"}),
         ("integrators/euler_lagrange.py", {"rk4", "rk45-compiled"} | SCIPY),
         ("integrators/closed_form.py", {"exact"}),
+        ("integrators/splitting_loop.py", SPLITTING),
         ("integrators/taylor.py", {"taylor", "taylor-longdouble", "taylor-quad", "exact"}),
         ("cli.py", set()),
         ("report/figures.py", set()),

@@ -88,7 +88,8 @@ def error_row(
     With `phases` also its frequencies, shape error and lags (see `phase`), and, if the chart that shows what is
     observed does not show the attitude, the attitude error of a second run in the chart that does.
     """
-    run = simulate(scene, method, horizon=horizon, samples=SAMPLES, observe=observe, **knobs(method, setting))
+    knob = knobs(method, setting)
+    run = simulate(scene, method, **knob, horizon=horizon, samples=SAMPLES, observe=observe, guard=False)
     truth = reference(scene, run["time"].values, precision="closed-form")
     found = errors(scene, run, truth)
     row: dict[str, float | str] = {name: run.attrs[name] for name in _COUNTS}
@@ -101,7 +102,7 @@ def error_row(
     if not phases:
         return row
     if not failed and "attitude" not in found:
-        wide = simulate(scene, method, horizon=horizon, samples=SAMPLES, observe="attitude", **knobs(method, setting))
+        wide = simulate(scene, method, **knob, horizon=horizon, samples=SAMPLES, observe="attitude", guard=False)
         values = attitude_error(wide, truth)
         row["attitude"], row["attitude_end"] = float(np.max(values)), float(values[-1])
     return row | phase(scene, run, truth)._asdict()

@@ -21,7 +21,8 @@ from symtop.study.study import Case, Study
 from symtop.study.work import Result, Task
 
 SAMPLE = 5  # cases of each study
-CLOCKED = ("seconds", "reliable", "spread")  # in the name of a variable that holds measured times
+# in the name of a variable that holds measured times
+CLOCKED = ("seconds", "reliable", "spread", "first_call", "foreseen", "attitude_cost")
 
 
 class Checked(NamedTuple):
@@ -72,10 +73,12 @@ def _how_much(one: xr.DataArray, other: xr.DataArray) -> str:
     return f" by up to {np.nanmax(gap):.3g}" if np.isfinite(gap).any() else " in what is known at all"
 
 
-def check(study: Study, results: Path, workers: Workers, *, quick: bool, everything: bool) -> Checked:
+def check(
+    study: Study, results: Path, workers: Workers, *, quick: bool = False, full: bool = False, everything: bool = False
+) -> Checked:
     """Compute `SAMPLE` stored cases again, or every one, and compare; likewise the dataset that they make together."""
     known = Round(study, results.resolve())
-    if not known.add(study.cases(quick), fresh=False) and study.follow_up is not None:
+    if not known.add(study.grid(quick=quick, full=full), fresh=False) and study.follow_up is not None:
         known.add(study.follow_up(known.combined()), fresh=False)
     stored = dict(sorted(known.done.items(), key=lambda item: store.digest_of(item[0])))  # in no particular order
     chosen = dict(list(stored.items())[: None if everything else SAMPLE])

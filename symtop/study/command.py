@@ -24,6 +24,7 @@ class Options(NamedTuple):
 
     results: Path
     quick: bool = False
+    full: bool = False
     fresh: bool = False
     jobs: int | None = None
     scheduler: str | None = None
@@ -78,8 +79,9 @@ def run_all(studies: list[Study], options: Options, workers: Workers) -> int:
     said: list[dict[str, Any]] = []
     for study in studies:
         found = run.run(
-            study, options.results, quick=options.quick, fresh=options.fresh, workers=workers, limit=options.limit
-        )
+            study, options.results, quick=options.quick, full=options.full, fresh=options.fresh, workers=workers,
+            limit=options.limit,
+        )  # fmt: skip
         said.append({key: found[key] for key in ("study", "cases", "computed", "failures", "verdict")})
         said[-1].update(figures=len(found["pictures"]), seconds=round(found["seconds"], 3))
         if not options.as_json:
@@ -94,12 +96,14 @@ def run_all(studies: list[Study], options: Options, workers: Workers) -> int:
     return 1 if any(entry["failures"] for entry in said) else 0
 
 
-def show_status(studies: list[Study], results: Path, *, quick: bool, as_json: bool) -> int:
+def show_status(studies: list[Study], options: Options) -> int:
     """Say what is known of every case; 1 if some have failed."""
-    found = {study.name: run.status(study, results, quick=quick) for study in studies}
-    if as_json:
+    found = {
+        study.name: run.status(study, options.results, quick=options.quick, full=options.full) for study in studies
+    }
+    if options.as_json:
         click.echo(json.dumps(found, indent=1))
-    for name, rows in {} if as_json else found.items():
+    for name, rows in {} if options.as_json else found.items():
         counts = {state: sum(row["state"] == state for row in rows) for state in run.STATES}
         click.echo(f"{name}: " + ", ".join(f"{count} {state}" for state, count in counts.items() if count))
         for row in rows:
@@ -112,7 +116,8 @@ def show_status(studies: list[Study], results: Path, *, quick: bool, as_json: bo
 def check_all(studies: list[Study], options: Options, workers: Workers) -> int:
     """Compute stored cases again and compare; 1 if anything is different."""
     found = [
-        check.check(study, options.results, workers, quick=options.quick, everything=options.fresh) for study in studies
+        check.check(study, options.results, workers, quick=options.quick, full=options.full, everything=options.fresh)
+        for study in studies
     ]
     if not any(entry.stored for entry in found):
         msg = (

@@ -198,11 +198,35 @@ def _strings(tree: Iterable[ast.Module]) -> set[str]:
     }
 
 
+def _asked(file: Path) -> set[str]:
+    """Names that a file imports from this package."""
+    return {name for module, names in _imported(file) if module.startswith(PACKAGE.name) for name in names}
+
+
 def _looks_up(file: Path) -> bool:
-    """Does a file ask the registry for integrators of its own choice?"""
-    asked = {"integrator", "integrators", "registry"}
-    return file not in RESOLVERS and any(
-        module.startswith(PACKAGE.name) and asked & set(names) for module, names in _imported(file)
+    """Does a file ask the registry for integrators of its own choice?
+
+    What it is given as an argument is its caller's choice, and a name that it spells out is found by that name.
+    """
+    if file in RESOLVERS:
+        return False
+    asked = _asked(file)
+    return bool(asked & {"integrators", "registry"}) or ("integrator" in asked and _chooses(_tree(file)))
+
+
+def _chooses(tree: ast.Module) -> bool:
+    """Is `integrator` used otherwise than on a literal name or on an argument of the function around it?"""
+    fine: set[int] = set()
+    for function in ast.walk(tree):
+        if isinstance(function, ast.FunctionDef):
+            given = {argument.arg for argument in ast.walk(function.args) if isinstance(argument, ast.arg)}
+            for call in ast.walk(function):
+                if isinstance(call, ast.Call) and len(call.args) == 1:
+                    what = call.args[0]
+                    if isinstance(what, ast.Constant) or (isinstance(what, ast.Name) and what.id in given):
+                        fine.add(id(call.func))
+    return any(
+        isinstance(node, ast.Name) and node.id == "integrator" and id(node) not in fine for node in ast.walk(tree)
     )
 
 
@@ -222,7 +246,7 @@ def basis(measure: Callable[..., Any]) -> Basis:
     found.add(measure)
     files = all_imports(frozenset(found.files))
     ours = [file for file in files if file.parent.name == "measure"]
-    said = _strings(_tree(file) for file in ours) | found.constants
+    said = _strings(_tree(file) for file in ours if _asked(file) & {"integrator", "simulate"}) | found.constants
     names = frozenset(said & set(integrators()))
     return Basis(tuple(found.values), files, names, found.lists or any(_looks_up(file) for file in ours))
 

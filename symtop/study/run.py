@@ -125,12 +125,14 @@ def _hired(workers: Workers | None, jobs: int | None) -> Iterator[Workers]:
         yield own
 
 
-def run(study: Study, results: Path, *, quick: bool = False, fresh: bool = False, jobs: int | None = None,
-        quiet: bool = False, workers: Workers | None = None, limit: float | None = None) -> dict[str, Any]:  # fmt: skip
+def run(study: Study, results: Path, *, quick: bool = False, full: bool = False, fresh: bool = False,
+        jobs: int | None = None, quiet: bool = False, workers: Workers | None = None,
+        limit: float | None = None) -> dict[str, Any]:  # fmt: skip
     """Bring a study's dataset, figures and findings up to date; returns the findings.
 
-    `limit` is the time a case may take, in seconds (the study's own by default). Cases that fail are named in
-    ``failures``, recorded beside the others with their traceback, and tried again the next time.
+    `quick` is the coarse grid, `full` the longest one of a study that has it; `limit` is the time a case may take, in
+    seconds (the study's own by default). Cases that fail are named in ``failures``, recorded beside the others with
+    their traceback, and tried again the next time.
     Raises SymtopError if the results cannot be written or nothing could be measured.
     """
     began = time.monotonic()
@@ -138,7 +140,7 @@ def run(study: Study, results: Path, *, quick: bool = False, fresh: bool = False
     seconds = study.limit if limit is None else positive("limit", limit)
     store.prepare(results, study)
     known = Round(study, results)
-    missing = known.add(study.cases(quick), fresh=fresh)
+    missing = known.add(study.grid(quick=quick, full=full), fresh=fresh)
     stamp = _stamp(study, sorted(path.name for path in known.paths))
     before = _drawn(study, results, stamp)
     if before is not None and not missing:
@@ -180,13 +182,13 @@ def _conclude(known: Round, stamp: str, *, quick: bool) -> dict[str, Any]:
     return findings
 
 
-def status(study: Study, results: Path, *, quick: bool = False) -> list[dict[str, str]]:
+def status(study: Study, results: Path, *, quick: bool = False, full: bool = False) -> list[dict[str, str]]:
     """What is known of every case: ``done``, ``failed``, ``stale`` (its sources have changed) or ``missing``.
 
     The second round of a study is known only when its first is done.
     """
     known = Round(study, results.resolve())
-    missing = known.add(study.cases(quick), fresh=False)
+    missing = known.add(study.grid(quick=quick, full=full), fresh=False)
     if study.follow_up is not None and not missing:
         known.add(study.follow_up(known.combined()), fresh=False)
     older = {store.label_of(path) for path in store.superseded(known.results, study, known.paths)}

@@ -84,10 +84,15 @@ class Study:
     verdict: Callable[[xr.Dataset], list[str]]
     tables: Callable[[xr.Dataset], list[Table]] = lambda _: []
     charts: Callable[[xr.Dataset], list[Chart]] = lambda _: []
+    full: Callable[[], list[Case]] | None = None  # a grid that takes much longer, for `--full`
     timed: bool = False  # all cases are
     follow_up: Callable[[xr.Dataset], list[Case]] | None = None  # a second round, made from what the first one found
     uses: Callable[[Case], Sequence[str]] | None = None  # integrators a case runs; "*" for all; None: found out
     limit: float = 3600.0  # seconds after which a case counts as hanging
+
+    def grid(self, *, quick: bool = False, full: bool = False) -> list[Case]:
+        """The cases of the first round: the coarse grid, the ordinary one, or the longest there is."""
+        return self.full() if full and self.full is not None else self.cases(quick)
 
     def digest(self, case: Case) -> str:
         """Hash of everything the case's numbers depend on: settings, the way of measuring, sources, versions."""
