@@ -27,7 +27,8 @@ from symtop.integrators.registry import Integrator, Plan, Run, integrator
 from symtop.scenes import Scene, closed_form
 from symtop.top import Angles, SymmetricTop
 
-STEPS = {"compiled": 2000, "python": 50}  # a probe may always take these: 0.05 to 0.5 ms
+STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these, 0.05 to 3 ms
+AT_LEAST = 0.25  # of them a probe takes in any case, up to the whole run
 SHARE = 0.1  # of the run's own steps, or time, which a probe may always take
 POINTS = 300  # of a probe that are compared with the closed form
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -172,7 +173,8 @@ def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
     step = plan.step_size
     allowed = max(STEPS[method.tier] * step, share)
     if twice <= allowed:
-        probe = _probe(scene, method, chart, plan, min(plan.horizon, allowed), step)
+        piece = max(twice, share, AT_LEAST * STEPS[method.tier] * step)
+        probe = _probe(scene, method, chart, plan, min(plan.horizon, piece), step)
         return grown(probe, plan.horizon, straight=straight), probe
     coarse = twice / round(allowed / step)
     probe = _probe(scene, method, chart, plan, twice, coarse)
