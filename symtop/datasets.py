@@ -1,6 +1,6 @@
 """Labelled datasets: names and units of variables, provenance, and files that are whole or absent.
 
-Conventions are CF-1.11 where it applies. No compression: round-off does not compress. No time stamps
+Conventions are CF-1.11 where it applies. Only maps of bytes are compressed: round-off does not compress. No time stamps
 inside, so that equal inputs give equal bytes.
 """
 
@@ -116,7 +116,10 @@ def write(data: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         target.parent.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
         os.close(handle)
-        encoding = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}
+        encoding: dict[Any, dict[str, Any]] = {
+            name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"
+        }
+        encoding |= {name: {"zlib": True} for name, values in data.data_vars.items() if values.dtype.kind == "u"}
         data.to_netcdf(temporary, engine="netcdf4", encoding=encoding)
         with open(temporary, "rb") as written:  # noqa: PTH123
             os.fsync(written.fileno())

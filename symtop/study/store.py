@@ -37,7 +37,7 @@ def load_case(path: Path) -> xr.Dataset | None:
 
 
 def combine(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
-    """One dataset over scene and integrator; a cell nobody measured is NaN (or an empty string)."""
+    """One dataset over scene and integrator; a cell nobody measured is NaN (a byte 255, a string empty)."""
     scenes = list(dict.fromkeys(case.scene for case, _ in cases))
     methods = list(dict.fromkeys(case.integrator for case, _ in cases))
     sizes: dict[str, int] = {}
@@ -59,9 +59,8 @@ def combine(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
         for name, variable in data.data_vars.items():
             dims = tuple(str(dim) for dim in variable.dims)
             if str(name) not in filled:
-                text = variable.dtype.kind in "OUT"
                 shape = (len(scenes), len(methods), *(sizes[dim] for dim in dims))
-                blank = np.full(shape, "", dtype=object) if text else np.full(shape, math.nan)
+                blank = np.full(shape, *_blank(variable.dtype))
                 filled[str(name)] = (("scene", "integrator", *dims), blank, dict(variable.attrs))
             corner = tuple(slice(0, size) for size in variable.shape)
             filled[str(name)][1][(*place, *corner)] = variable.values
@@ -70,6 +69,13 @@ def combine(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
         for name, (dims, values, attrs) in filled.items()
     }
     return xr.Dataset(variables, coords=coordinates)
+
+
+def _blank(kind: "np.dtype[Any]") -> tuple[Any, Any]:
+    """What stands for nothing in an array of that type, and the type that can hold it."""
+    if kind.kind in "OUT":
+        return "", object
+    return (np.iinfo(kind).max, kind) if kind.kind == "u" else (math.nan, float)
 
 
 def write_text(path: Path, text: str) -> None:
