@@ -6,8 +6,10 @@ import numpy as np
 import xarray as xr
 
 from symtop.integrators.registry import Integrator, integrator, integrators
-from symtop.measure import atlas, mechanisms, stability
+from symtop.measure import stability
 from symtop.report import atlas_figures
+from symtop.report import atlas_words as atlas
+from symtop.report import mechanism_words as mechanisms
 from symtop.scenes import added_scenes
 from symtop.study.study import Case, Picture, Study, Table
 

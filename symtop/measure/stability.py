@@ -24,6 +24,8 @@ from symtop.measure.linear_stability import linear_limits, sleeping_threshold, w
 from symtop.measure.outcome_maps import family, outcome_map
 from symtop.scenes import Scene, scene
 
+PAST = 1.05  # times the resonant step: far enough for what a resonance kills to live again
+
 
 def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
     """An outcome map over a family of scenes and the knob, with the linear limits of a fixed step over it."""
@@ -69,14 +71,17 @@ def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) 
     phases = np.asarray(settings["phases"], float)
     limit, third = linear_limits(method, where, np.linspace(0.02, phases[-1], 120) / omega)
     alive = [surviving_displacement(method, where, float(x) / omega, settings["steps"]) for x in phases]
-    at_third = surviving_displacement(method, where, third, settings["steps"]) if math.isfinite(third) else math.nan
+    around = [math.nan, math.nan]
+    if math.isfinite(third):
+        around = [surviving_displacement(method, where, x * third, settings["steps"]) for x in (1.0, PAST)]
     return xr.Dataset(
         {
             "phase_value": ("phase", phases),
             "surviving": ("phase", alive),
             "limit_phase": limit * omega,
             "third_turn_phase": third * omega,
-            "surviving_at_third_turn": at_third,
+            "surviving_at_third_turn": around[0],
+            "surviving_past_third_turn": around[1],
         }
     )
 

@@ -13,8 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.integrators.registry import integrators
-from symtop.measure.atlas import Cell, cell
 from symtop.measure.verdicts import VERDICTS
+from symtop.report.atlas_words import Cell, cell
 from symtop.report.style import GREY, OUTCOME_COLORS, legend_below, look, panels, use
 
 RASTER = (150, 430)  # pixels of one map, about those it has in the figure

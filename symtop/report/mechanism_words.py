@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from symtop.integrators.registry import integrators
-from symtop.measure.atlas import FAR, NEAR, cell, reach
 from symtop.measure.linear_stability import sleeping_threshold_in_theory
+from symtop.report.atlas_words import FAR, NEAR, cell, reach
 
 BARELY = 0.02  # rad: a displacement below this is next to nothing
 
@@ -63,7 +63,9 @@ def resonances(data: xr.Dataset) -> list[str]:
     dead = {}
     for name in _names(at, "third_turn_phase"):
         row = at.sel(integrator=name)
-        dead[name] = (float(row["third_turn_phase"]), float(row["surviving_at_third_turn"]))
+        left, past = float(row["surviving_at_third_turn"]), float(row["surviving_past_third_turn"])
+        if past > 3.0 * left:  # what stays dead beyond is no resonance
+            dead[name] = (float(row["third_turn_phase"]), left)
     gone = {name: place for name, (place, left) in dead.items() if left < BARELY}
     if gone:
         listed = ", ".join(f"{name} at {place:.4f}" for name, place in sorted(gone.items(), key=lambda item: item[1]))
@@ -98,6 +100,9 @@ def horizons(data: xr.Dataset) -> list[str]:
         return []
     good = np.isfinite(at["horizon"].values) & np.isfinite(at["predicted_horizon"].values)
     good &= (at["early_error"].values < 1e-2) & (at["early_error"].values > 1e-15)
+    keeps = np.array(["energy" in _conserved(str(name)) for name in at["integrator"].values])
+    kept = at["horizon"].values[keeps]
+    good[keeps] = False
     gap = at["horizon"].values[good] - at["predicted_horizon"].values[good]
     if not gap.size:
         return []
@@ -106,7 +111,17 @@ def horizons(data: xr.Dataset) -> list[str]:
         f"that their error at 6/g predicts (median {np.median(np.abs(gap)):.2f}/g); the longest lasts "
         f"{np.max(at['horizon'].values[good]):.0f}/g."
     )
+    if np.isfinite(kept).any():
+        said += (
+            " Methods that keep every integral stay on the separatrix and are right for at least "
+            f"{np.nanmin(kept):.0f}/g, whatever their step."
+        )
     return [said]
+
+
+def _conserved(name: str) -> frozenset[str]:
+    entry = integrators().get(name)
+    return (entry.conserves or frozenset()) if entry else frozenset()
 
 
 def sampling(data: xr.Dataset) -> list[str]:
