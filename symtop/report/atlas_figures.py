@@ -147,11 +147,11 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
     use()
     grazed = any(cell(data, "grazing", name) is not None for name in names)
     figure, axes = plt.subplots(
-        len(names), 1 + grazed, figsize=(9.6, 1.78 * len(names) + 0.95), squeeze=False,
+        len(names), 1 + grazed, figsize=(9.6, 1.9 * len(names) + 0.95), squeeze=False,
         gridspec_kw={"width_ratios": [1.25, 1.0][: 1 + grazed]},
     )  # fmt: skip
     seen: set[int] = set()
-    for line, name in zip(axes, names, strict=True):
+    for line, name, below in zip(axes, names, [*names[1:], None], strict=True):
         for axis, scene, label in zip(line, (family, "grazing"), ("spin r", r"gap $\delta$"), strict=False):
             found = cell(data, scene, name)
             if found is None:
@@ -164,10 +164,9 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
                 _overlay(axis, data.sel(scene=scene, integrator=name))
             elif found.knob_name == "step_size":  # the step in which the axis falls past the pole, 1.2 h = 1.1 delta
                 _line(axis, 1.1 * found.parameter / 1.2 / 4.22, found.parameter, PASSAGE)
-            if name == names[-1] or found.knob_name != _knob(data, family, names[-1]):
+            if below is None or found.knob_name != _knob(data, family, below):
                 axis.set_xlabel(KNOBS[found.knob_name], fontsize=8.5)
-        said = "\n".join(textwrap.wrap(sentences[name], 148))
-        line[0].set_title(said, loc="left", fontsize=8.0)
+        _caption(line[0], name, sentences[name])
     handles: list[Any] = [
         Patch(facecolor=OUTCOME_COLORS[VERDICTS[k]], label=WORDS[VERDICTS[k]], hatch=_legend_hatch(VERDICTS[k]),
               edgecolor=GREY, lw=0.4)
@@ -178,6 +177,16 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
         handles += [Line2D([], [], color="black", lw=1.1, ls=dashes, label=word) for dashes, word in lines]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure
+
+
+def _caption(axis: Any, name: str, sentence: str) -> None:
+    """The integrator's name, and below it its sentence, over a row of maps."""
+    lines = textwrap.wrap(sentence, 148)
+    axis.set_title("\n".join(["", *lines]), loc="left", fontsize=8.0)
+    axis.annotate(
+        name, (0.0, 1.0), (0.0, 5.5 + 11.2 * len(lines)), xycoords="axes fraction", textcoords="offset points",
+        fontsize=9.0, weight="bold", annotation_clip=False,
+    )  # fmt: skip
 
 
 def _knob(data: xr.Dataset, family: str, name: str) -> str:

@@ -91,7 +91,7 @@ class Advice(NamedTuple):
     @property
     def sentence(self) -> str:
         """Both halves."""
-        return f"Use {self.integrator} {self.use}; {self.fails}."
+        return f"Use it {self.use}; {self.fails}."
 
 
 def advice(data: xr.Dataset, family: str, name: str) -> Advice | None:
