@@ -1,192 +1,145 @@
-"""Where does each method fail as its step grows, and how?"""
+"""Where does each method fail, and how?"""
 
 import math
 
 import numpy as np
 import xarray as xr
 
-from symtop.integrators.registry import integrator, integrators
-from symtop.measure.accuracy import knobs
-from symtop.measure.errors import errors
-from symtop.measure.verdicts import ACCURATE, VERDICTS
-from symtop.measure.verdicts import verdict as judge
-from symtop.reference import reference
-from symtop.report import figures
-from symtop.scenes import Scene, added_scenes, closed_form, scene
-from symtop.simulate import simulate
+from symtop.integrators.registry import Integrator, integrator, integrators
+from symtop.measure import stability
+from symtop.report import atlas_figures
+from symtop.report import atlas_words as atlas
+from symtop.report import mechanism_words as mechanisms
+from symtop.scenes import added_scenes
 from symtop.study.study import Case, Picture, Study, Table
 
-SCENES = ["spheroid", "goldstein", "fast", "bruls-cardona-arnold"]
-PERIODS = 40.0
-GRAZING = 1e-3  # rad
-FINEST, COARSEST = 0.002, 2.0  # nutation periods
+FAMILY = "cusp"  # let go at theta = 0.8 with any spin
+PERIODS = 12.0
+SCANS = {
+    "grazing": stability.map_table,
+    "steady-fast": stability.resonance_table,
+    "sleeping": stability.sleeping_table,
+    "separatrix": stability.separatrix_table,
+    "goldstein": stability.sampling_table,
+}
+# most settings and rows of a map where a run takes milliseconds: the map's "grid" says what was run
+PYTHON, QUICK = (25, 24), (6, 4)
+SLOW = {"taylor": (25, 120), "taylor-longdouble": (25, 120), "taylor-quad": (13, 20), "radau": (13, 12)}
+LEAST_TOLERANCE = {"radau": 1e-6}  # a second a run at 1e-10
+
+
+def thinned(values: np.ndarray, most: int) -> np.ndarray:
+    """At most so many of the values, evenly."""
+    return values[:: -(-values.size // most)]
+
+
+def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool) -> tuple[list[float], list[float]]:
+    """Settings and rows of a map: steps, tolerances from 1e-10 to 0.5, or nothing to turn; fewer for slow methods."""
+    slow = SLOW.get(method.name, PYTHON if method.tier == "python" else (steps.size, values.size))
+    most = tuple(map(min, slow, QUICK)) if quick and slow[0] < steps.size else slow
+    parameters = thinned(values, most[1]).tolist()
+    if method.knob == "step_size":
+        return steps.tolist(), parameters
+    if method.knob is None:
+        return [math.nan], parameters
+    return np.geomspace(LEAST_TOLERANCE.get(method.name, 1e-10), 0.5, most[0]).tolist(), parameters
 
 
 def cases(quick: bool) -> list[Case]:
-    """Steps from 1/500 of a nutation to two of them; tolerances from 1e-10 to 0.5."""
-    count = 24 if quick else 97
-    steps = np.geomspace(FINEST, COARSEST, count).tolist()
-    tolerances = np.geomspace(1e-10, 0.5, max(count // 4, 12)).tolist()
+    """Maps of 200 steps by 120 spins and of 72 steps by 48 gaps; then the scans of single mechanisms."""
+    steps = np.geomspace(0.005, 2.0, 24 if quick else 200)
+    spins = np.geomspace(0.1, 30.0, 16 if quick else 120)
+    passes, gaps = np.geomspace(5e-4, 0.1, 12 if quick else 72), np.geomspace(1e-6, 0.3, 12 if quick else 48)
+    phases = np.linspace(0.5, 4.0, 15 if quick else 71).tolist()
+    limits = np.geomspace(0.1, 30.0, 4 if quick else 14).tolist()
+    tolerances = [math.inf, *(10.0 ** -np.arange(0.0 if quick else 1.0, 13.0, 4.0 if quick else 1.0)).tolist()]
+    fixed = {"steady-fast": {"phases": phases, "steps": 1000 if quick else 3000},
+             "sleeping": {"steps": [0.1, 0.5] if quick else [0.1, 0.25, 0.5, 0.75, 1.0]},
+             "goldstein": {"steps": 100, "periods": 3, "step_size": 0.1, "tolerances": tolerances,
+                           "solver_steps": 20_000 if quick else 100_000}}  # fmt: skip
     grid = []
-    for name in [*(SCENES[:3] if quick else SCENES), *added_scenes()]:
+    for name in [FAMILY, *added_scenes()]:
+        coarser = 1 if quick or name == FAMILY else 3
         for method in integrators().values():
-            ladder = {"step_size": steps, "tolerance": tolerances}.get(method.knob or "", [math.nan])
-            if method.name == "radau":  # 1 s a run at 1e-10
-                ladder = [value for value in tolerances if value > 1e-6]
-            grid.append(Case(name, method.name, {"periods": PERIODS, "ladder": ladder}))
+            ladder, parameters = axes(method, steps[::coarser], spins[::coarser], quick)
+            settings = {"parameters": parameters, "ladder": ladder, "periods": PERIODS, "limits": limits}
+            grid.append(Case(name, method.name, settings))
+    for method in integrators().values():
+        ladder, parameters = axes(method, passes, gaps, quick)
+        settings = {"parameters": parameters, "ladder": ladder, "periods": 1.0}
+        grid.append(Case("grazing", method.name, settings | {"shown": 0.005 if method.knob == "step_size" else 1e-6}))
+        if method.knob is not None:
+            ladder = [0.2, 0.1, 0.05, 0.025] if method.knob == "step_size" else [1e-4, 1e-6, 1e-8, 1e-10]
+            grid.append(Case("separatrix", method.name, {"ladder": ladder[: 1 if quick else 4]}))
+        if method.knob == "step_size":
+            grid.extend(Case(name, method.name, settings) for name, settings in fixed.items())
     return grid
 
 
 def measure(case: Case) -> xr.Dataset:
-    """What became of one run at each setting: outcome, verdict, axis error and the step in nutation periods."""
-    where, method = scene(case.scene), integrator(case.integrator)
-    period = where.nutation_period
-    horizon = case.settings["periods"] * period
-    rows: list[tuple[float, float, float, str, str]] = []
-    for value in case.settings["ladder"]:
-        setting = value * period if method.knob == "step_size" else value
-        knob = knobs(method, setting)
-        run = simulate(where, method, **knob, horizon=horizon, samples=241, observe="axis", guard=False)
-        error = errors(where, run, reference(where, run["time"].values, "closed-form"))["axis"].values
-        mean_step = run.attrs["reached_time"] / max(run.attrs["steps"], 1) / period
-        relative = value if method.knob == "step_size" else mean_step
-        worst = float(np.max(error)) if run.attrs["outcome"] == "ok" else math.nan
-        rows.append((value, relative, worst, run.attrs["outcome"], judge(where, run, error)))
-    columns = list(zip(*rows, strict=True))
-    names = ("knob", "relative_step", "axis", "outcome", "verdict")
-    table = {name: ("setting", list(column)) for name, column in zip(names, columns, strict=True)}
-    return xr.Dataset({**table, "knob_name": method.knob or "none"})
+    """The table of one mechanism for one integrator."""
+    return SCANS.get(case.scene, stability.map_table)(case.scene, integrator(case.integrator), case.settings)
+
+
+def families(data: xr.Dataset) -> list[str]:
+    """The scenes that have a map over spin."""
+    return [str(name) for name in data["scene"].values if str(name) not in SCANS]
+
+
+def advice(data: xr.Dataset, family: str) -> dict[str, atlas.Advice]:
+    """One line of the atlas for each integrator that has a map."""
+    found = {str(name): atlas.advice(data, family, str(name)) for name in data["integrator"].values}
+    return {name: line for name, line in found.items() if line is not None}
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
-    """One figure a scene, one strip an integrator."""
-    return [
-        Picture(
-            f"outcomes-{name}",
-            figures.outcome_strips(data, [str(name)], VERDICTS),
-            f"What became of runs on {name} over {PERIODS:g} nutation periods as the step grows. Accurate means an "
-            f"axis error of at most {ACCURATE:g} rad throughout. Failed runs are shown as failures, never left out.",
-            f"Coloured strips for {name}, one an integrator, showing what became of its runs as steps grow.",
-        )
-        for name in data["scene"].values
-    ]
-
-
-FAILURES = VERDICTS[4:]  # the run ended early
-
-
-def limits(data: xr.Dataset, name: str, method: str) -> tuple[float, float, str]:
-    """Largest knob below which every run is accurate, smallest knob at which a run failed, and how it failed."""
-    cell = data.sel(scene=name, integrator=method)
-    known = cell["verdict"].values != ""
-    knob, words = cell["knob"].values[known], cell["verdict"].values[known]
-    bad, failed = np.flatnonzero(words != "accurate"), np.flatnonzero(np.isin(words, FAILURES))
-    last = (bad[0] if bad.size else knob.size) - 1
-    accurate = float(knob[last]) if last >= 0 else math.nan
-    return accurate, float(knob[failed[0]]) if failed.size else math.nan, str(words[failed[0]]) if failed.size else ""
-
-
-def gap_to_pole(name: str) -> float:
-    """The closest that the axis of a scene comes to a pole, in radians."""
-    low, high = closed_form(scene(name)).theta_range
-    return min(low, math.pi - high)
-
-
-def grazing(data: xr.Dataset) -> list[str]:
-    """Scenes that come close to a pole, and what that does to methods whose chart ends there."""
-    sentences = []
-    for name in data["scene"].values:
-        where, gap = scene(str(name)), gap_to_pole(str(name))
-        if gap > GRAZING:
-            continue
-        words = data["verdict"].sel(scene=name)
-        angles = [str(m) for m in data["integrator"].values if integrator(str(m)).charts() == ("angles",)]
-        others = [str(m) for m in data["integrator"].values if str(m) not in angles]
-        never = [m for m in angles if not (words.sel(integrator=m) == "accurate").any()]
-        good = [m for m in others if (words.sel(integrator=m) == "accurate").any()]
-        sentences.append(
-            f"On {name} the axis passes a pole at {math.degrees(gap):.1e} degrees, where phi' rises to "
-            f"{_fastest(where):.1e} rad/s within an instant: of {len(angles)} methods in the angles chart {len(never)} "
-            f"are accurate at no setting tried, while {len(good)} of {len(others)} methods in charts without poles are."
-        )
-    return sentences
-
-
-def _fastest(where: Scene) -> float:
-    """The largest precession rate, at the turning point next to the pole."""
-    theta = min(closed_form(where).theta_range, key=math.sin)
-    momenta = where.top.momenta(where.start)
-    x = 0.5 * theta
-    return abs(momenta.north / math.sin(x) ** 2 + momenta.south / math.cos(x) ** 2) / (4.0 * where.top.I1)
+    """The atlas, a page a family of methods, and the mechanisms."""
+    drawn = []
+    for family in families(data):
+        lines = advice(data, family)
+        sentences = {name: line.sentence for name, line in lines.items()}
+        for page, names in atlas.pages(list(lines)).items():
+            drawn.append(Picture(
+                f"atlas-{family}-{page}", atlas_figures.atlas_page(data, family, names, sentences),
+                f"What became of every run of {len(names)} integrators ({page.replace('-', ' ')}) over {PERIODS:g} "
+                f"nutations. Left: {family} with its spin changed (r = 1 lets a top sleep upright) against the knob. "
+                "Right: a single fall past a pole that the axis misses by 1.1 delta. " + atlas.page_conclusion(
+                    data, family, names),
+                f"Maps of outcomes for {', '.join(names)}.",
+            ))  # fmt: skip
+    if set(SCANS) & set(map(str, data["scene"].values)):
+        drawn.append(Picture(
+            "mechanisms", atlas_figures.mechanisms(data),
+            "Six ways to fail, each measured alone. " + " ".join(mechanisms.mechanism_sentences(data)),
+            "Six panels: pole grazing, resonances, sleeping threshold, separatrix, sampling, solver tolerance.",
+        ))  # fmt: skip
+    return drawn
 
 
 def tables(data: xr.Dataset) -> list[Table]:
-    """Limits of accuracy and of survival."""
-    rows = []
-    for name in data["scene"].values:
-        for method in data["integrator"].values:
-            accurate, failed, how = limits(data, str(name), str(method))
-            words = data["verdict"].sel(scene=name, integrator=method).values
-            counts = {word: int(np.sum(words == word)) for word in VERDICTS}
-            rows.append(
-                [
-                    str(name),
-                    str(method),
-                    _unit(data, str(method)),
-                    f"{accurate:.2g}" if math.isfinite(accurate) else "none",
-                    f"{failed:.2g} ({how.replace('_', ' ')})" if how else "never",
-                    ", ".join(f"{word.replace('_', ' ')} {n}" for word, n in counts.items() if n),
-                ]
-            )
-    header = ["scene", "integrator", "limits in", "accurate up to", "first failure at", "runs by verdict"]
-    return [Table("Limits of accuracy and of survival", header, rows)]
-
-
-def _unit(data: xr.Dataset, method: str) -> str:
-    knob = str(data["knob_name"].sel(integrator=method).values[0])
-    return {"step_size": "nutation periods", "tolerance": "tolerance"}.get(knob, "nothing to turn")
+    """The atlas in words, and the limits in numbers."""
+    found = []
+    for family in families(data):
+        lines = [[line.integrator, line.use, line.fails] for line in advice(data, family).values()]
+        found.append(Table(f"The atlas in words: {family}", ["integrator", "use it", "it fails"], lines))
+    limits = mechanisms.limit_table(data)
+    return [*found, Table(*limits)] if limits else found
 
 
 def verdict(data: xr.Dataset) -> list[str]:
-    """How far the methods go, which of them never fail, and how the others do."""
-    calm = [str(name) for name in data["scene"].values if gap_to_pole(str(name)) > GRAZING]
-    sentences = []
-    for unit, thing in (("nutation periods", "steps"), ("tolerance", "tolerances")):
-        reach, first = [], {}
-        for method in data["integrator"].values:
-            if _unit(data, str(method)) != unit:
-                continue
-            found = [(*limits(data, name, str(method)), name) for name in calm]
-            reach.append((min(accurate if math.isfinite(accurate) else 0.0 for accurate, *_ in found), str(method)))
-            first[str(method)] = min(((at, how, name) for _, at, how, name in found if how), default=None)
-        if not reach:
-            continue
-        reach.sort(reverse=True)
-        ending = " of a nutation" if thing == "steps" else ""
-        best = ", ".join(f"{name} ({value:.2g})" for value, name in reach[:5])
-        worst = ", ".join(f"{name} ({value:.2g})" for value, name in reach[:-4:-1])
-        sentences.append(f"Accurate with the largest {thing}{ending}: {best}; with the smallest only: {worst}.")
-        never = [name for name, fate in first.items() if fate is None]
-        if never:
-            sentences.append(f"{len(never)} of {len(first)} of them never end early: {', '.join(never)}.")
-        for how in dict.fromkeys(fate[1] for fate in first.values() if fate):
-            failing = sorted((fate[0], name, fate[2]) for name, fate in first.items() if fate and fate[1] == how)
-            at, name, where = failing[0]
-            later = f", then {len(failing) - 1} more" if len(failing) > 1 else ""
-            sentences.append(
-                f"First to end with {how.replace('_', ' ')}: {name} at {at:.2g}{ending} on {where}{later}."
-            )
-    return sentences + grazing(data)
+    """How far the methods go, how they fail, and whether each mechanism is what theory says."""
+    return [s for family in families(data) for s in atlas.summary(data, family)] + mechanisms.mechanism_sentences(data)
 
 
 STUDY = Study(
     name="stability",
     title="Stability",
-    question="Where does each method fail as its step grows, and how?",
+    question="Where does each method fail, and how?",
     how_to_read=(
-        "Each strip is one method; from left to right the step grows. Green is accurate. Yellow looks healthy and is "
-        "wrong: energy bounded, phase lost. Hatched runs ended early or went where the true motion "
-        "never goes. Adaptive methods, on the right, are shown against their tolerance."
+        "A map has one cell a run. To the right the step or the tolerance grows, upwards the spin, or the gap between "
+        "path and pole. Green is accurate. Yellow looks healthy and is wrong: energy bounded, phase lost. Hatched "
+        "cells lose energy, go where the true motion never goes, or ended early. Lines: where small nutations about "
+        "a steady precession become unstable (solid), where they turn by a third of a turn a step (dashed)."
     ),
     cases=cases,
     measure=measure,

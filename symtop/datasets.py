@@ -1,6 +1,6 @@
 """Labelled datasets: names and units of variables, provenance, and files that are whole or absent.
 
-Conventions are CF-1.11 where it applies. No compression: round-off does not compress. No time stamps
+Conventions are CF-1.11 where it applies. Only maps of bytes are compressed: round-off does not compress. No time stamps
 inside, so that equal inputs give equal bytes.
 """
 
@@ -151,7 +151,10 @@ def sweep(path: Path) -> None:
 
 def write(data: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """Write a netCDF file so that it is whole or not there, whatever happens meanwhile."""
-    encoding = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}
+    encoding: dict[Any, dict[str, Any]] = {
+        name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"
+    }
+    encoding |= {name: {"zlib": True} for name, values in data.data_vars.items() if values.dtype.kind == "u"}
     with replacing(path) as partial:
         try:
             data.to_netcdf(partial, engine="netcdf4", encoding=encoding)

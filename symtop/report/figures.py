@@ -1,4 +1,4 @@
-"""The drawings that studies share: error against a knob, residuals against time, outcome maps."""
+"""The drawings that studies share: error against a knob, residuals against time."""
 
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.report.style import GREY, OUTCOME_COLORS, OUTCOME_HATCHES, Look, legend_below, look, panels, slope_guide
+from symtop.report.style import GREY, Look, legend_below, look, panels, slope_guide
 
 
 def error_curves(
@@ -168,59 +168,3 @@ def envelope(t: Any, r: Any, windows: int = 18) -> tuple[Any, Any]:
     place = np.clip(np.searchsorted(edges, t, side="left") - 1, 0, windows - 1)
     kept = np.unique(place)
     return np.sqrt(edges[kept] * edges[kept + 1]), np.array([r[place == k].max() for k in kept])
-
-
-def outcome_strips(data: xr.Dataset, scenes: Sequence[str], verdicts: Sequence[str]) -> Any:
-    """One strip an integrator, coloured and hatched by what became of each run, against its step or its tolerance."""
-    knobs = data["knob_name"].isel(scene=0).values
-    groups = [[str(n) for n, k in zip(data["integrator"].values, knobs, strict=True) if k == knob] for knob in KNOBS]
-    kept = [(label, names) for label, names in zip(KNOBS.values(), groups, strict=True) if names]
-    tallest = max(len(names) for _, names in kept)
-    figure, axes = panels(len(scenes), len(kept), height=0.75 + 0.3 * tallest, sharex="col")
-    used: set[str] = set()
-    for line, scene in zip(axes, scenes, strict=True):
-        for axis, (label, names) in zip(line, kept, strict=True):
-            for row, name in enumerate(names):
-                cell = data.sel(scene=scene, integrator=name)
-                used |= _strip(axis, row, cell["knob"].values, cell["verdict"].values)
-            axis.set(xscale="log", ylim=(tallest - 0.5, -0.5), yticks=range(len(names)), yticklabels=names)
-            axis.set_title(scene)
-            axis.grid(visible=False)
-            axis.tick_params(axis="y", length=0)
-            if scene == scenes[-1]:
-                axis.set_xlabel(label)
-    handles = [_patch(verdict) for verdict in verdicts if verdict in used]
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False)
-    return figure
-
-
-KNOBS = {"step_size": "step size (nutation periods)", "tolerance": "tolerance"}
-
-
-def _patch(verdict: str) -> Any:
-    from matplotlib.patches import Patch  # noqa: PLC0415
-
-    return Patch(
-        facecolor=OUTCOME_COLORS[verdict], hatch=OUTCOME_HATCHES.get(verdict), edgecolor=GREY, lw=0.4,
-        label=verdict.replace("_", " "),
-    )  # fmt: skip
-
-
-def _strip(axis: Any, row: int, steps: Any, verdicts: Any) -> set[str]:
-    good = np.isfinite(steps) & (steps > 0.0) & (verdicts != "")
-    if not good.any():
-        return set()
-    order = np.argsort(steps[good])
-    x, words = steps[good][order], verdicts[good][order]
-    middle = np.sqrt(x[1:] * x[:-1])
-    ratio = middle[0] / x[0] if x.size > 1 else 1.1
-    edges = np.concatenate([[x[0] / ratio], middle, [x[-1] * ratio]])
-    start = 0
-    for k in range(1, x.size + 1):
-        if k == x.size or words[k] != words[start]:
-            axis.fill_between(
-                [edges[start], edges[k]], row - 0.38, row + 0.38, facecolor=OUTCOME_COLORS[str(words[start])],
-                hatch=OUTCOME_HATCHES.get(str(words[start])), edgecolor=GREY, lw=0.3,
-            )  # fmt: skip
-            start = k
-    return {str(word) for word in words}

@@ -169,7 +169,7 @@ def was_begun(path: Path) -> bool:
 
 
 def combine(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
-    """One dataset over scene and integrator; a cell nobody measured is NaN (or an empty string)."""
+    """One dataset over scene and integrator; a cell nobody measured is NaN (a byte 255, a string empty)."""
     cases = [one for case, data in cases for one in _apart(case, data)]
     scenes = list(dict.fromkeys(case.scene for case, _ in cases))
     methods = list(dict.fromkeys(case.integrator for case, _ in cases))
@@ -192,9 +192,8 @@ def combine(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
         for name, variable in data.data_vars.items():
             dims = tuple(str(dim) for dim in variable.dims)
             if str(name) not in filled:
-                text = variable.dtype.kind in "OUT"
                 shape = (len(scenes), len(methods), *(sizes[dim] for dim in dims))
-                blank = np.full(shape, "", dtype=object) if text else np.full(shape, math.nan)
+                blank = np.full(shape, *_blank(variable.dtype))
                 filled[str(name)] = (("scene", "integrator", *dims), blank, dict(variable.attrs))
             corner = tuple(slice(0, size) for size in variable.shape)
             filled[str(name)][1][(*place, *corner)] = variable.values
@@ -211,6 +210,13 @@ def _apart(case: Case, data: xr.Dataset) -> list[tuple[Case, xr.Dataset]]:
         return [(case, data)]
     names = [str(name) for name in data["integrator"].values]
     return [(replace(case, integrator=name), data.sel(integrator=name, drop=True)) for name in names]
+
+
+def _blank(kind: "np.dtype[Any]") -> tuple[Any, Any]:
+    """What stands for nothing in an array of that type, and the type that can hold it."""
+    if kind.kind in "OUT":
+        return "", object
+    return (np.iinfo(kind).max, kind) if kind.kind == "u" else (math.nan, float)
 
 
 def write_text(path: Path, text: str) -> None:
