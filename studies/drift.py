@@ -4,7 +4,8 @@ import numpy as np
 import xarray as xr
 
 from symtop.integrators.registry import integrator, integrators
-from symtop.measure.conservation import CONSTANTS, growth, residuals, trend
+from symtop.measure.conservation import CONSTANTS, residuals, trend
+from symtop.measure.growth import growth
 from symtop.report import figures
 from symtop.scenes import added_scenes, scene
 from symtop.simulate import simulate

@@ -124,7 +124,7 @@ class Loop:
         return March(states, momenta, k, work, outcome), Position(state, low, carry, k)
 
 
-def driver(
+def driver(  # noqa: C901  (one loop, read in one piece)
     begin: Callable[..., Any],
     increment: Callable[..., Any],
     observe: Callable[..., Any],

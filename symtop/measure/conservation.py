@@ -8,7 +8,6 @@ wanders: in 33 % of cases its interval is too narrow (white noise: 3 %), so that
 """
 
 import math
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,6 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from symtop.measure.errors import energy_scale, momentum_scale
-from symtop.measure.order import Fit, power_law
 from symtop.scenes import Scene
 
 CONSTANTS = ("energy", "p_phi", "p_psi")
@@ -64,19 +62,3 @@ def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
     memory = min(max(memory, 0.0), 0.95)
     error *= math.sqrt((1.0 + memory) / (1.0 - memory))
     return Trend(slope, float(student.ppf(0.975, BLOCKS - 2)) * error, slope * float(t[-1] - t[0]))
-
-
-def growth(time: ArrayLike, residual: ArrayLike) -> Fit:
-    """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last two decades.
-
-    What happens within the first nutations is an oscillation that switches on, not growth.
-    """
-    t, r = np.asarray(time, float), np.abs(np.asarray(residual, float))
-    edges = np.geomspace(t[-1] / 100.0, t[-1], 13)
-    middles, tops = [], []
-    for low, high in pairwise(edges):
-        inside = (t > low) & (t <= high) & np.isfinite(r)
-        if inside.any():
-            middles.append(math.sqrt(low * high))
-            tops.append(float(r[inside].max()))
-    return power_law(middles, tops)

@@ -1,13 +1,13 @@
 """Long runs: a billion steps in the memory of a thousand, watched while they run, resumable to the same bits.
 
-A run is cut into windows: logarithmic in time, `PER_DECADE` a decade, until they would last longer than `LONGEST` steps.
-In each, `SAMPLES` samples are taken at whole steps that the golden ratio scatters, so that no stride is ever commensurate
-with the nutation; of every quantity the least, the largest and the mean are kept, and the samples are thrown away. The
-steps between samples are the compiled loop alone, and its 1e5 steps or more a window cost what they always cost.
+A run is cut into windows: logarithmic in time, `PER_DECADE` a decade, until they would be longer than `LONGEST`
+steps. In each, `SAMPLES` samples are taken at whole steps that the golden ratio scatters, so that no stride is
+commensurate with the nutation; of every quantity the least, the largest and the mean are kept, and the samples are
+thrown away. Between samples there is the compiled loop alone.
 
-After each window the position of the run, all that its next step depends on, can be written to a checkpoint (whole or not
-at all, at most every `SAVE` seconds, and on an interrupt). A run that finds its checkpoint goes on from there. Where
-windows end is fixed by the number of steps alone, so a resumed run has the bits of one that was never stopped.
+After a window the position of the run, all that its next step depends on, can be written to a checkpoint: whole or not
+at all, at most every `SAVE` seconds, and on an interrupt. A run that finds its checkpoint goes on from there. Where
+windows end is fixed by the number of steps alone, so that a resumed run has the bits of one that was never stopped.
 """
 
 import contextlib
@@ -40,9 +40,7 @@ from symtop.scenes import scene as find_scene
 from symtop.simulate import MOST_STEPS
 
 Array = np.ndarray
-Gauge = Callable[
-    [Array, Array], dict[str, Array]
-]  # states and momenta of some samples -> quantities, one value a sample
+Gauge = Callable[[Array, Array], dict[str, Array]]  # states and momenta of samples -> quantities
 
 FIRST = 10_000  # steps of the first window
 PER_DECADE = 12
@@ -82,7 +80,7 @@ def chart_of(method: Integrator) -> tuple[str, FixedStep]:
 def watch(where: Scene, method: Integrator, h: float) -> Gauge:
     """Relative changes of energy, modified energy and momenta since the start, and theta, of any samples of a run.
 
-    The oscillation that the modified energy leaves is fitted on the first `FIRST` steps (see `shadow`), which are run here.
+    The oscillation that the modified energy leaves is fitted on the first `FIRST` steps (`shadow`), which are run here.
     """
     chart, solver = chart_of(method)
     par, rule, state = solver.setup(where.top, where.start, h)
@@ -96,7 +94,7 @@ def watch(where: Scene, method: Integrator, h: float) -> Gauge:
     seen = shown(solver.loop(par, rule, state, h, np.array([0])).states)
     energy_start = float(shadow.energy(where, chart, seen)[0])
     series, modified_start = shadow.oscillation(
-        *shadow.section(where, chart, first), shadow.modified_energy(where, method.name, chart, first, h)
+        *shadow.section(chart, first), shadow.modified_energy(where, method.name, chart, first, h)
     )
 
     def gauge(states: Array, momenta: Array) -> dict[str, Array]:
@@ -104,7 +102,7 @@ def watch(where: Scene, method: Integrator, h: float) -> Gauge:
         modified = shadow.modified_energy(where, method.name, chart, states, h) - modified_start
         return {
             "energy": (shadow.energy(where, chart, states) - energy_start) / scale,
-            "modified_energy": (modified - series(*shadow.section(where, chart, states))) / scale,
+            "modified_energy": (modified - series(*shadow.section(chart, states))) / scale,
             "p_phi": (momenta[:, 0] - start.p_phi) / unit,
             "p_psi": (momenta[:, 1] - start.p_psi) / unit,
             "theta": states[:, 0] if chart == "angles" else charts.theta_from_axis(states[:, :3]),
@@ -126,9 +124,9 @@ def long_run(
     """Run a fixed-step method for any number of steps and return what it did, window by window.
 
     Dimension ``window``; ``steps`` is where each ends. For each of energy, modified_energy, p_phi, p_psi (relative
-    changes since the start) and theta (rad): ``NAME_least``, ``NAME_largest``, ``NAME_mean``. The first window shows its
-    last three quarters of modified energy as any other. With `checkpoint`, a file that is written as the run goes on
-    and removed at its end, an interrupted run is resumed. ``compensated=False`` sums increments plainly, to compare.
+    changes since the start) and theta (rad): ``NAME_least``, ``NAME_largest``, ``NAME_mean``. `checkpoint` is a file
+    that is written as the run goes on and removed at its end: an interrupted run resumes from it.
+    ``compensated=False`` sums increments plainly, to compare.
 
     Raises SymtopError for a method without a compiled loop and for a checkpoint of another run.
     """
@@ -141,39 +139,25 @@ def long_run(
     assert isinstance(solver.loop, Loop)  # noqa: S101
     loop = solver.loop if compensated else solver.loop.plain()
     par, rule, state = solver.setup(where.top, where.start, h)
-    identity = _identity(where, method, h, count, compensated)
-    file = None if checkpoint is None else Path(checkpoint)
-    at = loop.begun(par, rule, state, h)
-    rows: list[list[float]] = []
-    if file is not None and file.is_file():
-        at, rows = _resumed(file, at, identity)
-    ends, outcome = windows(count), OK
+    book = _Book(checkpoint, _identity(where, method, h, count, compensated))
+    at, rows = book.resumed(loop.begun(par, rule, state, h))
+    ends, outcome, reached = windows(count), OK, at.k
     gauge = watch(where, method, h) if len(rows) < len(ends) else None
-    saved, kept = time.monotonic(), len(rows)
     with (
-        _ending_on_sigterm(),
+        book.kept(),
         tqdm(total=count, initial=at.k, desc=f"{method.name} on {where.name}", unit="step", unit_scale=True,
              disable=quiet or None, leave=False) as bar,
     ):  # fmt: skip
-        try:
-            while gauge is not None and len(rows) < len(ends) and outcome == OK:
-                done, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))
-                outcome = done.outcome
-                if outcome == OK:
-                    rows.append(_summary(gauge(done.states, done.momenta)))
-                    bar.update(after.k - at.k)
-                    at = after
-                if file is not None and time.monotonic() - saved > SAVE:
-                    _save(file, at, rows, identity)
-                    saved, kept = time.monotonic(), len(rows)
-        except BaseException:
-            if file is not None and len(rows) > kept:
-                _save(file, at, rows, identity)
-            raise
-    if file is not None:
-        file.unlink(missing_ok=True)
+        while gauge is not None and len(rows) < len(ends) and outcome == OK:
+            done, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))
+            outcome, reached = done.outcome, after.k
+            if outcome == OK:
+                rows.append(_summary(gauge(done.states, done.momenta)))
+                bar.update(after.k - at.k)
+                at = after
+                book.note(at, rows)
+    book.close()
     columns = np.array(rows).reshape(len(rows), len(QUANTITIES), 3)
-    reached = (at if outcome == OK else after).k * h
     found: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
     for i, name in enumerate(QUANTITIES):
         for m, part in enumerate(("least", "largest", "mean")):
@@ -187,8 +171,8 @@ def long_run(
         horizon=count * h,
         compensated=str(compensated).lower(),
         outcome=OUTCOMES[outcome],
-        outcome_message=sentence(OUTCOMES[outcome], reached, count * h),
-        reached_time=reached,
+        outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h),
+        reached_time=reached * h,
     )
 
 
@@ -228,23 +212,59 @@ def regrown(carry: Any, values: Iterator[float]) -> Any:
     return next(values)
 
 
-def _save(file: Path, at: Position, rows: list[list[float]], identity: str) -> None:
-    numbers = [*at.state, *at.low, *leaves(at.carry)]
-    data = xr.Dataset({"position": ("number", numbers), "rows": (("window", "part"), rows)})
-    data.attrs.update(steps_done=at.k, identity=identity)
-    datasets.write(data, file)
+class _Book:
+    """The checkpoint of one run: what was done so far, on disk from time to time."""
 
+    def __init__(self, file: "str | Path | None", identity: str) -> None:
+        self.file = None if file is None else Path(file)
+        self.identity = identity
+        self.saved = time.monotonic()
+        self.latest: tuple[Position, list[list[float]]] | None = None
 
-def _resumed(file: Path, start: Position, identity: str) -> tuple[Position, list[list[float]]]:
-    """The position and the windows of a checkpoint."""
-    data = datasets.read(file)
-    if data.attrs.get("identity") != identity:
-        msg = f"checkpoint {file} belongs to another run or another version; remove it or name another file"
-        raise SymtopError(msg)
-    values = iter([float(value) for value in data["position"].values])
-    state, low = (tuple(next(values) for _ in start.state) for _ in range(2))
-    at = Position(state, low, regrown(start.carry, values), int(data.attrs["steps_done"]))
-    return at, [[float(value) for value in row] for row in data["rows"].values]
+    def resumed(self, start: Position) -> tuple[Position, list[list[float]]]:
+        """The position and the windows to go on from: those on disk, or the start."""
+        if self.file is None or not self.file.is_file():
+            return start, []
+        data = datasets.read(self.file)
+        if data.attrs.get("identity") != self.identity:
+            msg = f"checkpoint {self.file} belongs to another run or version; remove it or name another file"
+            raise SymtopError(msg)
+        values = iter([float(value) for value in data["position"].values])
+        state, low = (tuple(next(values) for _ in start.state) for _ in range(2))
+        at = Position(state, low, regrown(start.carry, values), int(data.attrs["steps_done"]))
+        return at, [[float(value) for value in row] for row in data["rows"].values]
+
+    def note(self, at: Position, rows: list[list[float]]) -> None:
+        """After a window: write it down if the last time was a while ago."""
+        self.latest = (at, list(rows))  # a copy: an interrupt may fall between a window and its note
+        if time.monotonic() - self.saved > SAVE:
+            self.save()
+
+    def save(self) -> None:
+        """Write what is not yet on disk."""
+        if self.file is None or self.latest is None:
+            return
+        at, rows = self.latest
+        numbers = [*at.state, *at.low, *leaves(at.carry)]
+        data = xr.Dataset({"position": ("number", numbers), "rows": (("window", "part"), rows)})
+        data.attrs.update(steps_done=at.k, identity=self.identity)
+        datasets.write(data, self.file)
+        self.saved, self.latest = time.monotonic(), None
+
+    @contextlib.contextmanager
+    def kept(self) -> Iterator[None]:
+        """Whatever ends the run early, an interrupt or a polite kill, leaves a checkpoint."""
+        with _ending_on_sigterm():
+            try:
+                yield
+            except BaseException:
+                self.save()
+                raise
+
+    def close(self) -> None:
+        """The run is done."""
+        if self.file is not None:
+            self.file.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager

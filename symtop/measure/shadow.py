@@ -9,10 +9,11 @@ it come off. The first is known in closed form, for kick-drift-kick splittings H
     midpoint              H - h^2 (p^2 V''/I1^2 + V'^2 / I1) / 24
     cayley                exactly conserved: `splitting_space.cayley_energy` / I1
 
-and leaves C h^4 (nothing for cayley). The second is whatever remains: the motion has one degree of freedom, a symplectic
-map stays on a closed curve of its (theta, p_theta), or of (u, u') with u = cos(theta), and any function of the state is on
-that curve a periodic function of the angle about its middle. A Fourier series in that angle, fitted to the first few nutations of a run, takes
-it off to a few 1e-17; only what moves the curve remains, and the mean of some hundred samples shows 1e-17 of it.
+and leaves C h^4 (nothing for cayley). The second is whatever remains: the motion has one degree of freedom, a
+symplectic map stays on a closed curve of its (theta, p_theta), or of (u, u') with u = cos(theta), and any function of
+the state is on that curve a periodic function of the angle about its middle. A Fourier series in that angle, fitted to
+the first nutations of a run, takes it off to a few 1e-17; only what moves the curve remains, and the mean of some
+hundred samples shows 1e-17 of it.
 Source of the first layer: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
 """
 
@@ -60,7 +61,7 @@ def _strang(top: SymmetricTop, at: Momenta, states: Array, h: float) -> Array:  
 
 def _cayley(top: SymmetricTop, at: Momenta, states: Array, h: float) -> Array:  # noqa: ARG001
     e, L = states[:, :3], states[:, 3:6]
-    return cayley_energy(top, h, 0.5 * h / top.I1, e, L) / top.I1 - space_energy(top, e, L, 0.0)
+    return np.asarray(cayley_energy(top, h, 0.5 * h / top.I1, e, L) / top.I1 - space_energy(top, e, L, 0.0))
 
 
 _CORRECTIONS: dict[str, Callable[[SymmetricTop, Momenta, Array, float], Array]] = {
@@ -73,13 +74,13 @@ KNOWN = tuple(_CORRECTIONS)
 
 
 def modified_energy(where: Scene, method: str, chart: str, states: Array, h: float) -> Array:
-    """The modified energy of kernel states (n, dimension) to order h^4, less its constant parts; H for other methods."""
+    """The modified energy of kernel states (n, dimension) up to O(h^4), less constants; H for other methods."""
     found = energy(where, chart, states)
     correction = _CORRECTIONS.get(method)
     return found if correction is None else found + correction(where.top, where.top.momenta(where.start), states, h)
 
 
-def section(where: Scene, chart: str, states: Array) -> tuple[Array, Array]:
+def section(chart: str, states: Array) -> tuple[Array, Array]:
     """(theta, p_theta) or (u, I1 u') of kernel states: a plane in which one nutation is a closed curve.
 
     In the angles chart the series of stormer-verlet needs twice as many harmonics in u as in theta.
