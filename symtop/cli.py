@@ -1,4 +1,4 @@
-"""The command line: ``symtop integrators | scenes | run | study | report``.
+"""The command line: ``symtop integrators | scenes | run | long | study | report``.
 
 Exit codes: 0 fine, 1 a case or a check failed, 2 bad input, 3 a run ended early by its outcome (what it had was kept).
 Heavy packages are imported by the command that needs them.
@@ -140,15 +140,55 @@ def run(
 
 
 @main.command()
+@click.argument("scene")
+@click.argument("integrator")
+@click.option("--steps", type=float, default=1e9, show_default=True, help="How many steps.")
+@click.option("--step-size", type=float, help="A thousandth of a nutation by default.")
+@click.option(
+    "--checkpoint", type=click.Path(dir_okay=False), help="File to resume from; in symtop's cache by default."
+)
+@click.option("--output", type=click.Path(), help="Write the windows to this netCDF file.")
+@plugin_option
+def long(
+    scene: str, integrator: str, steps: float, step_size: float | None, checkpoint: str | None, output: str | None,
+    plugin_files: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Run one INTEGRATOR on one SCENE for very many steps, in little memory; stop it as you like and call it again.
+
+    \b
+    symtop long spheroid stormer-verlet --steps 1e9 --output long.nc
+    """
+    from symtop import datasets  # noqa: PLC0415
+    from symtop.measure.longrun import PER_NUTATION, long_run  # noqa: PLC0415
+    from symtop.scenes import scene as find_scene  # noqa: PLC0415
+
+    _load_plugins(plugin_files)
+    h = find_scene(scene).nutation_period / PER_NUTATION if step_size is None else step_size
+    data = long_run(scene, integrator, steps=int(steps), step_size=h, checkpoint=checkpoint or True)
+    click.echo(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
+    if data.sizes["window"]:
+        for name in ("energy", "modified_energy", "p_phi", "p_psi"):
+            low, high = float(data[f"{name}_least"].min()), float(data[f"{name}_largest"].max())
+            end = float(data[f"{name}_mean"][-1])
+            click.echo(f"  {name:<16} change from {low:+.3e} to {high:+.3e}   mean of the last window {end:+.3e}")
+    if output is not None:
+        datasets.write(data, output)
+        click.echo(f"written to {output}")
+    if data.attrs["outcome"] != "ok":
+        sys.exit(3)
+
+
+@main.command()
 @click.argument("names", nargs=-1)
 @click.option("--all", "every", is_flag=True, help="Run every study.")
 @click.option("--quick", is_flag=True, help="Coarse grids, a few seconds a study; kept apart from the full results.")
+@click.option("--full", is_flag=True, help="The longest grid of a study that has one (drift: 10^9 steps).")
 @click.option("--fresh", is_flag=True, help="Compute every case again.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes for untimed cases; all cores by default.")
 @click.option("--results", type=click.Path(file_okay=False), default="results", show_default=True)
 @plugin_option
 def study(
-    names: tuple[str, ...], every: bool, quick: bool, fresh: bool, jobs: int | None, results: str,
+    names: tuple[str, ...], every: bool, quick: bool, full: bool, fresh: bool, jobs: int | None, results: str,
     plugin_files: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Run studies by NAME: datasets, figures and findings into the results folder.
@@ -161,6 +201,9 @@ def study(
     from symtop.study import run as runner  # noqa: PLC0415
 
     _load_plugins(plugin_files)
+    if quick and full:
+        msg = "quick and full must not be given together"
+        raise SymtopError(msg)
     chosen = runner.names() if every else list(names)
     if not chosen:
         msg = f"name a study or use --all; known: {', '.join(runner.names())}"
@@ -168,7 +211,7 @@ def study(
     folder = Path(results) / "quick" if quick else Path(results)
     failed = False
     for study_ in [runner.load(name) for name in chosen]:
-        found = runner.run(study_, folder, quick=quick, fresh=fresh, jobs=jobs)
+        found = runner.run(study_, folder, quick=quick, full=full, fresh=fresh, jobs=jobs)
         click.echo(
             f"{study_.name}: {found['computed']} of {found['cases']} cases computed, {len(found['pictures'])} figures"
         )

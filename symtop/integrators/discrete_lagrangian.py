@@ -155,8 +155,7 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
     theta = state[0]
-    # d = (h/I1) (p - h W0) with the very h that p changes by: a product h^2/I1, rounded once and for all, would be a
-    # force of eps h V'/2 on theta', which does work of one sign: the energy grew by 1e-13 in 1e8 steps
+    # h^2/I1 rounded once and for all would do work of one sign: h and h/I1 are all that the increments know
     lever = h / par.I1
     flight, scale = lever * state[1], lever * h
     sin_start, cos_start = _start_trig(rule, theta)
@@ -184,6 +183,9 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     # what was evaluated before the last correction follows it to first order; the remainder is its square
     W0 = force.W0 + force.W0_slope * correction
     W1 = force.W1 + force.W1_slope * correction
+    # theta moves by the very force that moves p. What Newton's last division leaves instead is off by a twentieth of a
+    # rounding, but always to the same side: the energy drifted by 4e-14 in 3e6 steps, and wanders by 8e-15 now
+    d = lever * (state[1] - h * W0)
     v = force.v + force.v_slope * correction
     C = sums.C - sums.P1 * correction
     step = (d, -h * (W0 + W1), h * v, h * (par.p_psi / par.I3 - v * C))

@@ -28,7 +28,7 @@ from tqdm import tqdm
 
 from symtop import charts, datasets
 from symtop.checks import SymtopError, positive, whole
-from symtop.integrators.compiled import source_digest
+from symtop.integrators.compiled import cache_root, source_digest
 from symtop.integrators.drive import Loop, Position
 from symtop.integrators.fixed_step import FixedStep, inside
 from symtop.integrators.outcomes import OK, OUTCOMES, sentence
@@ -42,6 +42,7 @@ from symtop.simulate import MOST_STEPS
 Array = np.ndarray
 Gauge = Callable[[Array, Array], dict[str, Array]]  # states and momenta of samples -> quantities
 
+PER_NUTATION = 1000.37  # steps, where nobody says otherwise: not commensurate with the nutation
 FIRST = 10_000  # steps of the first window
 PER_DECADE = 12
 LONGEST = 20_000_000  # steps: a window of this length takes a second or two, and no more than one is lost by a kill
@@ -117,7 +118,7 @@ def long_run(
     *,
     steps: int,
     step_size: float,
-    checkpoint: "str | Path | None" = None,
+    checkpoint: "str | Path | bool" = False,
     compensated: bool = True,
     quiet: bool = False,
 ) -> xr.Dataset:
@@ -125,7 +126,8 @@ def long_run(
 
     Dimension ``window``; ``steps`` is where each ends. For each of energy, modified_energy, p_phi, p_psi (relative
     changes since the start) and theta (rad): ``NAME_least``, ``NAME_largest``, ``NAME_mean``. `checkpoint` is a file
-    that is written as the run goes on and removed at its end: an interrupted run resumes from it.
+    that is written as the run goes on and removed at its end, or True for one in symtop's cache: an interrupted run
+    resumes from it.
     ``compensated=False`` sums increments plainly, to compare.
 
     Raises SymtopError for a method without a compiled loop and for a checkpoint of another run.
@@ -215,8 +217,9 @@ def regrown(carry: Any, values: Iterator[float]) -> Any:
 class _Book:
     """The checkpoint of one run: what was done so far, on disk from time to time."""
 
-    def __init__(self, file: "str | Path | None", identity: str) -> None:
-        self.file = None if file is None else Path(file)
+    def __init__(self, file: "str | Path | bool", identity: str) -> None:
+        own = cache_root() / "runs" / f"{identity}.nc"
+        self.file = own if file is True else Path(file) if file else None
         self.identity = identity
         self.saved = time.monotonic()
         self.latest: tuple[Position, list[list[float]]] | None = None
@@ -282,3 +285,10 @@ def _ending_on_sigterm() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def long_windows(where: Scene, method: Integrator, steps: int, per_nutation: float) -> xr.Dataset:
+    """The windows of one long run, resumed if it was begun before: ``window_steps``, ``window_energy_least``, ..."""
+    h = where.nutation_period / per_nutation
+    run = long_run(where, method, steps=steps, step_size=h, checkpoint=True, quiet=True)
+    return run.rename({name: f"window_{name}" for name in run.data_vars}).drop_attrs()

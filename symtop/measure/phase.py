@@ -17,7 +17,13 @@ from symtop.checks import SymtopError
 from symtop.scenes import Scene, closed_form
 
 NODES = 4096
-FEWEST = 1e-6  # rad: a nutation narrower than this has no phase to speak of
+NARROWEST = 1e-6  # rad: a nutation narrower than this has no phase to speak of
+
+
+def has_phase(where: Scene) -> bool:
+    """Does this motion nutate, and in a finite time?"""
+    highest, lowest = closed_form(where).theta_range
+    return lowest - highest > NARROWEST and math.isfinite(where.nutation_period)
 
 
 class Clock:
@@ -28,8 +34,7 @@ class Clock:
 
         self.period = where.nutation_period
         exact = closed_form(where)
-        narrow = exact.theta_range[1] - exact.theta_range[0] < FEWEST
-        if narrow or not math.isfinite(self.period):
+        if not has_phase(where):
             msg = f"scene {where.name} has no nutation whose phase could be measured"
             raise SymtopError(msg)
         times = self.period * np.arange(NODES + 1) / NODES

@@ -151,10 +151,13 @@ def _stamp(study: Study, digests: Iterable[str]) -> str:
     return digest.hexdigest()[:20]
 
 
-def run(study: Study, results: Path, *, quick: bool = False, fresh: bool = False, jobs: int | None = None,
-        quiet: bool = False) -> dict[str, Any]:  # fmt: skip
-    """Bring a study's dataset, figures and findings up to date; returns the findings."""
-    cases = study.cases(quick)
+def run(study: Study, results: Path, *, quick: bool = False, full: bool = False, fresh: bool = False,
+        jobs: int | None = None, quiet: bool = False) -> dict[str, Any]:  # fmt: skip
+    """Bring a study's dataset, figures and findings up to date; returns the findings.
+
+    `quick` is the coarse grid, `full` the longest one of a study that has it.
+    """
+    cases = study.full() if full and study.full is not None else study.cases(quick)
     paths = {store.case_path(results, study, case): case for case in cases}
     done: dict[Path, xr.Dataset] = {}
     if not fresh:

@@ -76,6 +76,7 @@ class Study:
     pictures: Callable[[xr.Dataset], list[Picture]]
     verdict: Callable[[xr.Dataset], list[str]]
     tables: Callable[[xr.Dataset], list[Table]] = lambda _: []
+    full: Callable[[], list[Case]] | None = None  # a grid that takes much longer, for `--full`
     timed: bool = False  # timed cases run one at a time, on a machine that does nothing else
 
     def digest(self, case: Case) -> str:
