@@ -119,9 +119,9 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     windows = Picture(
         "windows",
         long_figures.window_bands(here, walkers),
-        f"{steps:.0e} steps on {LONG}, {PER_NUTATION:.0f} a nutation: least to largest change of each window as a band, "
-        "its mean as a line. The energy swings within its band and goes nowhere; the modified energy shows the walk of "
-        f"rounding below it. Momenta, recomputed inside the step, stay within {worst:.0e}.",
+        f"{steps:.0e} steps on {LONG}, {PER_NUTATION:.0f} a nutation: a band from the least to the largest change of "
+        "each window, its mean as a line. The energy swings within its band and goes nowhere; the modified energy shows "
+        f"the walk of rounding below it. Momenta, recomputed inside the step, stay within {worst:.0e}.",
         "Bands of energy, modified energy and momenta over the logarithm of steps for four methods.",
     )
     walks = Picture(
@@ -145,7 +145,8 @@ def _walk(cell: xr.Dataset) -> str:
     name, ratio = str(cell["integrator"].values), float(cell["rounding_plain_end"] / cell["rounding_end"])
     return (
         f"{name} grows as n^{float(cell['rounding_exponent']):.2f} +- "
-        f"{float(cell['rounding_exponent_interval']):.2f} to {float(cell['rounding_end']):.1e}, {ratio:.0f} times less than plain sums."
+        f"{float(cell['rounding_exponent_interval']):.2f} to {float(cell['rounding_end']):.1e}, "
+        f"{ratio:.0f} times less than plain sums."
     )
 
 

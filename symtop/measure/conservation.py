@@ -42,9 +42,9 @@ def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
     """One run and what became of the constants of the motion and of its phase.
 
     Dimension ``sample``: ``sample_time`` and, for energy, p_phi and p_psi, ``NAME_residual``. For each of them the
-    ``largest``, the linear ``slope`` with its ``interval`` and ``rise``, and the ``exponent`` of growth over the last two
-    decades; for the phase of the nutation (rad; NaN where there is none) ``largest`` and ``exponent``, over the last
-    decade, because a wrong frequency gives way to a drifting one only late. ``exponent_interval`` goes with each.
+    ``largest``, the linear ``slope`` with its ``interval`` and ``rise``, and the ``exponent`` of growth over the last
+    two decades; for the phase of the nutation (rad; NaN where there is none) ``largest`` and ``exponent``, over the
+    last decade, because a wrong frequency gives way to a drifting one only late. ``exponent_interval`` goes with each.
     """
     run = simulate(scene, method, observe="nutation", **settings)
     time = run["time"].values

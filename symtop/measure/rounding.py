@@ -1,9 +1,9 @@
 """Round-off over many steps: how the modified energy of an ensemble wanders off, and what plain sums would do.
 
-Every member starts a hundredth of a radian from the one before; its step is the same fraction of its own nutation. Drift
-is the change of the mean modified energy of a window (see `shadow`, `longrun`), relative to the energy. The best that can
-be had is Brouwer's law, a root mean square that grows as n^1/2. Reference: Hairer, McLachlan, Razakarivony, BIT 48 (2008)
-231.
+Every member starts a hundredth of a radian from the one before; its step is the same fraction of its own nutation.
+Drift is the change of the mean modified energy of a window (see `shadow`, `longrun`), relative to the energy. The best
+that can be had is Brouwer's law, a root mean square that grows as n^1/2.
+Reference: Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231.
 """
 
 from dataclasses import replace
@@ -31,8 +31,8 @@ def members(where: Scene, count: int) -> list[Scene]:
 def round_off(where: Scene, method: Integrator, steps: int, per_nutation: float, count: int) -> xr.Dataset:
     """Drift of the modified energy of `count` starts over `steps` steps, with compensated and with plain sums.
 
-    Dimensions ``member`` and ``rounding_window``. ``rounding`` and ``rounding_plain`` hold drifts, ``..._rms`` their root
-    mean square, ``..._exponent`` its growth with ``..._exponent_interval`` (95 %), ``..._end`` its last value;
+    Dimensions ``member`` and ``rounding_window``. ``rounding`` and ``rounding_plain`` hold drifts, ``..._rms`` their
+    root mean square, ``..._exponent`` its growth with ``..._exponent_interval`` (95 %), ``..._end`` its last value;
     ``rounding_p_phi`` and ``rounding_p_psi`` the largest change of a momentum with compensated sums.
     """
     found: dict[str, object] = {}
