@@ -46,9 +46,8 @@ def _grid(steps: int, members: int, walk: int, longest: int, short: float) -> li
         for method in integrators().values()
         if method.knob == "step_size"
     ]
-    return long + lost + [
-        _history(name, method, steps) for name in [*SCENES, *added_scenes()] for method in integrators()
-    ]  # fmt: skip
+    histories = [_history(name, method, steps) for name in [*SCENES, *added_scenes()] for method in integrators()]
+    return histories + long + lost
 
 
 def _history(name: str, known: str, steps: int) -> Case:
@@ -100,11 +99,10 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     )
     growths = Picture(
         "exponents",
-        figures.dots(
+        long_figures.exponents(
             data,
             scenes,
             [(f"{name}_exponent", f"exponent of {label}") for name, label in {**LABELS, "phase": "phase"}.items()],
-            log=False,
         ),
         "Growth exponent of the largest residual of energy and momenta over the last two decades of time and of the "
         "phase error over the last one, with 95 % intervals: 0 is bounded, 1/2 the random walk of rounding, 1 a steady "
@@ -120,7 +118,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         "windows",
         long_figures.window_bands(here, walkers),
         f"{steps:.0e} steps on {LONG}, {PER_NUTATION:.0f} a nutation: a band from the least to the largest change of "
-        "each window, its mean as a line. The energy swings within its band and goes nowhere; the modified energy shows "
+        "each window, its mean as a line. Energy swings within its band and goes nowhere; the modified energy shows "
         f"the walk of rounding below it. Momenta, recomputed inside the step, stay within {worst:.0e}.",
         "Bands of energy, modified energy and momenta over the logarithm of steps for four methods.",
     )

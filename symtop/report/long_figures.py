@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.ticker import NullFormatter
 
+from symtop.report.figures import dots, envelope
 from symtop.report.style import BLACK, GREY, legend_below, look, panels, slope_guide
 
 ROWS = (
@@ -53,9 +55,11 @@ def walks(data: xr.Dataset, names: Sequence[str]) -> Any:
                   label=f"{name}, compensated")  # fmt: skip
         axis.plot(steps[good], cell["rounding_plain_rms"].values[good], "x--", color=BLACK, ms=4, lw=1.0,
                   label="plain sums")  # fmt: skip
-        axis.set(xscale="log", yscale="log", title=name, xlabel="steps", ylim=(1e-18, None))
+        axis.set(xscale="log", yscale="log", title=name, xlabel="steps")
+        axis.xaxis.set_minor_formatter(NullFormatter())
         first, last = float(steps[good][0]), float(steps[good][-1])
         slope_guide(axis, 0.5, (first * 3.0, last), 2e-18, r"$n^{1/2}$")
+    axes[0, 0].set_ylim(bottom=1e-18)
     axes[0, 0].set_ylabel("drift of modified energy (relative)")
     legend_below(figure, axes)
     return figure
@@ -73,7 +77,7 @@ def lost_phases(data: xr.Dataset, lost: float) -> Any:
         t, e = cell["horizon_nutations"].values, np.abs(cell["horizon_phase"].values)
         good = np.isfinite(t) & np.isfinite(e) & (t > 0.0) & (e > 0.0)
         predicted, measured = float(cell["horizon_predicted"]), float(cell["horizon_measured"])
-        left.plot(t[good], e[good], color=style.color, lw=0.9, alpha=0.8)
+        left.plot(*envelope(t[good], e[good]), color=style.color, lw=0.9, alpha=0.8)
         left.plot(predicted, lost, "o", mfc="none", color=style.color, ms=9)
         left.plot(measured, lost, style.marker, color=style.color, ms=4)
         if np.isfinite(measured):
@@ -89,4 +93,14 @@ def lost_phases(data: xr.Dataset, lost: float) -> Any:
     right.set(yticks=range(len(names)), yticklabels=names, ylim=(len(names) - 0.5, -0.5))
     right.set_xlabel("foretold time less the measured one (%)")
     legend_below(figure, axes)
+    return figure
+
+
+def exponents(data: xr.Dataset, scenes: Sequence[str], columns: Sequence[tuple[str, str]]) -> Any:
+    """Growth exponents of every integrator with their intervals, the laws of growth as lines."""
+    figure = dots(data, scenes, columns, log=False)
+    for axis in figure.axes:
+        axis.set(xlim=(-0.35, 2.5), xticks=(0.0, 0.5, 1.0, 1.5, 2.0))
+        for law in (0.0, 0.5, 1.0, 2.0):
+            axis.axvline(law, color=GREY, lw=0.8, zorder=1)
     return figure
