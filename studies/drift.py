@@ -1,66 +1,86 @@
-"""What happens to the constants of the motion over a million steps?"""
+"""What happens to energy, momenta and phase over a million steps, and over a billion?"""
 
 import numpy as np
 import xarray as xr
 
 from symtop.integrators.registry import integrator, integrators
-from symtop.measure.conservation import CONSTANTS, growth, residuals, trend
-from symtop.report import figures
+from symtop.measure.conservation import CONSTANTS, history
+from symtop.measure.horizons import LOST, lost_phase
+from symtop.measure.longrun import PER_NUTATION, long_windows
+from symtop.measure.rounding import round_off
+from symtop.measure.shadow import KNOWN
+from symtop.report import figures, long_figures
 from symtop.scenes import added_scenes, scene
-from symtop.simulate import simulate
 from symtop.study.study import Case, Picture, Study, Table
 
 SCENES = ["spheroid", "goldstein"]
+LONG = "spheroid"  # the scene of the long runs and of the horizons
 STEPS_A_NUTATION = 118.02
-PARTS = ("largest", "rise", "interval", "exponent", "exponent_interval")
-SHORTENED = {"radau": 0.02, "taylor-quad": 0.005}  # seconds to minutes otherwise
+TOLERANCES = {"rk45": 1e-8, "rk45-compiled": 1e-8}  # 1e-6 for the others
+SHORTENED = {"rk45": 0.2, "radau": 0.02, "taylor-quad": 0.005}  # seconds to minutes otherwise
 LABELS = {"energy": "energy", "p_phi": r"$p_\varphi$", "p_psi": r"$p_\psi$"}
+PARTS = ("largest", "rise", "interval", "exponent", "exponent_interval")
 
 
 def cases(quick: bool) -> list[Case]:
-    """A million steps of every fixed-step method, and the same horizon for the adaptive ones at 1e-6."""
-    steps = 20_000 if quick else 1_000_000
-    grid = []
-    for name in [*SCENES, *added_scenes()]:
-        horizon = steps * scene(name).nutation_period / STEPS_A_NUTATION
-        for method in integrators().values():
-            settings = {"horizon": horizon, "samples": 601 if quick else 4001}
-            if method.knob == "step_size":
-                settings["step_size"] = horizon / steps
-            elif method.knob == "tolerance" and method.default_tolerance is None:
-                settings["tolerance"] = 1e-6
-            settings["horizon"] = horizon * SHORTENED.get(method.name, 1.0)
-            grid.append(Case(name, method.name, settings))
-    return grid
+    """A million steps of every fixed-step method (and the same horizon of the adaptive ones); horizons; long runs."""
+    return _grid(20_000, 2, 100_000, 200_000, 100.0) if quick else _grid(1_000_000, 8, 10_000_000, 100_000_000, 1000.0)
+
+
+def full() -> list[Case]:
+    """An ensemble of 10^8 and a run of 10^9 steps each of four methods: half an hour on two cores."""
+    return _grid(1_000_000, 8, 100_000_000, 1_000_000_000, 1000.0)
+
+
+def _grid(steps: int, members: int, walk: int, longest: int, short: float) -> list[Case]:
+    long = [
+        case
+        for name in ("midpoint", *(other for other in KNOWN if other != "midpoint"))  # the slowest first
+        for case in (
+            Case(LONG, name, {"part": "long", "steps": longest, "per_nutation": PER_NUTATION}),
+            Case(LONG, name, {"part": "rounding", "steps": walk, "per_nutation": PER_NUTATION, "count": members}),
+        )
+    ]
+    lost = [
+        Case(LONG, method.name, {"part": "horizon", "short": short, "target": 2.5 * short})
+        for method in integrators().values()
+        if method.knob == "step_size"
+    ]
+    histories = [_history(name, method, steps) for name in [*SCENES, *added_scenes()] for method in integrators()]
+    return histories + long + lost
+
+
+def _history(name: str, known: str, steps: int) -> Case:
+    method, horizon = integrator(known), steps * scene(name).nutation_period / STEPS_A_NUTATION
+    settings = {"part": "history", "samples": 4001 if steps > 100_000 else 601}
+    if method.knob == "step_size":
+        settings["step_size"] = horizon / steps
+    elif method.knob == "tolerance" and method.default_tolerance is None:
+        settings["tolerance"] = TOLERANCES.get(known, 1e-6)
+    settings["horizon"] = horizon * SHORTENED.get(known, 1.0)
+    return Case(name, known, settings)
+
+
+MEASURES = {"history": history, "horizon": lost_phase, "rounding": round_off, "long": long_windows}
 
 
 def measure(case: Case) -> xr.Dataset:
-    """Residuals of energy and both momenta of one long run, with their trend and growth."""
-    where = scene(case.scene)
-    run = simulate(where, integrator(case.integrator), observe="nutation", guard=False, **case.settings)
-    time = run["time"].values
-    found = {"sample_time": ("sample", time), "outcome": run.attrs["outcome"], "steps": run.attrs["steps"]}
-    for name, values in residuals(where, run).items():
-        line, power = trend(time, values), growth(time, values)
-        found[f"{name}_residual"] = ("sample", values)
-        found[f"{name}_largest"] = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else np.nan
-        found[f"{name}_slope"], found[f"{name}_interval"] = line.slope, line.interval
-        found[f"{name}_rise"] = line.rise
-        found[f"{name}_exponent"], found[f"{name}_exponent_interval"] = power.slope, power.interval
-    return xr.Dataset(found)
+    """One part of the study: a history with its growth, a lost phase, an ensemble, or the windows of a long run."""
+    settings = dict(case.settings)
+    return MEASURES[settings.pop("part")](scene(case.scene), integrator(case.integrator), **settings)
 
 
 SHOWN = ("midpoint", "trapezoidal", "stormer-verlet", "strang", "gauss-4", "rk4", "rk45", "taylor")
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
-    """Residual energy and both residual momenta against time; their size and growth for every method."""
+    """Residuals and their growth for every method; the long runs, the walks of rounding, and the lost phases."""
     scenes = [str(name) for name in data["scene"].values]
     known = [name for name in data["integrator"].values if str(name) in SHOWN]
     shown = data.sel(integrator=known or data["integrator"].values)
     rows = [(name, f"|residual {LABELS[name]}| (relative)") for name in CONSTANTS]
     bounded = _flat(shown, "energy")
-    history = Picture(
+    history_ = Picture(
         "residuals",
         figures.residual_history(shown, scenes, rows),
         "Change of energy and of both momenta since the start: single samples as dots, the largest in each window as a "
@@ -79,12 +99,72 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     )
     growths = Picture(
         "exponents",
-        figures.dots(data, scenes, [("energy_exponent", "exponent of energy residual ~ t^exponent")], log=False),
-        "Growth exponent of the largest energy residual over the last two decades of time, with 95 % intervals: 0 is "
-        "bounded, 1/2 the random walk of rounding, 1 a steady drift.",
-        "Dot plot of growth exponents of the energy residual for every integrator.",
+        long_figures.exponents(
+            data,
+            scenes,
+            [(f"{name}_exponent", f"exponent of {label}") for name, label in {**LABELS, "phase": "phase"}.items()],
+        ),
+        "Growth exponent of the largest residual of energy and momenta over the last two decades of time and of the "
+        "phase error over the last one, with 95 % intervals: 0 is bounded, 1/2 the random walk of rounding, 1 a steady "
+        f"drift, 2 the phase of a drifting energy. {_laws(data)}",
+        "Dot plots of growth exponents of energy, momenta and phase for every integrator.",
     )
-    return [history, sizes, growths]
+    here = data.sel(scene=LONG)
+    walkers = [str(name) for name in KNOWN if np.isfinite(here["rounding_end"].sel(integrator=name))]
+    steps = float(here["window_steps"].max())
+    ends = [f"window_{name}_{part}" for name in ("p_phi", "p_psi") for part in ("least", "largest")]
+    worst = max(float(np.abs(here[name]).max()) for name in ends)
+    windows = Picture(
+        "windows",
+        long_figures.window_bands(here, walkers),
+        f"{steps:.0e} steps on {LONG}, {PER_NUTATION:.0f} a nutation: a band from the least to the largest change of "
+        "each window, its mean as a line. Energy swings within its band and goes nowhere; the modified energy shows "
+        f"the walk of rounding below it. Momenta, recomputed inside the step, stay within {worst:.0e}.",
+        "Bands of energy, modified energy and momenta over the logarithm of steps for four methods.",
+    )
+    walks = Picture(
+        "rounding",
+        long_figures.walks(here, walkers),
+        "Drift of the modified energy by rounding: each start thin, their root mean square with markers, and that of "
+        f"the same kernels with plain sums dashed. {' '.join(_walk(here.sel(integrator=name)) for name in walkers)}",
+        "Log-log plots of the drift by rounding over steps for four methods, compensated and plain.",
+    )
+    lost = Picture(
+        "horizons",
+        long_figures.lost_phases(here, LOST),
+        "Phase error of the nutation of every fixed-step method, each with a step of its own. When it reaches "
+        f"{LOST:g} rad is foretold from the grey part and then measured. {_horizons(here)}",
+        "Phase errors rising to a tolerance, foretold and measured times of reaching it, their difference in percent.",
+    )
+    return [history_, sizes, growths, windows, walks, lost]
+
+
+def _walk(cell: xr.Dataset) -> str:
+    name, ratio = str(cell["integrator"].values), float(cell["rounding_plain_end"] / cell["rounding_end"])
+    return (
+        f"{name} grows as n^{float(cell['rounding_exponent']):.2f} +- "
+        f"{float(cell['rounding_exponent_interval']):.2f} to {float(cell['rounding_end']):.1e}, "
+        f"{ratio:.0f} times less than plain sums."
+    )
+
+
+def _horizons(here: xr.Dataset) -> str:
+    ratio = here["horizon_ratio"]
+    off = 100.0 * float(np.abs(ratio - 1.0).max())
+    return f"Of {int(ratio.notnull().sum())} methods the furthest off is {off:.2g} %."
+
+
+def _laws(data: xr.Dataset) -> str:
+    said = []
+    for name in ("stormer-verlet", "rk4", "rk45-compiled"):
+        if name in data["integrator"].values:
+            cell = data.sel(integrator=name, scene=data["scene"].values[0])
+            parts = [
+                f"{q} {float(cell[f'{q}_exponent']):.2f} +- {float(cell[f'{q}_exponent_interval']):.2f}"
+                for q in ("energy", "phase")
+            ]
+            said.append(f"{name}: {' and '.join(parts)}.")
+    return f"On {data['scene'].values[0]}, " + " ".join(said) if said else ""
 
 
 def _flat(data: xr.Dataset, quantity: str) -> list[str]:
@@ -98,7 +178,7 @@ def _number(value: float) -> str:
 
 
 def tables(data: xr.Dataset) -> list[Table]:
-    """Largest residuals, trends and growth exponents."""
+    """Largest residuals, trends and growth exponents; walks of rounding; lost phases."""
     rows = []
     for name in data["scene"].values:
         for method in data["integrator"].values:
@@ -110,15 +190,42 @@ def tables(data: xr.Dataset) -> list[Table]:
                 row.append(_number(values["largest"]))
                 row.append(f"{_number(values['rise'])} +- {_number(doubt)}")
                 row.append(f"{values['exponent']:.2f} +- {values['exponent_interval']:.2f}")
+            row.append(f"{float(cell['phase_exponent']):.2f} +- {float(cell['phase_exponent_interval']):.2f}")
             rows.append(row)
     header = ["scene", "integrator", "outcome"]
     for quantity in CONSTANTS:
         header += [f"largest {quantity} residual", f"trend of {quantity} over the run", f"exponent of {quantity}"]
-    return [Table("Relative residuals, linear trends with 95 % intervals, and growth ~ t^exponent", header, rows)]
+    here = data.sel(scene=LONG)
+    kept = [name for name in here["integrator"].values if np.isfinite(here["horizon_predicted"].sel(integrator=name))]
+    horizons = [
+        [str(name), *(f"{float(here[f'horizon_{part}'].sel(integrator=name)):.6g}" for part in HORIZON)]
+        for name in kept
+    ]
+    walked = [name for name in KNOWN if np.isfinite(here["rounding_end"].sel(integrator=name))]
+    walks = [[name, *(f"{float(here[part].sel(integrator=name)):.2g}" for part in ROUNDING_PARTS)] for name in walked]
+    return [
+        Table(
+            "Relative residuals, linear trends with 95 % intervals, and growth ~ t^exponent",
+            [*header, "exponent of phase"],
+            rows,
+        ),
+        Table("Rounding: drift of the modified energy of an ensemble", ["integrator", *ROUNDING_PARTS.values()], walks),
+        Table(f"Nutations until {LOST:g} rad of phase are lost", ["integrator", *HORIZON.values()], horizons),
+    ]
 
 
+HORIZON = {"steps": "steps a nutation", "predicted": "foretold", "measured": "measured", "ratio": "ratio"}
+ROUNDING_PARTS = {
+    "rounding_exponent": "exponent",
+    "rounding_exponent_interval": "+- (95 %)",
+    "rounding_end": "drift at the end",
+    "rounding_plain_exponent": "exponent, plain sums",
+    "rounding_plain_end": "drift at the end, plain sums",
+    "rounding_p_phi": "largest change of p_phi",
+    "rounding_p_psi": "largest change of p_psi",
+}
 ROUNDING = 3e-13  # relative, over a million steps
-LOST = 1e-2  # relative; an error of this size is not kept, however steady
+LOSING = 1e-2  # relative; an error of this size is not kept, however steady
 STEADY = 0.25  # an exponent below this is not growth
 
 
@@ -129,7 +236,7 @@ def kind(cell: xr.Dataset, quantity: str) -> str:
     largest, exponent = float(cell[f"{quantity}_largest"].max()), float(cell[f"{quantity}_exponent"].max())
     if largest <= ROUNDING:
         return "rounding"
-    return "bounded" if exponent <= STEADY and largest <= LOST else "growing"
+    return "bounded" if exponent <= STEADY and largest <= LOSING else "growing"
 
 
 def verdict(data: xr.Dataset) -> list[str]:
@@ -152,19 +259,24 @@ def verdict(data: xr.Dataset) -> list[str]:
             sentences.append(f"{quantity} is lost with {listed}.")
         if failed := groups.get("failed"):
             sentences.append(f"Runs of {', '.join(name for _, name, _ in failed)} ended early.")
+    here = data.sel(scene=LONG)
+    walkers = [name for name in KNOWN if np.isfinite(here["rounding_end"].sel(integrator=name))]
+    sentences += [f"Rounding: {_walk(here.sel(integrator=name))}" for name in walkers]
+    sentences.append(f"The time of losing {LOST:g} rad of phase can be foretold. {_horizons(here)}")
     return sentences
 
 
 STUDY = Study(
     name="drift",
     title="Drift",
-    question="What happens to energy and momenta over a million steps?",
+    question="What happens to energy, momenta and phase over a million steps, and over a billion?",
     how_to_read=(
         "A flat line is a bounded error, a line of slope one a steady drift, and a slope of one half the random walk "
         "of rounding. The discrete methods hold a larger but bounded energy error and exact momenta; a Runge-Kutta "
         "method begins with a smaller error and loses everything in time."
     ),
     cases=cases,
+    full=full,
     measure=measure,
     pictures=pictures,
     tables=tables,

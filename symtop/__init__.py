@@ -34,6 +34,7 @@ _HOME = {
     "composition": "integrators.splitting",
     "runge_kutta": "integrators.runge_kutta",
     "simulate": "simulate",
+    "long_run": "measure.longrun",
     "reference": "reference",
     "ClosedForm": "exact",
     "recommend": "advise",

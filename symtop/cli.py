@@ -1,4 +1,4 @@
-"""The command line: ``symtop integrators | scenes | run | study | report | doctor``.
+"""The command line: ``symtop integrators | scenes | run | long | study | claims | report | recommend | doctor``.
 
 Exit codes: 0 fine; 1 a case or a check failed; 2 bad input, or a place that cannot be written; 3 a run ended early by
 its outcome (what it had was kept); 130 and 143 a study was interrupted or terminated (what was computed is kept).
@@ -161,6 +161,45 @@ def run(
         for file in (output, figure):
             if file is not None:
                 click.echo(f"written to {file}")
+    if data.attrs["outcome"] != "ok":
+        sys.exit(3)
+
+
+@main.command()
+@click.argument("scene")
+@click.argument("integrator")
+@click.option("--steps", type=float, default=1e9, show_default=True, help="How many steps.")
+@click.option("--step-size", type=float, help="A thousandth of a nutation by default.")
+@click.option(
+    "--checkpoint", type=click.Path(dir_okay=False), help="File to resume from; in symtop's cache by default."
+)
+@click.option("--output", type=click.Path(), help="Write the windows to this netCDF file.")
+@plugin_option
+def long(
+    scene: str, integrator: str, steps: float, step_size: float | None, checkpoint: str | None, output: str | None,
+    plugin_files: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Run one INTEGRATOR on one SCENE for very many steps, in little memory; stop it as you like and call it again.
+
+    \b
+    symtop long spheroid stormer-verlet --steps 1e9 --output long.nc
+    """
+    from symtop import datasets  # noqa: PLC0415
+    from symtop.measure.longrun import PER_NUTATION, long_run  # noqa: PLC0415
+    from symtop.scenes import scene as find_scene  # noqa: PLC0415
+
+    _load_plugins(plugin_files)
+    h = find_scene(scene).nutation_period / PER_NUTATION if step_size is None else step_size
+    data = long_run(scene, integrator, steps=int(steps), step_size=h, checkpoint=checkpoint or True)
+    click.echo(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
+    if data.sizes["window"]:
+        for name in ("energy", "modified_energy", "p_phi", "p_psi"):
+            low, high = float(data[f"{name}_least"].min()), float(data[f"{name}_largest"].max())
+            end = float(data[f"{name}_mean"][-1])
+            click.echo(f"  {name:<16} change from {low:+.3e} to {high:+.3e}   mean of the last window {end:+.3e}")
+    if output is not None:
+        datasets.write(data, output)
+        click.echo(f"written to {output}")
     if data.attrs["outcome"] != "ok":
         sys.exit(3)
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.measure.conservation import growth, residuals, trend
+from symtop.measure.conservation import residuals, trend
+from symtop.measure.growth import growth
 
 DISCRETE = ("midpoint", "trapezoidal", "stormer-verlet")
 

@@ -11,7 +11,8 @@ from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.gauss import STAGES, gauss_rule, march_axis, march_frame
 from symtop.integrators.registry import integrator
 from symtop.integrators.space import field_axis, frame_to_attitude, on_axis, on_frame
-from symtop.measure.conservation import growth, residuals, trend
+from symtop.measure.conservation import residuals, trend
+from symtop.measure.growth import growth
 from tests.slopes import assert_order
 
 ONE = np.array([1])

@@ -9,8 +9,9 @@ import xarray as xr
 import symtop
 from symtop.measure import verdicts
 from symtop.measure.accuracy import error_table, ladder
-from symtop.measure.conservation import growth, trend
+from symtop.measure.conservation import trend
 from symtop.measure.errors import errors
+from symtop.measure.growth import growth
 from symtop.measure.order import order
 from symtop.measure.timing import Timing, timings
 from symtop.reference import reference

@@ -12,8 +12,9 @@ from symtop.integrators.outcomes import OUTCOMES
 from symtop.integrators.registry import integrator
 from symtop.integrators.runge_kutta import Tableau, march_angles, runge_kutta
 from symtop.integrators.scipy_ivp import EulerLagrange
-from symtop.measure.conservation import growth, residuals, trend
+from symtop.measure.conservation import residuals, trend
 from symtop.measure.errors import errors
+from symtop.measure.growth import growth
 from symtop.simulate import make_plan
 from tests.slopes import assert_order
 

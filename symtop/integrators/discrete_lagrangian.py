@@ -156,8 +156,9 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
     theta = state[0]
-    flight = h * state[1] / par.I1
-    scale = h * h / par.I1
+    # h^2/I1 rounded once and for all would do work of one sign: h and h/I1 are all that the increments know
+    lever = h / par.I1
+    flight, scale = lever * state[1], lever * h
     sin_start, cos_start = _start_trig(rule, theta)
     # W0 is smooth in time: the cubic through its last four values predicts the next one. At 300 steps a nutation that
     # leaves 1.1 to 1.6 iterations, where a parabola left 1.8 to 2.0.
@@ -169,7 +170,7 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     effort = 1
     outcome = NOT_CONVERGED
     while True:
-        correction = (flight - d - scale * force.W0) / (1.0 + scale * force.W0_slope)
+        correction = (lever * (state[1] - h * force.W0) - d) / (1.0 + scale * force.W0_slope)
         last, size = size, abs(correction)
         if size <= rule.tolerance * (abs(flight) + abs(scale * force.W0)) + SMALLEST or 0.5 * last <= size <= ROUNDING:
             d += correction
@@ -185,6 +186,9 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     # what was evaluated before the last correction follows it to first order; the remainder is its square
     W0 = force.W0 + force.W0_slope * correction
     W1 = force.W1 + force.W1_slope * correction
+    # theta moves by the very force that moves p. What Newton's last division leaves instead is off by a twentieth of a
+    # rounding, but always to the same side: the energy drifted by 4e-14 in 3e6 steps, and wanders by 8e-15 now
+    d = lever * (state[1] - h * W0)
     v = force.v + force.v_slope * correction
     C = sums.C - sums.P1 * correction
     step = (d, -h * (W0 + W1), h * v, h * (par.p_psi / par.I3 - v * C))

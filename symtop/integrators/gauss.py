@@ -29,10 +29,10 @@ import numpy as np
 from numba.cpython.unsafe.tuple import tuple_setitem
 
 from symtop.integrators.compiled import register_jitable
-from symtop.integrators.drive import driver
-from symtop.integrators.fixed_step import Prepare, Present, fixed_step
+from symtop.integrators.drive import Loop, driver
+from symtop.integrators.fixed_step import FixedStep, Prepare, Present, fixed_step
 from symtop.integrators.outcomes import NOT_CONVERGED, OK
-from symtop.integrators.registry import Array, Integrator, Plan, Run, Solver
+from symtop.integrators.registry import Array, Integrator
 from symtop.integrators.space import field_axis, field_frame, frame_to_attitude, observe_axis, on_axis, on_frame
 from symtop.top import Angles, SymmetricTop
 
@@ -190,14 +190,13 @@ march_axis = driver(begin_axis, increment_axis, observe_axis)
 march_frame = driver(begin_frame, increment_frame, observe_axis)
 
 
-def solver(stages: int, march: Any, prepare: Prepare, present: Present | None = None) -> Solver:
+def solver(stages: int, march: Loop, prepare: Prepare, present: Present | None = None) -> FixedStep:
     """A solver of the registry; its coefficients are computed when it is first used."""
 
-    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        rule = gauss_rule(stages)
-        return fixed_step(march, rule, prepare, stages, implicit=True, present=present)(top, start, plan)
+    def rule(top: SymmetricTop, start: Angles, h: float) -> Any:
+        return gauss_rule(stages)
 
-    return solve
+    return fixed_step(march, rule, prepare, stages, implicit=True, present=present)
 
 
 def gauss(stages: int) -> Integrator:

@@ -13,7 +13,7 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters II.5 a
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 from symtop.checks import SymtopError, finite, one_of, row
@@ -21,13 +21,11 @@ from symtop.integrators import coefficients as tables
 from symtop.integrators import splitting_angles, splitting_space
 from symtop.integrators.angles import reduced
 from symtop.integrators.coefficients import Table
-from symtop.integrators.drive import March
-from symtop.integrators.fixed_step import Prepare, fixed_step
-from symtop.integrators.registry import Integrator, Plan, Run, Solver
+from symtop.integrators.fixed_step import fixed_step
+from symtop.integrators.registry import Integrator
 from symtop.integrators.space import on_attitude, on_axis
-from symtop.integrators.splitting_loop import Composition, Stages, closed
+from symtop.integrators.splitting_loop import Composition, closed
 from symtop.integrators.splitting_space import ROTATIONS
-from symtop.top import Angles, SymmetricTop
 
 _SPACE = {"axis": (splitting_space.march_axis, on_axis), "attitude": (splitting_space.march_attitude, on_attitude)}
 
@@ -68,9 +66,12 @@ def composition(
     integrable = rotation != "exact" and rule.drift == (1.0,) and not any(rule.gradient) and not boost
     if space:
         stages = partial(splitting_space.stages, rule, rotation, boost)
-        solvers = {chart: _solver(march, prepare, stages) for chart, (march, prepare) in _SPACE.items()}
+        solvers = {
+            chart: fixed_step(march, stages, prepare, 1, implicit=False) for chart, (march, prepare) in _SPACE.items()
+        }
     else:
-        solvers = {"angles": _solver(splitting_angles.march, reduced, partial(splitting_angles.stages, rule))}
+        stages = partial(splitting_angles.stages, rule)
+        solvers = {"angles": fixed_step(splitting_angles.march, stages, reduced, 1, implicit=False)}
     return Integrator(
         name=name,
         family="splitting",
@@ -103,18 +104,6 @@ def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[f
         msg = f"gradient must be zero where kick is, not {slopes} with {kicks}"
         raise SymtopError(msg)
     return closed(drifts, kicks, slopes)
-
-
-def _solver(
-    march: Callable[..., March], prepare: Prepare, stages: Callable[[SymmetricTop, Angles, float], Stages]
-) -> Solver:
-    """A solver that multiplies the coefficients out for each run."""
-
-    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        rule = stages(top, start, plan.step_size)
-        return fixed_step(march, rule, prepare, 1, implicit=False)(top, start, plan)
-
-    return solve
 
 
 def _on_space(name: str, numbers: Table, reference: str, summary: str) -> Integrator:

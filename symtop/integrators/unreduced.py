@@ -29,7 +29,7 @@ from symtop.integrators.discrete_lagrangian import RULES, quadrature, record
 from symtop.integrators.drive import driver
 from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.outcomes import NOT_CONVERGED
-from symtop.integrators.registry import Integrator, Plan, Run, Solver
+from symtop.integrators.registry import Array, Integrator
 from symtop.top import Angles, SymmetricTop
 
 ANGLES_CHART = (0, 3, 1, 2)  # theta, p_theta, phi, psi among theta, phi, psi, p_theta, p_phi, p_psi
@@ -185,14 +185,9 @@ def whole(top: SymmetricTop, at: Angles) -> tuple[WholeTop, tuple[float, ...]]:
     )  # fmt: skip
 
 
-def _in_angles(solve: Solver) -> Solver:
-    """Show (theta, p_theta, phi, psi) of the six state variables; p_phi and p_psi are columns of their own."""
-
-    def shown(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        run = solve(top, start, plan)
-        return run._replace(states=run.states[:, ANGLES_CHART])
-
-    return shown
+def _in_angles(par: WholeTop, times: Array, states: Array) -> Array:
+    """(theta, p_theta, phi, psi) of the six state variables; p_phi and p_psi are columns of their own."""
+    return states[:, ANGLES_CHART]
 
 
 def unreduced(
@@ -206,7 +201,7 @@ def unreduced(
 ) -> Integrator:
     """The method that `discrete_lagrangian` makes of the same arguments, stepped in all three angles."""
     rule, symmetric = quadrature(nodes, weights)
-    solver = _in_angles(fixed_step(march, rule, whole, len(rule.nodes), implicit=True))
+    solver = fixed_step(march, rule, whole, len(rule.nodes), implicit=True, present=_in_angles)
     return record(name, rule, solver, order=order, symmetric=symmetric, summary=summary, reference=reference)
 
 

@@ -8,16 +8,18 @@ wanders: in 33 % of cases its interval is too narrow (white noise: 3 %), so that
 """
 
 import math
-from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from symtop.integrators.registry import Integrator
+from symtop.measure.clock import Clock, has_phase
 from symtop.measure.errors import energy_scale, momentum_scale
-from symtop.measure.order import Fit, power_law
+from symtop.measure.growth import growth
 from symtop.scenes import Scene
+from symtop.simulate import simulate
 
 CONSTANTS = ("energy", "p_phi", "p_psi")
 BLOCKS = 24
@@ -34,6 +36,33 @@ class Trend(NamedTuple):
     def significant(self) -> bool:
         """Does the interval exclude zero?"""
         return bool(abs(self.slope) > self.interval)
+
+
+def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
+    """One run and what became of the constants of the motion and of its phase.
+
+    Dimension ``sample``: ``sample_time`` and, for energy, p_phi and p_psi, ``NAME_residual``. For each of them the
+    ``largest``, the linear ``slope`` with its ``interval`` and ``rise``, and the ``exponent`` of growth over the last
+    two decades; for the phase of the nutation (rad; NaN where there is none) ``largest`` and ``exponent``, over the
+    last decade, because a wrong frequency gives way to a drifting one only late. ``exponent_interval`` goes with each.
+    """
+    run = simulate(scene, method, observe="nutation", **settings)
+    time = run["time"].values
+    found: dict[str, Any] = {"sample_time": ("sample", time), "outcome": run.attrs["outcome"]}
+    found["steps"] = run.attrs["steps"]
+    for name, values in residuals(scene, run).items():
+        line, power = trend(time, values), growth(time, values)
+        found[f"{name}_residual"] = ("sample", values)
+        found[f"{name}_largest"] = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else np.nan
+        found[f"{name}_slope"], found[f"{name}_interval"], found[f"{name}_rise"] = line
+        found[f"{name}_exponent"], found[f"{name}_exponent_interval"] = power.slope, power.interval
+    phase = np.full(time.size, np.nan)
+    if has_phase(scene):
+        phase = Clock(scene).error(time, run["theta"].values, run["p_theta"].values / scene.top.I1)
+    power = growth(time, phase, 1.0)
+    found["phase_largest"] = float(np.nanmax(np.abs(phase))) if np.isfinite(phase).any() else np.nan
+    found["phase_exponent"], found["phase_exponent_interval"] = power.slope, power.interval
+    return xr.Dataset(found)
 
 
 def residuals(scene: Scene, run: xr.Dataset) -> dict[str, np.ndarray]:
@@ -64,19 +93,3 @@ def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
     memory = min(max(memory, 0.0), 0.95)
     error *= math.sqrt((1.0 + memory) / (1.0 - memory))
     return Trend(slope, float(student.ppf(0.975, BLOCKS - 2)) * error, slope * float(t[-1] - t[0]))
-
-
-def growth(time: ArrayLike, residual: ArrayLike) -> Fit:
-    """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last two decades.
-
-    What happens within the first nutations is an oscillation that switches on, not growth.
-    """
-    t, r = np.asarray(time, float), np.abs(np.asarray(residual, float))
-    edges = np.geomspace(t[-1] / 100.0, t[-1], 13)
-    middles, tops = [], []
-    for low, high in pairwise(edges):
-        inside = (t > low) & (t <= high) & np.isfinite(r)
-        if inside.any():
-            middles.append(math.sqrt(low * high))
-            tops.append(float(r[inside].max()))
-    return power_law(middles, tops)
