@@ -17,7 +17,7 @@ from symtop.checks import SymtopError, one_of, positive, whole
 from symtop.integrators.outcomes import OUTCOMES, sentence
 from symtop.integrators.registry import Integrator, Plan, Run, integrator
 from symtop.scenes import OBSERVABLES, Scene, closed_form, scene
-from symtop.top import SymmetricTop
+from symtop.top import Angles, SymmetricTop
 
 MOST_STEPS = 20_000_000_000  # ten minutes of the fastest kernel
 WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
@@ -129,7 +129,7 @@ def simulate(
         raise SymtopError(msg)
     chart = choose_chart(method, watched)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, end, count)
-    run = _checked(method, chart, plan, _solve(method, chart, chosen, plan))
+    run = solve_plan(method, chart, chosen.top, chosen.start, plan, f" on {chosen.name}")
     return datasets.describe(
         as_dataset(chosen, chart, plan, run),
         title=f"{method.name} on {chosen.name}",
@@ -156,14 +156,17 @@ DIMENSIONS = {"angles": 4, "axis": 6, "attitude": 7}
 MOST_SAMPLES = 10_000_000
 
 
-def _solve(method: Integrator, chart: str, where: Scene, plan: Plan) -> object:
+def solve_plan(
+    method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan, where: str = ""
+) -> Run:
+    """What a solver makes of a plan, checked; SymtopError if it breaks or returns something else."""
     try:
-        return method.solvers[chart](where.top, where.start, plan)
+        return _checked(method, chart, plan, method.solvers[chart](top, start, plan))
     except SymtopError:
         raise
     except Exception as error:
         said = " ".join(str(error).split())
-        msg = f"integrator {method.name} failed on {where.name}: {type(error).__name__}: {said}"
+        msg = f"integrator {method.name} failed{where}: {type(error).__name__}: {said}"
         raise SymtopError(msg) from error
 
 
