@@ -156,9 +156,7 @@ DIMENSIONS = {"angles": 4, "axis": 6, "attitude": 7}
 MOST_SAMPLES = 10_000_000
 
 
-def solve_plan(
-    method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan, where: str = ""
-) -> Run:
+def solve_plan(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan, where: str = "") -> Run:
     """What a solver makes of a plan, checked; SymtopError if it breaks or returns something else."""
     try:
         return _checked(method, chart, plan, method.solvers[chart](top, start, plan))

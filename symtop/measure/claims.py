@@ -9,9 +9,8 @@ One battery judges every integrator alike, ours and a plug-in's, through nothing
     explicit, work, memory                            what a step costs                                (`claims_long`)
     pole           the axis passes a pole exactly                                                      (`claims_long`)
 
-A verdict is `confirmed`, `refuted`, `measured` (nothing was claimed), `undecided` (and why), or `inapplicable` (and
-why). A claim is refuted only far beyond what the measurement itself leaves in doubt; both numbers are in the ledger as
-`value` and `resolution`. Nothing claimed of the energy means what the other claims imply: kept if it is among the
+A claim is refuted only far beyond what the measurement itself leaves in doubt; both numbers are in the ledger
+(`symtop.measure.ledger`). Nothing claimed of the energy means what the other claims imply: kept if it is among the
 conserved quantities, bounded if the method is symplectic and its step fixed (Benettin, Giorgilli, J. Stat. Phys. 74
 (1994) 1117). Work and iterations are what the solver reports; memory is what NumPy and Python allocate.
 """
@@ -21,20 +20,15 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from symtop.checks import SymtopError
 from symtop.integrators.registry import Integrator
 from symtop.measure import claims_long as long
 from symtop.measure import claims_order as orders
 from symtop.measure import step_map as maps
+from symtop.measure.ledger import CLAIMS, Finding, Ledger, undecided
 from symtop.scenes import Scene
 
-CLAIMS = (
-    "order", "symplectic", "symmetric", "energy", "p_phi", "p_psi", "axis_length", "invariant", "explicit", "work",
-    "memory", "pole",
-)  # fmt: skip
-VERDICTS = ("confirmed", "refuted", "measured", "undecided", "inapplicable")
 SCENE = "spheroid"
 
 BAND = 0.3  # by how much a slope may differ from an order, beside its own interval
@@ -47,57 +41,6 @@ MISSED = 1e-8
 ONE_MAP = 1e-9  # two steps are twice one step within this
 SHOWN = 24  # settings of the order that are kept
 FLAT = 8.0  # bytes a step: less than one number
-
-
-class Finding(NamedTuple):
-    """One cell of the ledger."""
-
-    claim: str
-    declared: str
-    measured: str
-    verdict: str
-    why: str  # a clause that completes "CLAIM is VERDICT: ..."
-    value: float = math.nan  # the number that the verdict rests on
-    resolution: float = math.nan  # the least such number that the battery can tell from a true claim
-
-    def sentence(self, name: str) -> str:
-        """The verdict in words."""
-        said = f"claims {self.declared}" if self.declared else "claims nothing"
-        return f"{name}, {self.claim.replace('_', ' ')}: {said}; {self.verdict}: {self.why}."
-
-
-class Ledger(NamedTuple):
-    """Everything the battery found about one integrator."""
-
-    integrator: str
-    scene: str
-    findings: tuple[Finding, ...]
-    traces: dict[str, np.ndarray]  # errors by step, defects by differencing width
-    steps_run: int
-    nutations_run: float
-
-    def __getitem__(self, claim: str) -> Finding:  # type: ignore[override]
-        return next(found for found in self.findings if found.claim == claim)
-
-    def sentences(self) -> list[str]:
-        """One sentence a verdict."""
-        return [found.sentence(self.integrator) for found in self.findings]
-
-    def dataset(self) -> xr.Dataset:
-        """Dimensions ``claim``, ``setting`` (steps of the order) and ``width`` (of differencing)."""
-        columns = {
-            name: ("claim", [getattr(found, name) for found in self.findings])
-            for name in ("declared", "measured", "verdict", "why", "value", "resolution")
-        }
-        traces = {name: ("width" if "defect" in name else "setting", row) for name, row in self.traces.items()}
-        data = xr.Dataset({**columns, **traces}, coords={"claim": list(CLAIMS)})
-        return data.assign(steps_run=self.steps_run, nutations_run=self.nutations_run)
-
-
-def read(data: xr.Dataset) -> list[Finding]:
-    """The findings of one integrator out of a dataset of the claims study."""
-    columns = ("claim", "declared", "measured", "verdict", "why", "value", "resolution")
-    return [Finding(*row) for row in zip(*(data[name].values.tolist() for name in columns), strict=True)]
 
 
 def declared_energy(method: Integrator) -> str:
@@ -114,33 +57,22 @@ def judge(method: Integrator, where: Scene, *, quick: bool = False) -> Ledger:
     traces: dict[str, np.ndarray] = {}
     findings = {"order": _attempt("order", _yes_no_number(method.order), lambda: _order(method, where, quick, traces))}
     findings |= _structure(method, where, quick, traces)
-    try:
-        run = long.long_run(method, where, quick=quick)
-    except SymtopError as error:
-        run = None
-        for claim in ("energy", "p_phi", "p_psi", "axis_length", "invariant", "explicit", "work"):
-            findings[claim] = _undecided(claim, "", str(error))
-    else:
-        findings |= {claim: _kept(method, run, claim) for claim in ("energy", "p_phi", "p_psi", "axis_length")}
-        findings["invariant"] = _invariant(method, run)
-        findings["explicit"], findings["work"] = _explicit(method, run), _work(method, run)
+    findings |= _over_steps(method, where, quick, traces)
     findings["memory"] = _attempt("memory", "", lambda: _memory(method, where))
     findings["pole"] = _attempt("pole", _pole_claim(method), lambda: _pole(method))
     return Ledger(
-        method.name, where.name, tuple(findings[claim] for claim in CLAIMS), traces,
-        run.steps if run else 0, run.nutations if run else 0.0,
-    )  # fmt: skip
+        method.name,
+        where.name,
+        tuple(findings[claim] for claim in CLAIMS),
+        traces,
+    )
 
 
 def _attempt(claim: str, declared: str, measure: Callable[[], Finding]) -> Finding:
     try:
         return measure()
     except SymtopError as error:
-        return _undecided(claim, declared, str(error))
-
-
-def _undecided(claim: str, declared: str, why: str) -> Finding:
-    return Finding(claim, declared, "", "undecided", why.rstrip("."))
+        return undecided(claim, declared, str(error))
 
 
 def _yes_no_number(value: bool | int | None) -> str:
@@ -209,9 +141,7 @@ class _Chart(NamedTuple):
     why: str
 
 
-def _structure(
-    method: Integrator, where: Scene, quick: bool, traces: dict[str, np.ndarray]
-) -> dict[str, Finding]:
+def _structure(method: Integrator, where: Scene, quick: bool, traces: dict[str, np.ndarray]) -> dict[str, Finding]:
     brackets, returns = [], []
     names = method.charts()[-1:] if quick else method.charts()
     for chart in names:
@@ -223,7 +153,7 @@ def _structure(
             traces["width"], traces["bracket_defect"] = defect.widths, defect.raw
             returns.append(_returned(chart, maps.return_miss(step, start), gap))
         except SymtopError as error:
-            unknown = _Chart(chart, None, math.nan, math.nan, str(error).rstrip("."))
+            unknown = _Chart(chart, None, math.nan, math.nan, undecided("", "", str(error)).why)
             brackets.append(unknown)
             returns.append(unknown)
     if "width" in traces:
@@ -267,10 +197,23 @@ def _over_charts(claim: str, declared: bool | None, found: list[_Chart]) -> Find
             verdict = _agrees(declared=declared, found=answer)
             why = f"{worst.why}, in the {worst.chart} chart"
             return Finding(claim, _yes_no_number(declared), words, verdict, why, worst.value, worst.resolution)
-    return _undecided(claim, _yes_no_number(declared), "no chart could be tried")
+    return undecided(claim, _yes_no_number(declared), "no chart could be tried")
 
 
 # ---- a million steps -------------------------------------------------------------------------------------------------
+
+
+def _over_steps(method: Integrator, where: Scene, quick: bool, traces: dict[str, np.ndarray]) -> dict[str, Finding]:
+    """Everything that one long run shows."""
+    try:
+        run = long.long_run(method, where, quick=quick)
+    except SymtopError as error:
+        claims = ("energy", "p_phi", "p_psi", "axis_length", "invariant", "explicit", "work")
+        return {claim: undecided(claim, "", str(error)) for claim in claims}
+    traces["steps_run"], traces["nutations_run"] = np.array(run.steps), np.array(run.nutations)
+    found = {claim: _kept(method, run, claim) for claim in ("energy", "p_phi", "p_psi", "axis_length")}
+    rest = (_invariant(method, run), _explicit(method, run), _work(method, run))
+    return found | {one.claim: one for one in rest}
 
 
 def _span(run: long.LongRun) -> str:
@@ -311,7 +254,7 @@ def _invariant(method: Integrator, run: long.LongRun) -> Finding:
     known = [name for name in own if name in run.constants]
     if known != own:
         unknown = ", ".join(name for name in own if name not in run.constants)
-        return _undecided("invariant", ", ".join(own), f"the battery has no formula for {unknown}")
+        return undecided("invariant", ", ".join(own), f"the battery has no formula for {unknown}")
     worst = max(known, key=lambda name: run.constants[name].largest)
     return _constant("invariant", "kept", run, run.constants[worst])._replace(declared=", ".join(own))
 
@@ -332,7 +275,7 @@ def _explicit(method: Integrator, run: long.LongRun) -> Finding:
         cost = f"{run.evaluations:.2f} forces a step" + (", rejected steps included" if adaptive else ", always")
         verdict = _agrees(declared=method.explicit, found=True)
         return Finding("explicit", declared, "yes", verdict, f"it reports no iterations and {cost}", 0.0, 0.0)
-    return _undecided("explicit", declared, "it reports no iterations, but its steps do not all cost the same")
+    return undecided("explicit", declared, "it reports no iterations, but its steps do not all cost the same")
 
 
 def _work(method: Integrator, run: long.LongRun) -> Finding:
@@ -366,7 +309,9 @@ def _pole(method: Integrator) -> Finding:
         for one in found
     )  # fmt: skip
     judged = [one for one in found if one.chart != "angles"] or found
-    measured = ", ".join(dict.fromkeys("passes" if one.passes else one.outcome.replace("ok", "wrong") for one in judged))
+    measured = ", ".join(
+        dict.fromkeys("passes" if one.passes else one.outcome.replace("ok", "wrong") for one in judged)
+    )
     worst = max(one.finer for one in judged)
     if not declared:
         return Finding("pole", declared, measured, "measured", said, worst, long.POLE_RIGHT)

@@ -130,9 +130,7 @@ def _without(power: int, coarse: Array, fine: Array) -> Array:
 
 
 def _signed_error(method: Integrator, where: Scene, horizon: float, steps: int) -> Array:
-    run = simulate(
-        where, method, step_size=horizon / steps, horizon=horizon, samples=2, observe=observable(method)
-    )
+    run = simulate(where, method, step_size=horizon / steps, horizon=horizon, samples=2, observe=observable(method))
     if run.attrs["outcome"] != "ok":
         msg = f"a run of {steps} steps over {horizon:.3g} {run.attrs['outcome_message']}"
         raise SymtopError(msg)

@@ -85,10 +85,7 @@ class StepMap:
 
     def angles(self, z: Array) -> Angles:
         """The start that a point z stands for."""
-        theta, phi, psi, *momenta = z
-        p_theta, p_phi, p_psi = (self.unit * value for value in momenta)
-        phi_dot = (p_phi - p_psi * math.cos(theta)) / (self.top.I1 * math.sin(theta) ** 2)
-        return Angles(theta, phi, psi, p_theta / self.top.I1, phi_dot, p_psi / self.top.I3 - phi_dot * math.cos(theta))
+        return angles_at(self.top, np.concatenate([z[:3], self.unit * z[3:]]))
 
     def at(self, start: Angles) -> Array:
         """Y of a start itself."""
@@ -128,6 +125,18 @@ class StepMap:
         return float(np.max(np.abs(apart)))
 
 
+def angles_at(top: SymmetricTop, z: Array) -> Angles:
+    """The start at a point (theta, phi, psi, p_theta, p_phi, p_psi), not at a pole."""
+    theta, phi, psi, p_theta, p_phi, p_psi = (float(value) for value in z)
+    phi_dot = (p_phi - p_psi * math.cos(theta)) / (top.I1 * math.sin(theta) ** 2)
+    return Angles(theta, phi, psi, p_theta / top.I1, phi_dot, p_psi / top.I3 - phi_dot * math.cos(theta))
+
+
+def one_step(method: Integrator, chart: str, where: Scene, h: float) -> StepMap:
+    """The map of a step of a given h."""
+    return StepMap(method, chart, where.top, momentum_scale(where), h)
+
+
 def generic_start(scene: Scene) -> Angles:
     """A point of the scene's true motion where nothing is special: no turning point, no phase of zero."""
     if not math.isfinite(scene.nutation_period):
@@ -144,7 +153,7 @@ def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Ang
     """
     start = generic_start(scene)
     period = scene.nutation_period if math.isfinite(scene.nutation_period) else scene.horizon / 8.0
-    trial = StepMap(method, chart, scene.top, momentum_scale(scene), SHARE * period)
+    trial = one_step(method, chart, scene, SHARE * period)
     if method.knob != "step_size":
         return trial, start
     refusal = SymtopError(f"{method.name} makes no step in the {chart} chart")
@@ -153,7 +162,7 @@ def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Ang
         try:
             halves = trial.shown(trial.run(start, 0.5 * h, 2))
             if trial.gap(trial.image(trial.point(start), h), halves) < COARSE:
-                return StepMap(method, chart, scene.top, trial.unit, h), start
+                return one_step(method, chart, scene, h), start
         except SymtopError as error:
             refusal = error
         h *= 0.7
@@ -190,9 +199,9 @@ def symplectic_defect(step: StepMap, start: Angles) -> Defect:
     """The defect of the bracket after one step from `start`, extrapolated to width zero, with its own error."""
     z = step.point(start)
     middle = step.image(z)
-    widths = WIDEST / 2.0 ** np.arange(WIDTHS)
     scale = min(1.0, math.sin(start.theta))  # near a pole everything changes over its distance
-    table = [[_differences(step, z, middle, scale * width)] for width in widths]
+    widths = np.array([scale * WIDEST / 2.0**k for k in range(WIDTHS)])
+    table = [[_differences(step, z, middle, width)] for width in widths]
     best, doubt = table[0][0], math.inf
     for k in range(1, WIDTHS):
         for j in range(1, k + 1):
@@ -204,7 +213,7 @@ def symplectic_defect(step: StepMap, start: Angles) -> Defect:
     noise = 4.0 * _largest(best) * doubt + 1e-13
     raw = np.array([_largest(_miss(step.chart, row[0], middle)) for row in table])
     rest = float(np.linalg.svd(_miss(step.chart, best, middle), compute_uv=False)[2])
-    return Defect(_largest(_miss(step.chart, best, middle)), rest, noise, scale * widths, raw)
+    return Defect(_largest(_miss(step.chart, best, middle)), rest, noise, widths, raw)
 
 
 def _differences(step: StepMap, z: Array, middle: Array, width: float) -> Array:

@@ -6,7 +6,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.report.style import GREY, OUTCOME_COLORS, OUTCOME_HATCHES, Look, legend_below, look, panels, slope_guide
+from symtop.report.style import (
+    GREY,
+    OUTCOME_COLORS,
+    OUTCOME_HATCHES,
+    VERMILLION,
+    YELLOW,
+    Look,
+    legend_below,
+    look,
+    panels,
+    slope_guide,
+)  # fmt: skip
 
 
 def error_curves(
@@ -224,3 +235,44 @@ def _strip(axis: Any, row: int, steps: Any, verdicts: Any) -> set[str]:
             )  # fmt: skip
             start = k
     return {str(word) for word in words}
+
+
+VERDICT_COLORS = {
+    "confirmed": "#CFE8F3",
+    "refuted": VERMILLION,
+    "measured": "#F2F2F2",
+    "undecided": YELLOW,
+    "inapplicable": "#FFFFFF",
+}
+
+
+def verdict_matrix(rows: Mapping[str, Sequence[Any]], claims: Sequence[str], symbols: Mapping[str, str]) -> Any:
+    """One row an integrator, one column a claim, in each cell a symbol and what was measured, on the verdict's colour.
+
+    `rows` holds the findings of an integrator in the order of `claims`: things with `verdict` and `measured`.
+    """
+    from matplotlib.patches import Patch, Rectangle  # noqa: PLC0415
+
+    figure, axes = panels(1, 1, width=14.5, height=0.6 + 0.235 * len(rows))
+    axis = axes[0, 0]
+    for line, found in enumerate(rows.values()):
+        for column, one in enumerate(found):
+            color = VERDICT_COLORS[one.verdict]
+            axis.add_patch(Rectangle((column - 0.5, line - 0.5), 1.0, 1.0, facecolor=color, edgecolor="white", lw=1.0))
+            said = symbols[one.verdict] + (f" {one.measured.replace(' +- ', '±')}" if one.measured else "")
+            bad = one.verdict == "refuted"
+            axis.text(
+                column, line, said, ha="center", va="center", fontsize=7.5, color="white" if bad else "black",
+                fontweight="bold" if bad else "normal",
+            )  # fmt: skip
+    axis.set(xlim=(-0.5, len(claims) - 0.5), ylim=(len(rows) - 0.5, -0.5), yticks=range(len(rows)), yticklabels=rows)
+    axis.set_xticks(range(len(claims)), [claim.replace("_", " ") for claim in claims])
+    axis.tick_params(length=0, top=True, labeltop=True)
+    axis.grid(visible=False)
+    axis.spines[:].set_visible(False)
+    handles = [
+        Patch(facecolor=color, edgecolor=GREY, lw=0.4, label=f"{symbols[verdict]} {verdict}")
+        for verdict, color in VERDICT_COLORS.items()
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
+    return figure

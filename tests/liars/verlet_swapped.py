@@ -20,14 +20,17 @@ def increment(par, rule, state, carry, h):
     after, precession_after, turn_after = splitting_angles.force_angles(par, state, (move, 0.0, 0.0, 0.0))
     kick = -0.5 * h * (slope + after)
     wheel = 0.5 * h * (precession + precession_after)
-    return (move, kick, wheel, h * par.p_psi / par.I3 - 0.5 * h * (turn + turn_after)), carry, 2, chart_outcome(
-        state[0] + move
+    return (
+        (move, kick, wheel, h * par.p_psi / par.I3 - 0.5 * h * (turn + turn_after)),
+        carry,
+        2,
+        chart_outcome(state[0] + move),
     )
 
 
 def observe(par, rule, before, dstate, h):
     """The momenta are parameters of this method."""
-    return par.p_phi, par.p_psi
+    return 0.5 * (par.north + par.south), par.p_psi
 
 
 solver = fixed_step(driver(begin, increment, observe), (0.0,), reduced, 1, implicit=False)
