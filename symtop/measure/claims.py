@@ -233,9 +233,9 @@ def _constant(claim: str, declared: str, run: long.LongRun, found: long.Constant
     measured = f"{kind}, {found.largest:.0e}" if kind != "unknown" else ""
     why = f"largest relative change {found.largest:.1e} in {_span(run)}, {found.a_step:.0e} in one step at most"
     if kind not in ("kept", "unknown"):
-        why += f", growing as t^({found.exponent:.2f} +- {found.interval:.2f})"
+        why += f", growth exponent {found.exponent:.2f} +- {found.interval:.2f}"
         if kind == "drift":
-            why += f", {found.rise / max(run.steps, 1):.1e} a step"
+            why += f", drifting by {found.rise / max(run.steps, 1):.1e} a step"
     if kind in ("kept", "bounded") and run.outcome != "ok":
         why += f"; but the run {run.message}"
         return Finding(claim, declared, measured, "undecided", why, found.largest, long.KEPT)
