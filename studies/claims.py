@@ -71,16 +71,16 @@ def _defects(data: xr.Dataset) -> Picture:
         axis.plot(width[good], raw[good], look.marker + "-", color=look.color, ms=look.size, label=str(name))
         (falls if raw[good][-1] < raw[good][0] / 100.0 else stays).append(str(name))
     axis.set(xscale="log", yscale="log", xlabel="differencing width", ylabel="defect of the bracket after one step")
-    ends = axis.get_xlim()
-    axis.autoscale(enable=False)
-    style.slope_guide(axis, 2.0, (ends[0] * 1.6, ends[1] / 1.6), 4e-7, "width$^2$")
+    finest, coarsest = float(np.nanmin(data["defect_width"])), float(np.nanmax(data["defect_width"]))
+    lowest = float(np.nanmin(data["bracket_defect"]))
+    style.slope_guide(axis, 2.0, (1.4 * finest, 0.7 * coarsest), 0.5 * lowest, "width$^2$")
     style.legend_below(figure, axes)
     return Picture(
         "bracket",
         figure,
         "How far one step is from preserving the bracket, as the width of the central differences that measure it is "
         f"refined. It falls with the square of the width, all of it error of the differencing, for "
-        f"{', '.join(falls) or 'none'}; it stays where it is, and is therefore real, for {', '.join(stays) or 'none'}.",
+        f"{', '.join(falls) or 'none'}; it levels off, and is therefore real, for {', '.join(stays) or 'none'}.",
         "Log-log plot of the defect against the differencing width: lines of slope two for symplectic methods, level "
         "lines for the others.",
     )

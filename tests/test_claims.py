@@ -80,7 +80,7 @@ def test_a_millionth_part_of_a_momentum_is_seen(chart):
 @pytest.mark.parametrize(("name", "chart", "kept"), [("strang", "axis", True), ("gauss-4", "axis", False)])
 def test_only_a_real_defect_stays_as_the_differences_are_refined(name, chart, kept):
     found = symplectic_defect(*step_map(symtop.integrator(name), chart, SPHEROID))
-    assert (found.raw[-1] < found.raw[0] / 100.0) is kept
+    assert bool(found.raw[-1] < found.raw[0] / 100.0) is kept
     assert (found.size < 1e-11) is kept
 
 
@@ -94,7 +94,7 @@ def test_a_step_is_one_map_unless_it_looks_at_the_start():
 # ---- growth ----------------------------------------------------------------------------------------------------------
 
 TIME = np.linspace(0.0, 8000.0, 4001)
-WAVE = 1e-5 * np.sin(37.7 * TIME)
+WAVE = 1e-5 * np.sin(37.1 * TIME)  # not commensurate with the samples
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ WAVE = 1e-5 * np.sin(37.7 * TIME)
         (WAVE, "bounded"),
         (WAVE + 1e-9 * TIME, "drift"),  # most of it below the wave
         (1e-9 * TIME, "drift"),
-        (1e-7 * np.sqrt(TIME), "random walk"),
+        (1e-7 * np.sqrt(TIME) * np.sin(37.1 * TIME), "random walk"),
         (np.full(4001, np.nan), "unknown"),
     ],
 )
@@ -121,7 +121,7 @@ def test_a_wave_with_noise_is_never_a_drift():
 def test_the_cayley_energy_is_kept_by_nobody_else():
     for name, kept in (("cayley", True), ("cayley-tuned", True), ("strang", False)):
         run = symtop.simulate("spheroid", name, step_size=0.01, horizon=20.0, observe="axis")
-        assert (np.abs(long.constants(SPHEROID, run)["cayley_energy"]).max() < 1e-13) is kept
+        assert bool(np.abs(long.constants(SPHEROID, run)["cayley_energy"]).max() < 1e-13) is kept
 
 
 # ---- order -----------------------------------------------------------------------------------------------------------
@@ -220,7 +220,7 @@ def test_an_energy_error_that_is_no_claim_is_refused():
 # file: what is refuted first of all, and in which words
 CAUGHT = {
     "wrong_start": ("order", r"another power of the step: slopes attitude 1\.0"),
-    "symplectic_rk4": ("symplectic", r"defect of the bracket 1\.\de-02 \(it goes from .e-02 to .e-02"),
+    "symplectic_rk4": ("symplectic", r"defect of the bracket \d\.\de-0[23] \(it goes from (.e-0[23]) to \1"),
     "coefficients_swapped": ("order", r"another power of the step: slopes attitude (0\.9|1\.0)"),
     "hidden_kick": ("symmetric", r"a step forth and back misses the start by \d\.\de-0"),
     "one_newton": ("energy", r"drifting by -?\d\.\de-10 a step"),

@@ -40,6 +40,7 @@ TOLERANCE = 1e-6  # of an adaptive method without a default of its own
 SLOW = {"taylor-quad": 0.002}  # quadruple precision is software
 KEPT = 1e-11
 BOUNDED, LINEAR = 0.25, 0.75  # exponents between which growth is a random walk
+NEAR = 0.1  # to the exponent of a random walk
 SURE = 8.0
 VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
 
@@ -65,7 +66,7 @@ class Constant(NamedTuple):
         if self.exponent - self.interval > BOUNDED:
             if drifts or self.exponent - self.interval > LINEAR:
                 return "drift"
-            return "random walk" if abs(self.exponent - 0.5) <= self.interval else "growing"
+            return "random walk" if abs(self.exponent - 0.5) <= max(self.interval, NEAR) else "growing"
         return "drift" if drifts else "bounded"
 
 

@@ -1,7 +1,7 @@
 """The order claim: the slope of the error, and the limit that it falls to.
 
-The slope is fitted by `symtop.measure.order` to a ladder of steps, then again with ten more steps put into the two or
-three decades of error above rounding where a method of high order is asymptotic; if the scene does not show it, on
+The slope is fitted by `symtop.measure.order` to a ladder of steps, then again with ten more steps put into the two
+decades of error above rounding where a method of high order is asymptotic; if the scene does not show it, on
 `FALLBACK` over longer runs. An adaptive method is fitted against its mean step.
 
 A slope says nothing about a small constant: a method whose coefficients miss their sum by 1e-9 has the right slope down
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
 FALLBACK, LONGER = "goldstein", (40.0, 400.0)
 FINEST = {"compiled": 2e5, "python": 1e4}  # steps of the longest run
-DENSE = 10
+DENSE, DECADES = 10, 2.0
 SHARE = 0.37  # of a nutation: length of the runs that are extrapolated to h = 0
 STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
 ROUNDING = 1e-11  # a limit as close as this is the true motion
@@ -99,12 +99,14 @@ def _fitted(method: Integrator, where: Scene, main: str, horizon: float, table: 
 
 
 def _asymptotic(method: Integrator, found: Order) -> list[float]:
-    """Steps from where rounding ends to an error three decades above it."""
-    good = np.isfinite(found.error) & (found.error > 100.0 * found.bound)
-    if not good.any():
+    """Steps from where rounding ends to an error `DECADES` above it."""
+    good = np.flatnonzero(np.isfinite(found.error) & (found.error > 50.0 * found.bound))
+    if good.size == 0:
         return []
-    finest = float(np.min(found.step_size[good]))
-    return [finest * 10.0 ** (3.0 / (method.order or 2) * k / DENSE) for k in range(1, DENSE + 1)]
+    finest = good[np.argmin(found.step_size[good])]
+    power = method.order or 2
+    first = float(found.step_size[finest] * (20.0 * found.bound[finest] / found.error[finest]) ** (1.0 / power))
+    return [first * 10.0 ** (DECADES / power * k / (DENSE - 1)) for k in range(DENSE)]
 
 
 class Limit(NamedTuple):

@@ -247,9 +247,10 @@ VERDICT_COLORS = {
 
 
 def verdict_matrix(rows: Mapping[str, Sequence[Any]], claims: Sequence[str], symbols: Mapping[str, str]) -> Any:
-    """One row an integrator, one column a claim, in each cell a symbol and what was measured, on the verdict's colour.
+    """One row an integrator, one column a claim, in each cell a symbol and what was measured, on the verdict's colour;
+    a refuted cell shows what was declared as well.
 
-    `rows` holds the findings of an integrator in the order of `claims`: things with `verdict` and `measured`.
+    `rows` holds an integrator's findings in the order of `claims`: things with `verdict`, `declared` and `measured`.
     """
     from matplotlib.patches import Patch, Rectangle  # noqa: PLC0415
 
@@ -259,11 +260,12 @@ def verdict_matrix(rows: Mapping[str, Sequence[Any]], claims: Sequence[str], sym
         for column, one in enumerate(found):
             color = VERDICT_COLORS[one.verdict]
             axis.add_patch(Rectangle((column - 0.5, line - 0.5), 1.0, 1.0, facecolor=color, edgecolor="white", lw=1.0))
-            said = symbols[one.verdict] + (f" {one.measured.replace(' +- ', '±')}" if one.measured else "")
             bad = one.verdict == "refuted"
+            said = f"{one.declared} | {one.measured}" if bad else one.measured
+            said = f"{symbols[one.verdict]} {said}".replace(" +- ", "±").rstrip()
             axis.text(
-                column, line, said, ha="center", va="center", fontsize=7.5, color="white" if bad else "black",
-                fontweight="bold" if bad else "normal",
+                column, line, said, ha="center", va="center", fontsize=min(7.5, 130.0 / len(said)),
+                color="white" if bad else "black", fontweight="bold" if bad else "normal",
             )  # fmt: skip
     axis.set(xlim=(-0.5, len(claims) - 0.5), ylim=(len(rows) - 0.5, -0.5), yticks=range(len(rows)), yticklabels=rows)
     axis.set_xticks(range(len(claims)), [claim.replace("_", " ") for claim in claims])
