@@ -205,6 +205,44 @@ def long(
 
 
 @main.command()
+@click.argument("names", nargs=-1, metavar="[INTEGRATOR]...")
+@click.option("--scene", default="spheroid", show_default=True, help="The scene to judge on.")
+@click.option("--quick", is_flag=True, help="Shorter runs, one chart.")
+@plugin_option
+@json_option
+def claims(names: tuple[str, ...], scene: str, quick: bool, plugin_files: tuple[str, ...], as_json: bool) -> None:
+    """Measure every claim of each INTEGRATOR; exit code 1 if one is refuted.
+
+    Without a name: those of the plug-in, or all there are.
+
+    \b
+    symtop claims midpoint rk4
+    symtop claims --plugin my_methods.py
+    """
+    from symtop.integrators.registry import integrator, integrators  # noqa: PLC0415
+    from symtop.measure.claims import judge  # noqa: PLC0415
+    from symtop.scenes import scene as find_scene  # noqa: PLC0415
+
+    before = set(integrators())
+    _load_plugins(plugin_files)
+    added = [name for name in integrators() if name not in before]
+    where = find_scene(scene)
+    chosen = [integrator(name) for name in names or added or integrators()]
+    refuted, shown = False, []
+    for method in chosen:
+        ledger = judge(method, where, quick=quick)
+        refuted |= any(found.verdict == "refuted" for found in ledger.findings)
+        if as_json:
+            shown += [{"integrator": method.name, "scene": where.name, **found.plain()} for found in ledger.findings]
+        else:
+            click.echo("\n".join(ledger.sentences()))
+    if as_json:
+        click.echo(json.dumps(shown, indent=1))
+    if refuted:
+        sys.exit(1)
+
+
+@main.command()
 @click.argument("names", nargs=-1)
 @click.option("--all", "every", is_flag=True, help="Run every study.")
 @click.option("--quick", is_flag=True, help="Coarse grids, a few seconds a study; kept apart from the full results.")

@@ -20,7 +20,7 @@ from symtop.guard import warning
 from symtop.integrators.outcomes import OUTCOMES, sentence
 from symtop.integrators.registry import Integrator, Plan, Run, integrator
 from symtop.scenes import OBSERVABLES, Scene, closed_form, scene
-from symtop.top import SymmetricTop
+from symtop.top import Angles, SymmetricTop
 
 MOST_STEPS = 20_000_000_000  # ten minutes of the fastest kernel
 MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
@@ -159,7 +159,7 @@ def simulate(
             guard(said)
         else:
             warnings.warn(said, SymtopWarning, stacklevel=2)
-    run = _checked(method, chart, plan, _solve(method, chart, chosen, plan))
+    run = solve_plan(method, chart, chosen.top, chosen.start, plan, f" on {chosen.name}")
     return datasets.describe(
         as_dataset(chosen, chart, plan, run),
         title=f"{method.name} on {chosen.name}",
@@ -187,14 +187,15 @@ DIMENSIONS = {"angles": 4, "axis": 6, "attitude": 7}
 MOST_SAMPLES = 10_000_000
 
 
-def _solve(method: Integrator, chart: str, where: Scene, plan: Plan) -> object:
+def solve_plan(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan, where: str = "") -> Run:
+    """What a solver makes of a plan, checked; SymtopError if it breaks or returns something else."""
     try:
-        return method.solvers[chart](where.top, where.start, plan)
+        return _checked(method, chart, plan, method.solvers[chart](top, start, plan))
     except SymtopError:
         raise
     except Exception as error:
         said = " ".join(str(error).split())
-        msg = f"integrator {method.name} failed on {where.name}: {type(error).__name__}: {said}"
+        msg = f"integrator {method.name} failed{where}: {type(error).__name__}: {said}"
         raise SymtopError(msg) from error
 
 

@@ -9,9 +9,9 @@ from symtop.integrators import galerkin as kernel
 from symtop.integrators.angles import reduced
 from symtop.measure.conservation import trend
 from symtop.measure.errors import momentum_scale
+from symtop.measure.step_map import StepMap, angles_at, one_step, return_miss, symplectic_defect
 from symtop.top import effective_force, effective_stiffness
 from tests.conftest import random_scenes
-from tests.structure import angles_at, return_miss, symplectic_defect, whole_step
 from tests.test_integrators import fitted
 
 SCENES = ("spheroid", "goldstein")
@@ -80,29 +80,28 @@ def test_one_step_is_the_stationary_parabola(where):
     """The reduction to two unknowns, and all six results of a step, against six equations solved as they stand."""
     method, point = symtop.integrator(NAME), point_of(where)
     for h in (0.1, 0.02):
-        found = whole_step(method, where.top, point, h)
+        found = StepMap(method, "angles", where.top, 1.0, h).image(point)
         assert np.max(np.abs(found - independent_step(where.top, point, h))) < 2e-12
 
 
 def test_other_weights_are_another_method():
     where = random_scenes(1, seed=21)[0]
     point = point_of(where)
-    found = whole_step(symtop.integrator(NAME), where.top, point, 0.1)
+    found = StepMap(symtop.integrator(NAME), "angles", where.top, 1.0, 0.1).image(point)
     wrong = independent_step(where.top, point, 0.1, weights=(0.17, 0.66, 0.17))
     assert not np.max(np.abs(found - wrong)) < 2e-12
 
 
 @pytest.mark.parametrize("where", random_scenes(6, seed=22), ids=lambda s: s.name)
 def test_the_six_dimensional_step_map_is_symplectic(where):
-    method, h = symtop.integrator(NAME), 0.02
-    coarse, fine = (symplectic_defect(method, where.top, where.start, h, delta) for delta in (2e-3, 1e-3))
-    assert fine < 2e-10
-    assert fine < coarse / 4 + 1e-11  # what is left is the differencing, which shrinks as its fourth power
+    defect = symplectic_defect(one_step(symtop.integrator(NAME), "angles", where, 0.02), where.start)
+    assert defect.size < 2e-10
+    assert defect.raw[-1] < defect.raw[0] / 100.0  # what is left is the differencing, which falls as its square
 
 
 @pytest.mark.parametrize("where", random_scenes(8, seed=23), ids=lambda s: s.name)
 def test_a_step_and_its_reverse_return_to_the_start(where):
-    assert return_miss(symtop.integrator(NAME), where.top, where.start, 0.02) < 2e-14
+    assert return_miss(one_step(symtop.integrator(NAME), "angles", where, 0.02), where.start) < 2e-14
 
 
 def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
@@ -117,8 +116,8 @@ def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
 
     wrong = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
     where = random_scenes(1, seed=22)[0]
-    assert symplectic_defect(wrong, where.top, where.start, 0.02, 1e-3) > 1e-5
-    assert return_miss(wrong, where.top, where.start, 0.02) > 1e-5
+    assert symplectic_defect(one_step(wrong, "angles", where, 0.02), where.start).size > 1e-5
+    assert return_miss(one_step(wrong, "angles", where, 0.02), where.start) > 1e-5
 
 
 @pytest.mark.parametrize("where", random_scenes(4, seed=24), ids=lambda s: s.name)

@@ -13,6 +13,8 @@ from symtop.integrators.registry import integrator
 from symtop.integrators.space import field_axis, frame_to_attitude, on_axis, on_frame
 from symtop.measure.conservation import residuals, trend
 from symtop.measure.growth import growth
+from symtop.measure.step_map import one_step as map_of
+from symtop.measure.step_map import symplectic_defect
 from tests.slopes import assert_order
 
 ONE = np.array([1])
@@ -128,33 +130,17 @@ def test_steps_are_reversible(stages):
     np.testing.assert_allclose(back, state, rtol=0, atol=2e-14)
 
 
-def poisson_defect(step, state):
-    """max |J B(y) J^T - B(step(y))| / max |B| with J by central differences; zero for a Poisson map.
-
-    The bracket of (e, L): {L_i, L_j} = eps_ijk L_k, {L_i, e_j} = eps_ijk e_k, {e_i, e_j} = 0, up to a common sign.
-    """
-
-    def hat(v):
-        return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-
-    def bracket(y):
-        return np.block([[np.zeros((3, 3)), hat(y[:3])], [hat(y[:3]), hat(y[3:])]])
-
-    d = 1e-5
-    columns = [(step(state + d * unit) - step(state - d * unit)) / (2.0 * d) for unit in np.eye(6)]
-    J = np.stack(columns, axis=1)
-    return np.max(np.abs(J @ bracket(state) @ J.T - bracket(step(state)))) / np.max(np.abs(bracket(state)))
-
-
 def test_gauss_methods_are_not_poisson():
     """Why `symplectic` is false: the bracket is missed by the method's own local error, of order 2s + 1."""
     scene = symtop.scene("spheroid")
-    par, state = on_axis(scene.top, scene.start)
-    start = np.array(state)
-    for stages, h in ((1, 0.05), (2, 0.1)):
-        coarse, fine = (poisson_defect(lambda y, h=h: one_step(stages, y, par, h), start) for h in (h, h / 2.0))  # noqa: B023
-        assert abs(np.log2(coarse / fine) - (2 * stages + 1)) < 0.5, (stages, coarse, fine)
-    assert poisson_defect(lambda y: one_step(6, y, par, 0.2), start) < 1e-9  # the exact map, as far as differences see
+
+    def defect(order, h):
+        return symplectic_defect(map_of(integrator(f"gauss-{order}"), "axis", scene, h), scene.start).size
+
+    for order, h in ((2, 0.05), (4, 0.1)):
+        coarse, fine = defect(order, h), defect(order, h / 2.0)
+        assert abs(np.log2(coarse / fine) - (order + 1)) < 0.5, (order, coarse, fine)
+    assert defect(12, 0.2) < 1e-9  # the exact map, as far as differences see
 
 
 def test_a_step_that_is_too_large_is_reported():

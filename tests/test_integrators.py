@@ -14,8 +14,8 @@ from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.registry import Integrator
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
+from symtop.measure.step_map import one_step, return_miss, symplectic_defect
 from tests.conftest import random_scenes
-from tests.structure import return_miss, symplectic_defect
 
 DISCRETE = ("midpoint", "trapezoidal", "stormer-verlet")
 
@@ -82,10 +82,9 @@ def test_taylor_agrees_with_thirty_digits(truth, scene_name, entry, quantity):
 @pytest.mark.parametrize("where", random_scenes(6, seed=3), ids=lambda s: s.name)
 @pytest.mark.parametrize("name", DISCRETE)
 def test_the_step_map_is_symplectic(name, where):
-    method, h = symtop.integrator(name), 0.02
-    coarse, fine = (symplectic_defect(method, where.top, where.start, h, delta) for delta in (2e-3, 1e-3))
-    assert fine < 2e-10
-    assert fine < coarse / 4 + 1e-11  # what is left is the differencing, which shrinks as its fourth power
+    defect = symplectic_defect(one_step(symtop.integrator(name), "angles", where, 0.02), where.start)
+    assert defect.size < 2e-10
+    assert defect.raw[-1] < defect.raw[0] / 100.0  # what is left is the differencing, which falls as its square
 
 
 def explicit_euler(top, start, plan):
@@ -110,21 +109,21 @@ def explicit_euler(top, start, plan):
 @pytest.mark.parametrize("where", random_scenes(4, seed=4), ids=lambda s: s.name)
 def test_a_method_that_is_not_symplectic_is_seen(where):
     euler = Integrator(name="euler", family="other", summary="", solvers={"angles": explicit_euler})
-    assert symplectic_defect(euler, where.top, where.start, 0.02, 1e-3) > 1e-6
-    assert return_miss(euler, where.top, where.start, 0.02) > 1e-6
+    assert symplectic_defect(one_step(euler, "angles", where, 0.02), where.start).size > 1e-6
+    assert return_miss(one_step(euler, "angles", where, 0.02), where.start) > 1e-6
 
 
 @pytest.mark.parametrize("where", random_scenes(8, seed=5), ids=lambda s: s.name)
 @pytest.mark.parametrize("name", DISCRETE)
 def test_a_step_and_its_reverse_return_to_the_start(name, where):
-    assert return_miss(symtop.integrator(name), where.top, where.start, 0.02) < 2e-14
+    assert return_miss(one_step(symtop.integrator(name), "angles", where, 0.02), where.start) < 2e-14
 
 
 def test_a_rule_that_is_not_symmetric_misses_the_start():
     lopsided = symtop.discrete_lagrangian("left", (0.0, 2.0 / 3.0), (0.25, 0.75))
     assert lopsided.symmetric is False
     where = random_scenes(1, seed=5)[0]
-    assert return_miss(lopsided, where.top, where.start, 0.02) > 1e-7
+    assert return_miss(one_step(lopsided, "angles", where, 0.02), where.start) > 1e-7
 
 
 def test_midpoint_is_the_implicit_midpoint_rule_of_the_reduced_hamiltonian():

@@ -56,6 +56,7 @@ Solver = Callable[[SymmetricTop, Angles, Plan], Run]
 FAMILIES = ("discrete-lagrangian", "splitting", "runge-kutta", "taylor", "library", "exact", "other")
 TIERS = ("compiled", "python")
 KNOBS = ("step_size", "tolerance", None)
+ENERGY_ERRORS = ("kept", "bounded", None)
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,7 @@ class Integrator:
     least_tolerance: float = 0.0
     default_tolerance: float | None = None
     reference: str = ""
+    energy_error: str | None = None  # "kept" or "bounded"; None says what follows from the other claims
 
     def __post_init__(self) -> None:
         label("name", self.name)
@@ -90,6 +92,9 @@ class Integrator:
         one_of("tier", self.tier, TIERS)
         if self.knob not in KNOBS:
             msg = f"knob must be 'step_size', 'tolerance' or None, not {self.knob!r}"
+            raise SymtopError(msg)
+        if self.energy_error not in ENERGY_ERRORS:
+            msg = f"energy_error must be 'kept', 'bounded' or None, not {self.energy_error!r}"
             raise SymtopError(msg)
         given = self.solvers if isinstance(self.solvers, Mapping) else {}
         if not given or not set(given) <= {"angles", "axis", "attitude"} or not all(map(callable, given.values())):

@@ -72,4 +72,6 @@ def compose(force: Any, kick: Any, drift: Any, par: Any, rule: Any, state: Any, 
             now = force(par, state, step)
     if rule.kick[n] != 0.0:
         step = kick(par, now, step, rule.kick[n], rule.bend[n])
+    elif rule.kick[0] != 0.0:  # what the next step kicks with first
+        now = force(par, state, step)
     return step, now

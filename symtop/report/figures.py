@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.report.style import GREY, Look, legend_below, look, panels, slope_guide
+from symtop.report.style import GREY, VERMILLION, YELLOW, Look, legend_below, look, panels, slope_guide
 
 
 def error_curves(
@@ -168,3 +168,46 @@ def envelope(t: Any, r: Any, windows: int = 18) -> tuple[Any, Any]:
     place = np.clip(np.searchsorted(edges, t, side="left") - 1, 0, windows - 1)
     kept = np.unique(place)
     return np.sqrt(edges[kept] * edges[kept + 1]), np.array([r[place == k].max() for k in kept])
+
+
+VERDICT_COLORS = {
+    "confirmed": "#CFE8F3",
+    "refuted": VERMILLION,
+    "measured": "#F2F2F2",
+    "undecided": YELLOW,
+    "inapplicable": "#FFFFFF",
+}
+
+
+def verdict_matrix(rows: Mapping[str, Sequence[Any]], claims: Sequence[str], symbols: Mapping[str, str]) -> Any:
+    """One row an integrator, one column a claim, in each cell a symbol and what was measured, on the verdict's colour;
+    a refuted cell shows what was declared as well.
+
+    `rows` holds an integrator's findings in the order of `claims`: things with `verdict`, `declared` and `measured`.
+    """
+    from matplotlib.patches import Patch, Rectangle  # noqa: PLC0415
+
+    figure, axes = panels(1, 1, width=14.5, height=0.6 + 0.235 * len(rows))
+    axis = axes[0, 0]
+    for line, found in enumerate(rows.values()):
+        for column, one in enumerate(found):
+            color = VERDICT_COLORS[one.verdict]
+            axis.add_patch(Rectangle((column - 0.5, line - 0.5), 1.0, 1.0, facecolor=color, edgecolor="white", lw=1.0))
+            bad = one.verdict == "refuted"
+            said = f"{one.declared} | {one.measured}" if bad else one.measured
+            said = f"{symbols[one.verdict]} {said}".replace(" +- ", "±").rstrip()
+            axis.text(
+                column, line, said, ha="center", va="center", fontsize=min(7.5, 130.0 / len(said)),
+                color="white" if bad else "black", fontweight="bold" if bad else "normal",
+            )  # fmt: skip
+    axis.set(xlim=(-0.5, len(claims) - 0.5), ylim=(len(rows) - 0.5, -0.5), yticks=range(len(rows)), yticklabels=rows)
+    axis.set_xticks(range(len(claims)), [claim.replace("_", " ") for claim in claims])
+    axis.tick_params(length=0, top=True, labeltop=True)
+    axis.grid(visible=False)
+    axis.spines[:].set_visible(False)
+    handles = [
+        Patch(facecolor=color, edgecolor=GREY, lw=0.4, label=f"{symbols[verdict]} {verdict}")
+        for verdict, color in VERDICT_COLORS.items()
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
+    return figure

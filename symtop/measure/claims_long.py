@@ -1,0 +1,230 @@
+"""What a million steps do to the constants of the motion, what a step costs, and what happens at a pole.
+
+A constant is kept if after a million steps it is off by no more than `KEPT`, relative: rounding, added up. An energy
+that is not kept is bounded, a random walk or a drift by the exponent of its growth (0, 1/2, 1) with its 95 % interval;
+a drift that hides below a bounded oscillation shows in the means of 24 equal stretches, and counts if the line through
+them exceeds `SURE` of its own intervals. Random walks pass a plain test of the slope in one case in three; this one
+they do not pass, and at the size of rounding nothing but the size is judged.
+
+A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau, whatever its tau: c is fitted, and it
+is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
+
+Python solvers are too slow for a million steps: they run for as many as `EVALUATIONS` allow, and the ledger says so.
+"""
+
+import dataclasses
+import math
+import tracemalloc
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from symtop.integrators.registry import Integrator
+from symtop.measure.conservation import residuals, trend
+from symtop.measure.errors import errors
+from symtop.measure.growth import growth
+from symtop.reference import reference
+from symtop.scenes import Scene
+from symtop.simulate import simulate
+from symtop.top import Angles, SymmetricTop
+
+Array = NDArray[np.float64]
+
+STEPS, QUICK_STEPS = 1_000_000, 50_000
+STEPS_A_NUTATION = 118.02
+SAMPLES = 4001
+PILOT = 400  # steps of the run that is sampled at every step
+EVALUATIONS = {"compiled": 2e8, "python": 4e4}
+TOLERANCE = 1e-6  # of an adaptive method without a default of its own
+SLOW = {"taylor-quad": 0.002}  # quadruple precision is software
+KEPT = 1e-11
+BOUNDED, LINEAR = 0.25, 0.75  # exponents between which growth is a random walk
+NEAR = 0.1  # to the exponent of a random walk
+SURE = 8.0
+VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
+
+
+class Constant(NamedTuple):
+    """What became of one constant of the motion."""
+
+    largest: float  # relative change
+    a_step: float  # largest change in one step
+    exponent: float  # of its growth with time
+    interval: float
+    rise: float  # of the line through the means over the whole run
+    certain: float  # the rise in units of its 95 % interval
+
+    @property
+    def kind(self) -> str:
+        """kept, bounded, random walk, drift, or just growing; unknown if it was never finite."""
+        if not math.isfinite(self.largest):
+            return "unknown"
+        if self.largest <= KEPT:
+            return "kept"
+        drifts = abs(self.certain) > SURE and abs(self.rise) > VISIBLE * self.largest
+        if self.exponent - self.interval > BOUNDED:
+            if drifts or self.exponent - self.interval > LINEAR:
+                return "drift"
+            return "random walk" if abs(self.exponent - 0.5) <= max(self.interval, NEAR) else "growing"
+        return "drift" if drifts else "bounded"
+
+
+class LongRun(NamedTuple):
+    """One long run: its constants by name, and its cost."""
+
+    constants: dict[str, Constant]
+    outcome: str
+    message: str
+    chart: str
+    steps: int
+    nutations: float
+    evaluations: float  # of the force, a step
+    iterations: float  # of a solver, a step
+    steady_cost: bool  # every run of the same number of steps cost the same, at two step sizes
+
+
+def _period(where: Scene) -> float:
+    return where.nutation_period if math.isfinite(where.nutation_period) else where.horizon / 8.0
+
+
+def _run(method: Integrator, where: Scene, steps: float, step: float, samples: int) -> xr.Dataset:
+    """A run for `steps` times `step`: of that many steps, or for that time at the tolerance."""
+    if method.knob == "step_size":
+        return simulate(
+            where, method, step_size=step, horizon=round(steps) * step, samples=samples, observe="axis", guard=False
+        )
+    given = None if method.knob is None or method.default_tolerance is not None else TOLERANCE
+    return simulate(where, method, tolerance=given, horizon=steps * step, samples=samples, observe="axis", guard=False)
+
+
+def long_run(method: Integrator, where: Scene, *, quick: bool = False) -> LongRun:
+    """A million steps of a compiled method, fewer where that would take minutes."""
+    step = _period(where) / STEPS_A_NUTATION
+    pilot = _run(method, where, PILOT, step, PILOT + 1)
+    other = _run(method, where, PILOT, 0.21 * step, PILOT + 1)
+    cost = max(float(pilot.attrs["force_evaluations"]) / PILOT, 1.0)
+    most = QUICK_STEPS if quick else STEPS
+    steps = min(most, EVALUATIONS[method.tier] / cost) * SLOW.get(method.name, 1.0)
+    if method.knob is None:
+        steps = PILOT  # a formula has no steps: nothing adds up
+    run = _run(method, where, max(steps, PILOT), step, SAMPLES)
+    made = max(int(run.attrs["steps"]), 1)
+    found, small = constants(where, run), constants(where, pilot)
+    return LongRun(
+        {name: _judged(run["time"].values, values, small[name]) for name, values in found.items()},
+        str(run.attrs["outcome"]),
+        str(run.attrs["outcome_message"]),
+        str(run.attrs["chart"]),
+        int(run.attrs["steps"]),
+        float(run.attrs["reached_time"]) / _period(where),
+        float(run.attrs["force_evaluations"]) / made,
+        float(run.attrs["newton_iterations"]) / made,
+        len({data.attrs["force_evaluations"] / max(data.attrs["steps"], 1) for data in (pilot, other)}) == 1,
+    )
+
+
+def constants(where: Scene, run: xr.Dataset) -> dict[str, Array]:
+    """Relative change of every constant that the run's chart has, at its samples."""
+    found = residuals(where, run)
+    if run.attrs["chart"] != "angles":
+        found["axis_length"] = np.linalg.norm(run["axis"].values, axis=1) - 1.0
+    if run.attrs["chart"] != "angles" and math.isfinite(run.attrs["step_size"]):
+        found["cayley_energy"] = _cayley_residual(where.top, run)
+    return found
+
+
+def _cayley_residual(top: SymmetricTop, run: xr.Dataset) -> Array:
+    """|L|^2/2 + c u - k^2 (1-u^2)/8 with the best c, relative to its size; |L|^2 is in the energy."""
+    u = run["axis"].values[:, 2]
+    spin: Array = 0.5 * run["p_psi"].values ** 2 * (1.0 / top.I3 - 1.0 / top.I1)
+    square: Array = top.I1 * (run["energy"].values - top.mgl * u - spin)  # |L|^2 / 2
+    kick = float(run.attrs["step_size"]) * top.mgl
+    rest = square - kick * kick * (1.0 - u) * (1.0 + u) / 8.0
+    good = np.isfinite(rest) & np.isfinite(u)
+    if good.sum() < 8 or np.ptp(u[good]) == 0.0:
+        return np.full(u.size, math.nan)
+    du, dr = u[good] - u[good].mean(), rest[good] - rest[good].mean()
+    c = -float(du @ dr) / float(du @ du)
+    whole: Array = rest + c * u
+    relative: Array = (whole - whole[0]) / float(np.max(np.abs(rest[good])))
+    return relative
+
+
+def _judged(time: Array, values: Array, every_step: Array) -> Constant:
+    """Size, growth and trend of a residual; `every_step` holds it at consecutive steps."""
+    size = np.abs(values[np.isfinite(values)])
+    jumps = np.abs(np.diff(every_step))
+    jumps = jumps[np.isfinite(jumps)]
+    power, line = growth(time, values), trend(time, values)
+    sure = abs(line.slope) / line.interval if line.interval > 0.0 else 0.0
+    return Constant(
+        float(size.max()) if size.size else math.nan,
+        float(jumps.max()) if jumps.size else math.nan,
+        power.slope, power.interval, line.rise, sure,
+    )  # fmt: skip
+
+
+def memory_a_step(method: Integrator, where: Scene) -> float:
+    """Bytes that a run keeps for each further step, by Python's own count of what NumPy and Python allocate."""
+    few = max(100, round((4_000 if method.tier == "compiled" else 200) * min(1.0, 20.0 * SLOW.get(method.name, 1.0))))
+    step = _period(where) / STEPS_A_NUTATION
+    peaks, made = [], []
+    _run(method, where, few, step, 11)  # whatever is made once is made here
+    for steps in (few, 6 * few):
+        tracemalloc.start()
+        try:
+            made.append(int(_run(method, where, steps, step, 11).attrs["steps"]))
+            peaks.append(tracemalloc.get_traced_memory()[1])
+        finally:
+            tracemalloc.stop()
+    return max(peaks[1] - peaks[0], 0) / max(made[1] - made[0], 1)
+
+
+# the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1
+_POLE_RATE = 0.5 / math.cos(0.5) ** 2
+POLE = Scene(
+    "pole",
+    SymmetricTop(1.0, 1.0, 1.0),
+    Angles(theta=1.0, theta_dot=-1.2, phi_dot=_POLE_RATE, psi_dot=1.0 - _POLE_RATE * math.cos(1.0)),
+    4.0,
+)
+POLE_STEPS = 400
+POLE_RIGHT = 1e-7  # rad: right, whatever the step
+
+
+class Passage(NamedTuple):
+    """What a method did in one chart when the axis passed a pole."""
+
+    chart: str
+    outcome: str
+    error: float  # of the axis, rad
+    finer: float  # with half the step or a tenth of the tolerance
+
+    @property
+    def passes(self) -> bool:
+        """Did it come out on the other side, with an error that falls with the step?"""
+        return self.outcome == "ok" and (self.finer < 0.7 * self.error or self.finer < POLE_RIGHT)
+
+
+def passages(method: Integrator) -> list[Passage]:
+    """What happens at a pole, in every chart of the method."""
+    found = []
+    for chart in method.charts():
+        only = dataclasses.replace(method, solvers={chart: method.solvers[chart]})
+        ends, errors_there = [], []
+        for finer in (1.0, 2.0):
+            step = POLE.horizon / (POLE_STEPS * finer)
+            knob = {"step_size": step} if method.knob == "step_size" else {}
+            if method.knob == "tolerance":
+                knob = {"tolerance": max(10.0 ** (-5.0 - finer), method.least_tolerance)}
+            run = simulate(
+                POLE, only, samples=201, observe="axis" if chart != "attitude" else "attitude", guard=False, **knob
+            )
+            truth = reference(POLE, run["time"].values, precision="closed-form")
+            ends.append(str(run.attrs["outcome"]))
+            miss = errors(POLE, run, truth)["axis"].values
+            errors_there.append(float(np.nanmax(miss)) if np.isfinite(miss).any() else math.nan)
+        found.append(Passage(chart, next((end for end in ends if end != "ok"), "ok"), *errors_there))
+    return found

@@ -1,0 +1,273 @@
+"""The structure of one step: does it preserve the bracket, does it retrace itself, is it one map at all?
+
+A step is seen only through a solver, as a run of one step from a start z = (theta, phi, psi, p_theta, p_phi, p_psi), so
+that anybody's plug-in can be judged. What it shows is a vector Y(z) in the chart's own variables, whose brackets are
+known at any point:
+
+    angles      (theta, phi, psi, p_theta, p_phi, p_psi)    {q_i, p_j} = delta_ij
+    axis        (e, L)                                       {L_i, L_j} = eps_ijk L_k,  {e_i, L_j} = eps_ijk e_k
+    attitude    (q, L)                                       the same L,  {q, L_i} = i-th unit vector times q, halved
+
+With D = dY/dz and J the canonical matrix, the step is symplectic (Lie-Poisson on the axis) if D J D^T = B(Y), which at
+a pole of the image is no harder than elsewhere. D comes from central differences of width w, w/2, w/4 ... and
+Richardson's extrapolation; its own error is the change from one extrapolation to the next, and a defect counts only
+beyond it. With shrinking w the raw defect of a symplectic map falls as w^2, that of any other map stays.
+
+Momenta are in units of the larger of |p_phi| and |p_psi|, so that everything here is of order one.
+A symmetric method has step(-h) = step(h)^-1. An adaptive one has no step of a given h: it runs for that time, and the
+way back is the motion with all rates reversed. A method whose run of two steps is not two runs of one step (it tunes
+itself, or starts differently) is not one map. If it tunes one number t by its start, D = D_t + (dY/dt) (dt/dz)^T, and
+D J D^T - B has rank two when the map of a fixed t is symplectic: then the third singular value vanishes.
+Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1, VI.2, VII.2; Ridders, Adv. Eng. Softw. 4 (1982).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop import charts
+from symtop.checks import SymtopError
+from symtop.integrators.registry import Integrator, Plan, Run
+from symtop.measure.errors import momentum_scale
+from symtop.scenes import Scene, closed_form
+from symtop.simulate import solve_plan
+from symtop.top import Angles, SymmetricTop
+
+Array = NDArray[np.float64]
+
+WIDEST = 0.04  # the first differencing width, in radians and units of the momenta
+WIDTHS = 5
+COARSE = 3e-3  # a step is coarse enough to show its structure if two halves of it differ by this
+LOOSE = 1e-3  # tolerance at which an adaptive method shows its structure
+UNIT = 1e-12  # |e| = 1 and |q| = 1 within this
+SHARE = 0.37  # of a nutation: what an adaptive method is run for
+CANONICAL = np.block([[np.zeros((3, 3)), np.eye(3)], [-np.eye(3), np.zeros((3, 3))]])
+
+
+@dataclass(frozen=True)
+class StepMap:
+    """The map of one step of a method in one of its charts, on one top."""
+
+    method: Integrator
+    chart: str
+    top: SymmetricTop
+    unit: float  # of momenta
+    h: float
+
+    def run(self, start: Angles, h: float, steps: int = 1) -> Run:
+        """A run of so many steps, sampled at its end; for an adaptive method a run for that time."""
+        end = steps * h
+        if self.method.knob == "step_size":
+            plan = Plan(np.array([end]), end, h, np.array([steps]), math.nan)
+        else:
+            loose = math.nan if self.method.knob is None else max(LOOSE, self.method.least_tolerance)
+            plan = Plan(np.array([end]), end, math.nan, np.empty(0, dtype=np.int64), loose)
+        done = solve_plan(self.method, self.chart, self.top, start, plan)
+        if done.outcome != "ok" or not np.isfinite(done.states).all():
+            msg = f"a step of {h:.3g} in the {self.chart} chart ended as {done.outcome}"
+            raise SymtopError(msg)
+        return done
+
+    def shown(self, done: Run) -> Array:
+        """The last sample as Y."""
+        state = done.states[-1]
+        if self.chart == "angles":
+            theta, p_theta, phi, psi = state
+            return np.array([theta, phi, psi, *(np.array([p_theta, done.p_phi[-1], done.p_psi[-1]]) / self.unit)])
+        return np.concatenate([state[:-3], state[-3:] / self.unit])
+
+    def image(self, z: Array, h: float | None = None) -> Array:
+        """Y after one step from z."""
+        return self.shown(self.run(self.angles(z), self.h if h is None else h))
+
+    def angles(self, z: Array) -> Angles:
+        """The start that a point z stands for."""
+        return angles_at(self.top, np.concatenate([z[:3], self.unit * z[3:]]))
+
+    def at(self, start: Angles) -> Array:
+        """Y of a start itself."""
+        if self.chart != "angles":
+            state = charts.space_state(self.chart, self.top, start)
+            return np.concatenate([state[:-3], state[-3:] / self.unit])
+        return self.point(start)
+
+    def point(self, start: Angles) -> Array:
+        """z of a start."""
+        momenta = self.top.momenta(start)
+        scaled = np.array([self.top.I1 * start.theta_dot, momenta.p_phi, momenta.p_psi]) / self.unit
+        return np.array([start.theta, start.phi, start.psi, *scaled])
+
+    def restart(self, y: Array) -> Angles:
+        """The start that a Y stands for; on the axis the spin angle is free and becomes zero."""
+        if self.chart == "angles":
+            return self.angles(y)
+        state = np.concatenate([y[:-3], self.unit * y[-3:]])
+        if self.chart == "attitude":
+            return charts.angles_from_attitude(self.top, state)
+        phi = charts.phi_from_axis(state[:3])
+        rates = charts.rates_from_momentum(self.top, state[:3], phi, state[3:])
+        return Angles(*(float(value) for value in (charts.theta_from_axis(state[:3]), phi, 0.0, *rates)))
+
+    def length(self, y: Array) -> float:
+        """|e| or |q|; one in the angles, which have no such thing."""
+        return 1.0 if self.chart == "angles" else float(np.linalg.norm(y[:-3]))
+
+    def gap(self, first: Array, second: Array) -> float:
+        """Largest difference of two Y; q and -q are one attitude, phi and psi are angles."""
+        if self.chart == "attitude" and float(first[:4] @ second[:4]) < 0.0:
+            second = np.concatenate([-second[:4], second[4:]])
+        apart = first - second
+        if self.chart == "angles":
+            apart[1:3] = np.remainder(apart[1:3] + math.pi, 2.0 * math.pi) - math.pi
+        return float(np.max(np.abs(apart)))
+
+
+def angles_at(top: SymmetricTop, z: Array) -> Angles:
+    """The start at a point (theta, phi, psi, p_theta, p_phi, p_psi), not at a pole."""
+    theta, phi, psi, p_theta, p_phi, p_psi = (float(value) for value in z)
+    phi_dot = (p_phi - p_psi * math.cos(theta)) / (top.I1 * math.sin(theta) ** 2)
+    return Angles(theta, phi, psi, p_theta / top.I1, phi_dot, p_psi / top.I3 - phi_dot * math.cos(theta))
+
+
+def one_step(method: Integrator, chart: str, where: Scene, h: float) -> StepMap:
+    """The map of a step of a given h."""
+    return StepMap(method, chart, where.top, momentum_scale(where), h)
+
+
+def generic_start(scene: Scene) -> Angles:
+    """A point of the scene's true motion where nothing is special: no turning point, no phase of zero."""
+    if not math.isfinite(scene.nutation_period):
+        return scene.start
+    motion = closed_form(scene)(np.array([0.3711 * scene.nutation_period]))
+    names = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
+    return Angles(*(float(getattr(motion, name)[0]) for name in names))
+
+
+def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Angles]:
+    """The map at a step so large that its structure shows above rounding, and the point to judge it at.
+
+    Raises SymtopError if no step succeeds.
+    """
+    start = generic_start(scene)
+    period = scene.nutation_period if math.isfinite(scene.nutation_period) else scene.horizon / 8.0
+    trial = one_step(method, chart, scene, SHARE * period)
+    if method.knob != "step_size":
+        return trial, start
+    refusal = SymtopError(f"{method.name} makes no step in the {chart} chart")
+    h = trial.h
+    for _ in range(40):
+        try:
+            halves = trial.shown(trial.run(start, 0.5 * h, 2))
+            if trial.gap(trial.image(trial.point(start), h), halves) < COARSE:
+                return one_step(method, chart, scene, h), start
+        except SymtopError as error:
+            refusal = error
+        h *= 0.7
+    raise refusal
+
+
+def bracket(chart: str, y: Array) -> Array:
+    """B(Y): the brackets of all pairs of the chart's variables, momenta in the map's unit."""
+    if chart == "angles":
+        return CANONICAL
+    place, momentum = y[:-3], y[-3:]
+    units = np.eye(3)
+    spun = [np.cross(unit, momentum) for unit in units]
+    if chart == "axis":
+        turned = [np.cross(unit, place) for unit in units]
+    else:
+        w, x = place[0], place[1:]
+        turned = [0.5 * np.array([-(unit @ x), *(w * unit + np.cross(unit, x))]) for unit in units]
+    moved = np.stack(turned, axis=1)
+    return np.block([[np.zeros((place.size, place.size)), moved], [-moved.T, np.stack(spun, axis=1)]])
+
+
+class Defect(NamedTuple):
+    """How far a step is from preserving the bracket."""
+
+    size: float  # max |D J D^T - B|, extrapolated
+    rest: float  # the third singular value: what a number tuned by the start cannot explain
+    noise: float  # what the differencing leaves in doubt
+    widths: Array
+    raw: Array  # the defect from plain central differences of each width
+
+
+def symplectic_defect(step: StepMap, start: Angles) -> Defect:
+    """The defect of the bracket after one step from `start`, extrapolated to width zero, with its own error."""
+    z = step.point(start)
+    middle = step.image(z)
+    scale = min(1.0, math.sin(start.theta))  # near a pole everything changes over its distance
+    widths = np.array([scale * WIDEST / 2.0**k for k in range(WIDTHS)])
+    table = [[_differences(step, z, middle, width)] for width in widths]
+    best, doubt = table[0][0], math.inf
+    for k in range(1, WIDTHS):
+        for j in range(1, k + 1):
+            finer, coarser = table[k][j - 1], table[k - 1][j - 1]
+            table[k].append(finer + (finer - coarser) / (4.0**j - 1.0))
+            change = max(_largest(table[k][j] - finer), _largest(table[k][j] - coarser))
+            if change < doubt:
+                best, doubt = table[k][j], change
+    noise = 4.0 * _largest(best) * doubt + 1e-13
+    raw = np.array([_largest(_miss(step.chart, row[0], middle)) for row in table])
+    rest = float(np.linalg.svd(_miss(step.chart, best, middle), compute_uv=False)[2])
+    return Defect(_largest(_miss(step.chart, best, middle)), rest, noise, widths, raw)
+
+
+def _differences(step: StepMap, z: Array, middle: Array, width: float) -> Array:
+    columns = []
+    for k in range(6):
+        if step.chart == "axis" and k == 2:  # nothing on the axis depends on psi
+            columns.append(np.zeros_like(middle))
+            continue
+        aside = width * np.eye(6)[k]
+        ahead, behind = (_aligned(step.chart, step.image(z + sign * aside), middle) for sign in (1.0, -1.0))
+        columns.append((ahead - behind) / (2.0 * width))
+    return np.stack(columns, axis=1)
+
+
+def _aligned(chart: str, y: Array, middle: Array) -> Array:
+    if chart == "attitude" and float(y[:4] @ middle[:4]) < 0.0:
+        return np.concatenate([-y[:4], y[4:]])
+    return y
+
+
+def _miss(chart: str, slopes: Array, y: Array) -> Array:
+    wrong: Array = slopes @ CANONICAL @ slopes.T - bracket(chart, y)
+    return wrong
+
+
+def _largest(matrix: Any) -> float:
+    return float(np.max(np.abs(matrix)))
+
+
+def return_miss(step: StepMap, start: Angles) -> float:
+    """Distance from the start after a step forth and back; a solver that takes no negative step runs reversed."""
+    before = step.at(start)
+    there = step.restart(step.image(step.point(start)))
+    if step.method.knob == "step_size":
+        try:
+            return step.gap(step.shown(step.run(there, -step.h)), before)
+        except SymtopError:
+            pass
+    back = step.restart(step.shown(step.run(reversed_rates(there), step.h)))
+    return step.gap(step.at(reversed_rates(back)), before)
+
+
+def reversed_rates(start: Angles) -> Angles:
+    """The same attitude, every rate the other way round."""
+    return Angles(start.theta, start.phi, start.psi, -start.theta_dot, -start.phi_dot, -start.psi_dot)
+
+
+def restart_gap(step: StepMap, start: Angles) -> float:
+    """How much a run of two steps differs from two runs of one step: rounding, if a step is a map.
+
+    A step that does not keep |e| or |q| at one cannot be taken up again by a start: that is no evidence, and zero.
+    """
+    after = step.image(step.point(start))
+    if step.method.knob != "step_size" or abs(step.length(after) - 1.0) > UNIT:
+        return 0.0
+    once = step.restart(after)
+    return step.gap(step.shown(step.run(start, step.h, 2)), step.shown(step.run(once, step.h)))
