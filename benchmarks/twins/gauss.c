@@ -36,23 +36,20 @@ static inline int increment(
     double last = INFINITY;
     long effort = 0;
     (void)h;
-    for (int i = 0; i < stages; i++)
-        for (int m = 0; m < DIM; m++) {
-            double total = 0.0;
-            for (int j = 0; j < stages; j++) total += rule->predict[i][j] * carry->L[j][m];
-            carry->next[i][m] = total;
-        }
+    for (int i = 0; i < stages; i++) {
+        for (int m = 0; m < DIM; m++) carry->next[i][m] = 0.0;
+        for (int j = 0; j < stages; j++)
+            for (int m = 0; m < DIM; m++) carry->next[i][m] += rule->predict[i][j] * carry->L[j][m];
+    }
     for (int i = 0; i < stages; i++)
         for (int m = 0; m < DIM; m++) carry->L[i][m] = carry->next[i][m];
     while (effort < SWEEPS) {
         double correction = 0.0;
         for (int i = 0; i < stages; i++) {
-            double place[DIM], slope[DIM];
-            for (int m = 0; m < DIM; m++) {
-                double total = 0.0;
-                for (int j = 0; j < stages; j++) total += rule->mu[i][j] * carry->L[j][m];
-                place[m] = state[m] + total;
-            }
+            double place[DIM] = {0.0}, slope[DIM];
+            for (int j = 0; j < stages; j++)
+                for (int m = 0; m < DIM; m++) place[m] += rule->mu[i][j] * carry->L[j][m];
+            for (int m = 0; m < DIM; m++) place[m] = state[m] + place[m];
             field(par, place, slope);
             for (int m = 0; m < DIM; m++) {
                 double value = carry->weights[i] * slope[m];
@@ -68,11 +65,9 @@ static inline int increment(
         }
         last = correction;
     }
-    for (int m = 0; m < DIM; m++) {
-        double total = 0.0;
-        for (int i = 0; i < stages; i++) total += carry->L[i][m];
-        step[m] = total;
-    }
+    for (int m = 0; m < DIM; m++) step[m] = 0.0;
+    for (int i = 0; i < stages; i++)
+        for (int m = 0; m < DIM; m++) step[m] += carry->L[i][m];
     *work = effort;
     return isfinite(step[0]) ? outcome : 2;
 }

@@ -72,8 +72,8 @@ def _prune(keep: Path) -> None:
 def register_jitable(function: Callable[..., Any]) -> Any:
     """Let kernels call a plain function, inlined wherever they do.
 
-    Left to itself LLVM keeps the larger ones, such as the drift of a splitting, as calls that pass their results through
-    memory: 1.3 times the time of a step, 2 times for the Gauss methods on nine variables.
+    Left to itself LLVM keeps the larger ones, such as the drift of a splitting, as calls that pass their results
+    through memory: 1.3 times the time of a step.
     """
     return _register(forceinline=True)(function)
 
