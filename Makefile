@@ -51,8 +51,7 @@ lint: $(READY)
 
 bench: $(READY)
 	@echo "symtop: timing the kernels against C (needs gcc)"
-	@$(BIN)/python benchmarks/kernels.py
-	@$(BIN)/python benchmarks/targets.py
+	@$(BIN)/python -m benchmarks.bench
 
 clean:
 	rm -rf .venv .pytest_cache .ruff_cache .mypy_cache benchmarks/build results/cases results/quick results/*.nc results/*.json

@@ -66,18 +66,26 @@ def kernel_of(method: Integrator, chart: str, scene: Scene, h: float) -> Kernel:
     return Kernel(inside["march"], par, rule, state, h)
 
 
-# the loop of a family: its C file, and the macros for a rule
-FAMILIES: dict[Callable[..., Any], tuple[str, Callable[[Any], dict[str, int]]]] = {
-    discrete_lagrangian.march: ("discrete_lagrangian", lambda rule: {"NODES": len(rule.nodes)}),
-    unreduced.march: ("unreduced", lambda rule: {"NODES": len(rule.nodes)}),
-    galerkin.march: ("galerkin", lambda rule: {}),
-    splitting_angles.march: ("splitting_angles", lambda rule: {"DRIFTS": len(rule.drift)}),
-    splitting_space.march_axis: ("splitting_space", lambda rule: {"DRIFTS": len(rule.drift)}),
-    splitting_space.march_attitude: ("splitting_space", lambda rule: {"DRIFTS": len(rule.drift), "ATTITUDE": 1}),
-    runge_kutta.march_angles: ("runge_kutta", lambda rule: {"STAGES": len(rule.b), "ANGLES": 1}),
-    runge_kutta.march_axis: ("runge_kutta", lambda rule: {"STAGES": len(rule.b), "AXIS": 1}),
-    gauss.march_axis: ("gauss", lambda rule: {"AXIS": 1}),
-    gauss.march_frame: ("gauss", lambda rule: {"FRAME": 1}),
+def _macros(rule: Any, chart: str = "") -> dict[str, int]:
+    """What numba, too, knows when it compiles: the length of the table, and the chart."""
+    lengths = {"drift": "DRIFTS", "nodes": "NODES", "a": "STAGES"}
+    rows = {"a": "b"}  # a tableau is as long as its weights
+    found = {macro: len(getattr(rule, rows.get(row, row))) for row, macro in lengths.items() if hasattr(rule, row)}
+    return found | ({chart: 1} if chart else {})
+
+
+# the loop of a family: its C file, and the macro for its chart
+FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
+    discrete_lagrangian.march: ("discrete_lagrangian", ""),
+    unreduced.march: ("unreduced", ""),
+    galerkin.march: ("galerkin", ""),
+    splitting_angles.march: ("splitting_angles", ""),
+    splitting_space.march_axis: ("splitting_space", ""),
+    splitting_space.march_attitude: ("splitting_space", "ATTITUDE"),
+    runge_kutta.march_angles: ("runge_kutta", "ANGLES"),
+    runge_kutta.march_axis: ("runge_kutta", "AXIS"),
+    gauss.march_axis: ("gauss", "AXIS"),
+    gauss.march_frame: ("gauss", "FRAME"),
 }
 # maps between the variables that are stepped and those that are shown, once a run
 SHOWN: dict[Callable[..., Any], tuple[Callable[..., Any], Callable[..., Any]]] = {
@@ -122,10 +130,10 @@ class Twin:
     """The C twin of one kernel on one scene."""
 
     def __init__(self, kernel: Kernel, flags: Sequence[str] = FAST) -> None:
-        name, macros = FAMILIES[kernel.march]
+        name, chart = FAMILIES[kernel.march]
         self.kernel = kernel
         self._enter, self._present = SHOWN.get(kernel.march, (None, None))
-        self._march = library(name, tuple(macros(kernel.rule).items()), tuple(flags)).march
+        self._march = library(name, tuple(_macros(kernel.rule, chart).items()), tuple(flags)).march
         self._march.restype = ctypes.c_long
         pointer = ctypes.c_void_p
         self._march.argtypes = [pointer, pointer, pointer, ctypes.c_double, ctypes.c_long, pointer]
@@ -160,7 +168,10 @@ def ours(kernel: Kernel, steps: int) -> tuple[np.ndarray, int]:
 
 
 def difference(kernel: Kernel, steps: int, flags: Sequence[str] = EXACT) -> float:
-    """Largest difference of the two states after `steps` steps, relative to their largest number; inf if work differs."""
+    """Largest difference of the two states after `steps` steps, relative to their largest number.
+
+    Infinite if the twin is to have the same bits and took another number of iterations.
+    """
     mine, my_work = ours(kernel, steps)
     theirs, their_work = Twin(kernel, flags).shown(steps)
     if my_work != their_work and flags == EXACT:
