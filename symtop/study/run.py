@@ -176,23 +176,29 @@ def run(study: Study, results: Path, *, quick: bool = False, fresh: bool = False
     combined = datasets.describe(store.combine(found), study.title, question=study.question)
     datasets.write(combined, results / f"{study.name}.nc")
     _forget(results, study, paths)
-    pictures = [_save(results, study, picture) for picture in study.pictures(combined)]
-    findings = {
+    findings = findings_of(study, combined, results, failures=failures, cases=len(paths))
+    findings |= {"quick": quick, "stamp": stamp if not failures else ""}
+    store.write_json(findings_path, findings)
+    return {**findings, "computed": len(missing)}
+
+
+def findings_of(
+    study: Study, data: xr.Dataset, results: Path, *, failures: list[str], cases: int
+) -> dict[str, Any]:  # fmt: skip
+    """Draw a dataset and say what it shows, as the report wants it."""
+    return {
         "study": study.name,
         "title": study.title,
         "question": study.question,
         "how_to_read": study.how_to_read,
-        "verdict": study.verdict(combined),
-        "tables": [table._asdict() for table in study.tables(combined)],
-        "pictures": pictures,
+        "verdict": study.verdict(data),
+        "tables": [table._asdict() for table in study.tables(data)],
+        "pictures": [_save(results, study, picture) for picture in study.pictures(data)],
         "failures": failures,
-        "cases": len(paths),
-        "quick": quick,
-        "stamp": stamp if not failures else "",
+        "cases": cases,
+        "quick": False,
         "provenance": datasets.provenance(),
     }
-    store.write_json(findings_path, findings)
-    return {**findings, "computed": len(missing)}
 
 
 def _forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
