@@ -52,13 +52,10 @@ def packages(data: xr.Dataset) -> list[str]:
 
 
 def _times(seconds: float) -> str:
-    return (
-        f"{seconds * 1e6:.3g} us"
-        if seconds < 1e-3
-        else f"{seconds * 1e3:.3g} ms"
-        if seconds < 1.0
-        else f"{seconds:.3g} s"
-    )
+    for unit, size in (("s", 1.0), ("ms", 1e-3)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds * 1e6:.3g} us"
 
 
 def judgement(mine: Best, theirs: Best) -> str:
@@ -160,16 +157,15 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         axis.set(xscale="log", yscale="log", title=scene, xlabel="wall time of one run (s)", ylim=(3e-12, 3.0))
     axes[0][0].set_ylabel(f"largest axis error over {PERIODS:g} nutations (rad)")
     style.legend_below(figure, axes)
-    first = [best_of(data, scenes[0], package, JUDGED[-1]) for package in (OURS, "scipy")]
-    gain = (
-        f" On {scenes[0]} at {JUDGED[-1]:.0e} it is {first[1].timing.best / first[0].timing.best:.3g} times left of SciPy's."
-        if all(first)
-        else ""
-    )
+    mine, scipys = (best_of(data, scenes[0], package, JUDGED[-1]) for package in (OURS, "scipy"))
+    gain = ""
+    if mine is not None and scipys is not None:
+        times = scipys.timing.best / mine.timing.best
+        gain = f" On {scenes[0]} at {JUDGED[-1]:.0e} SciPy needs {times:.3g} times as long."
     caption = (
-        "The best that each package offers: for every accuracy its fastest solver and setting. Best is towards the lower "
-        f"left; the thick line is symtop.{gain} Dashed curve: the loop around every step is Python. Dashed grey: the "
-        "accuracies at which the verdict is given."
+        "The best that each package offers: for every accuracy its fastest solver and setting. Best is towards the "
+        f"lower left; the thick line is symtop.{gain} Dashed curve: the loop around every step is Python. Dashed "
+        "grey: the accuracies at which the verdict is given."
     )
     alt = "Log-log plots of axis error against wall time, one panel a scene, one curve a package."
     return [Picture("fronts", figure, caption, alt)]
@@ -193,9 +189,9 @@ STUDY = Study(
     title="Beside other libraries",
     question="What would I gain or lose by using another library for this?",
     how_to_read=(
-        "The same tops, the same error, the same timing for all, in one run. A library that is handed equations gets the "
-        "six quadratic ones on (e, L), without sines and poles; one that models bodies gets the body. heyoka is what "
-        "symtop offers as `taylor`, so it stands by itself; the closed form does not take part. A package says nothing "
+        "The same tops, the same error, the same timing for all, in one run. A library that is handed equations gets "
+        "the six quadratic ones on (e, L), without sines and poles; one that models bodies gets the body. heyoka is "
+        "what symtop offers as `taylor`, so it stands by itself; the closed form does not take part. A package says nothing "
         "about its other uses here: MuJoCo and Drake simulate whole robots, and rebound is made for planets."
     ),
     cases=lambda _: [],
@@ -210,9 +206,7 @@ STUDY = Study(
 def lines(data: xr.Dataset) -> list[str]:
     """The verdict and the first table, for a terminal."""
     table = tables(data)[0]
-    widths = [max(len(row[i]) for row in [table.header, *table.rows]) + 2 for i in range(len(table.header))]
-    shown = [
-        "".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        for row in [table.header, *table.rows]
-    ]
+    rows = [table.header, *table.rows]
+    widths = [max(len(row[i]) for row in rows) + 2 for i in range(len(table.header))]
+    shown = ["".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     return [*shown, "", *verdict(data)]

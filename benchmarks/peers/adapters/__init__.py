@@ -1,1 +1,1 @@
-"""One file a peer: ``PACKAGE``, what it is called where it is installed, and ``peers()``, its solvers as Integrators."""
+"""One file a peer: ``PACKAGE``, the name to install, and ``peers()``, its solvers as Integrator records."""

@@ -1,4 +1,4 @@
-"""rebound: Gragg, Bulirsch and Stoer's extrapolation on a user-defined ODE, with a right-hand side compiled to C by numba.
+"""rebound: the extrapolation of Gragg, Bulirsch and Stoer on a user-defined ODE, its right-hand side in C by numba.
 
 Six equations on (e, L); eps_rel = eps_abs = the tolerance. rebound bends its step to stop at a time and does not
 interpolate, so that sampling it at given times would change what is measured: its accuracy is judged at the ends of its
