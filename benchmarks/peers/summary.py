@@ -191,8 +191,8 @@ STUDY = Study(
     how_to_read=(
         "The same tops, the same error, the same timing for all, in one run. A library that is handed equations gets "
         "the six quadratic ones on (e, L), without sines and poles; one that models bodies gets the body. heyoka is "
-        "what symtop offers as `taylor`, so it stands by itself; the closed form does not take part. A package says nothing "
-        "about its other uses here: MuJoCo and Drake simulate whole robots, and rebound is made for planets."
+        "what symtop offers as `taylor`, so it stands by itself; the closed form does not take part. None of this says "
+        "anything about a package's other uses: MuJoCo and Drake are for whole robots, and rebound is for planets."
     ),
     cases=lambda _: [],
     measure=lambda _: xr.Dataset(),
