@@ -61,7 +61,7 @@ def measure(accuracy: float = ACCURACY) -> list[Reached]:
     base = 20_000
     calls = [lambda: verlet(scene.top, scene.start, plan_of(base))]
     calls += [lambda s=solve, n=steps: s(scene.top, scene.start, plan_of(n)) for solve, steps in found.values()]
-    step, *times = (timing.best for timing in timings(calls, batches=15, batch=0.005))
+    step, *times = (timing.best for timing in timings(calls, batches=40, batch=1e-3))
     step /= base
     rows = [
         Reached(name, steps, seconds, seconds / step)

@@ -11,7 +11,7 @@ import symtop
 from benchmarks import kernels, peers, twin
 from benchmarks.peers import common, measure, summary
 from symtop.integrators.space import field_axis
-from symtop.measure.timing import Timing
+from symtop.measure.timing import Timing, timings
 from symtop.study import run, store
 
 KERNELS = kernels.kernels()
@@ -53,6 +53,20 @@ def test_a_twin_that_leaves_the_chart_says_so():
     kernel = KERNELS["stormer-verlet", "angles"]
     with pytest.raises(RuntimeError, match="stopped after"):
         twin.Twin(kernel._replace(state=(0.01, -9.0, 0.0, 0.0)), twin.EXACT)(STEPS)
+
+
+@needs_gcc
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "key",
+    [("stormer-verlet", "angles"), ("strang", "axis"), ("midpoint", "angles"), ("rk4", "axis"), ("gauss-6", "axis")],
+    ids="-".join,
+)
+def test_a_kernel_takes_at_most_a_quarter_more_than_its_twin(key):
+    kernel, steps = KERNELS[key], 8000
+    other = twin.Twin(kernel)
+    ours, theirs = timings([lambda: twin.ours(kernel, steps), lambda: other(steps)], batches=60, batch=1e-3)
+    assert ours.best / theirs.best < kernels.LIMIT
 
 
 def test_a_ratio_carries_the_spread_of_its_fifths():
