@@ -2,18 +2,20 @@
 # make quick     the same on coarse grids, into results/quick               make test-all  all tests
 # make bench     kernels against C                                          make lint      ruff and mypy
 # make check-results   compute some stored cases again and compare, to the last bit (FRESH=1: every one)
+# make peers     the same tops in other libraries
 # Each target sets up .venv first; the second time that takes no time.
 
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
+PEERS := benchmarks/peers/.venv
 STUDIES := $(patsubst studies/%.py,%,$(wildcard studies/[!_]*.py))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup studies quick report check-results test test-all lint bench clean
+.PHONY: help setup studies quick report check-results test test-all lint bench peers clean
 
 help:
-	@sed -n '1,5s/^# //p' Makefile
+	@sed -n '1,6s/^# //p' Makefile
 
 setup: $(READY)
 
@@ -56,8 +58,17 @@ lint: $(READY)
 
 bench: $(READY)
 	@echo "symtop: timing the kernels against C (needs gcc)"
-	@$(BIN)/python benchmarks/kernels.py
-	@$(BIN)/python benchmarks/targets.py
+	@$(BIN)/python -m benchmarks.bench
+
+peers: $(PEERS)/.ready
+	@echo "symtop: the same tops in other libraries (about four minutes; leave the machine alone meanwhile)"
+	@$(PEERS)/bin/python -m benchmarks.peers
+
+$(PEERS)/.ready: pyproject.toml constraints.txt benchmarks/peers/constraints.txt
+	@echo "symtop: making $(PEERS) and installing other libraries (a gigabyte, some minutes, once)"
+	@$(PYTHON) -m venv $(PEERS)
+	@$(PEERS)/bin/python benchmarks/peers/install.py
+	@touch $(PEERS)/.ready
 
 clean:
-	rm -rf .venv .pytest_cache .ruff_cache .mypy_cache benchmarks/build results/cases results/quick results/*.nc results/*.json
+	rm -rf .venv $(PEERS) .pytest_cache .ruff_cache .mypy_cache benchmarks/build results/cases results/quick results/*.nc results/*.json

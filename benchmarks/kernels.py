@@ -1,88 +1,123 @@
-"""Nanoseconds a step of every fixed-step kernel, against C twins and against Stormer-Verlet, in one run.
+"""Nanoseconds a step of every compiled fixed-step kernel, against its C twin and against Stormer-Verlet, in one run.
 
-    make bench        (needs gcc; the twins are built into benchmarks/build)
-
-All kernels are interleaved in random order, so that ratios hold although the machine drifts. The scene is spheroid,
-the step 1/400 of a nutation; `--json FILE` keeps the samples.
+The scene is spheroid, the step 1/400 of a nutation, a call about a millisecond. All kernels and all twins are
+interleaved in random order, so that ratios hold although the machine drifts. A ratio is that of the fastest batches;
+its spread is what the five fifths of the batches would have said, each by itself.
 """
 
-import argparse
-import ctypes
-import json
-import subprocess
-from pathlib import Path
-
-import numpy as np
+from typing import NamedTuple
 
 import symtop
-from symtop.integrators.angles import reduced
-from symtop.integrators.registry import Plan
-from symtop.measure.timing import timings
+from benchmarks import twin
+from symtop.measure.timing import Timing, timings
 
-HERE = Path(__file__).resolve().parent
-
-
-def build() -> ctypes.CDLL:
-    """Compile the C twins for this processor."""
-    library = HERE / "build" / "twins.so"
-    library.parent.mkdir(exist_ok=True)
-    flags = ["-O3", "-march=native", "-shared", "-fPIC"]
-    subprocess.run(["gcc", *flags, "-o", str(library), str(HERE / "twins.c"), "-lm"], check=True)
-    return ctypes.CDLL(str(library))
+SCENE = "spheroid"
+PER_NUTATION = 400.37
+CALL = 1e-3  # seconds: long against the 10 us of a call from Python, short against a time slice of a busy machine
+BATCHES, BATCH = 25, 0.002
+LIMIT = 1.25  # of the C twin's time
+CHECKED = 2000  # steps over which both must agree
+FIFTHS = 5
 
 
-def twin(library: ctypes.CDLL, name: str, scene: symtop.Scene, h: float, steps: int):
-    """A call of a C twin that does `steps` steps, and the state it ends in."""
-    par, state = reduced(scene.top, scene.start)
-    numbers = (ctypes.c_double * len(par))(*par)
-    function = library[name.replace("-", "_")]
-    function.restype = ctypes.c_long
-    function.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, ctypes.c_long]
+class Row(NamedTuple):
+    """One kernel: nanoseconds a step, and how it stands."""
 
-    def call() -> np.ndarray:
-        box = (ctypes.c_double * len(state))(*state)
-        done = function(numbers, box, h, steps)
-        assert done == steps
-        return np.array(box)
-
-    return call
+    name: str
+    chart: str
+    nanoseconds: float
+    spread: float
+    in_c: float
+    ratio: float
+    ratio_low: float
+    ratio_high: float
+    difference: float  # of the two final states without fused multiply-add, relative
+    verlet_steps: float
 
 
-def main() -> None:
-    """Time everything and print the table."""
-    parser = argparse.ArgumentParser(description="Nanoseconds a step of every fixed-step kernel")
-    parser.add_argument("--steps", type=int, default=200_000)
-    parser.add_argument("--per-nutation", type=float, default=400.37)
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args()
-    scene = symtop.scene("spheroid")
-    steps, h = options.steps, scene.nutation_period / options.per_nutation
-    plan = Plan(np.array([steps * h]), steps * h, h, np.array([steps]), np.nan)
-    library = build()
-    twins = ["stormer-verlet"]
-    names, calls = [], []
-    for method in symtop.integrators().values():
-        if method.knob == "step_size" and method.tier == "compiled":
-            for chart, solve in method.solvers.items():
-                names.append(f"{method.name} [{chart}]")
-                calls.append(lambda solve=solve: solve(scene.top, scene.start, plan))
-    for name in twins:
-        call = twin(library, name, scene, h, steps)
-        ours = symtop.integrator(name).solvers["angles"](scene.top, scene.start, plan).states[-1]
-        gap = float(np.max(np.abs(call() - ours)))
-        assert gap < 1e-8, f"the C twin of {name} computes something else: {gap}"
-        names.append(f"{name} [C]")
-        calls.append(call)
-    found = dict(zip(names, timings(calls, batches=7), strict=True))
-    base = found["stormer-verlet [angles]"].best
-    print(f"{'kernel':<42}{'ns/step':>9}{'spread':>8}{'/ Verlet':>10}{'/ C':>7}")
-    for name, timing in found.items():
-        other = found.get(name.replace(" [angles]", " [C]")) if "[angles]" in name else None
-        ratio = f"{timing.best / other.best:7.2f}" if other else ""
-        print(f"{name:<42}{timing.best / steps * 1e9:9.1f}{timing.spread:8.0%}{timing.best / base:10.2f}{ratio}")
-    if options.json:
-        options.json.write_text(json.dumps({name: timing._asdict() for name, timing in found.items()}, indent=1))
+def ratio(ours: Timing, theirs: Timing) -> tuple[float, float, float]:
+    """The ratio of two timings, and the smallest and largest that a fifth of the batches gives."""
+    parts = [
+        min(ours.samples[k::FIFTHS]) / min(theirs.samples[k::FIFTHS])
+        for k in range(min(FIFTHS, len(ours.samples), len(theirs.samples)))
+    ]
+    whole = ours.best / theirs.best
+    return whole, min(whole, *parts), max(whole, *parts)
 
 
-if __name__ == "__main__":
-    main()
+def kernels() -> dict[tuple[str, str], twin.Kernel]:
+    """Every compiled fixed-step kernel that has a twin, by integrator and chart."""
+    scene = symtop.scene(SCENE)
+    h = scene.nutation_period / PER_NUTATION
+    return {
+        (method.name, chart): twin.kernel_of(method, chart, scene, h)
+        for method in symtop.integrators().values()
+        if method.knob == "step_size" and method.tier == "compiled"
+        for chart in method.solvers
+    }
+
+
+def measure() -> list[Row]:
+    """Check that every twin is a twin, then time all of them."""
+    found = {key: kernel for key, kernel in kernels().items() if kernel.march in twin.FAMILIES}
+    gaps = {key: twin.difference(kernel, CHECKED) for key, kernel in found.items()}
+    calls, counts = [], []
+    for kernel in found.values():
+        other = twin.Twin(kernel)
+        probe = timings([lambda other=other: other(CHECKED)], batches=3, batch=BATCH)[0]
+        steps = max(CHECKED, int(CALL / probe.best * CHECKED))
+        counts.append(steps)
+        calls += [lambda kernel=kernel, steps=steps: twin.ours(kernel, steps), lambda o=other, n=steps: o(n)]
+    timed = timings(calls, batches=BATCHES, batch=BATCH)
+    pairs = list(zip(found, counts, timed[::2], timed[1::2], strict=True))
+    verlet = next(ours.best / steps for key, steps, ours, _ in pairs if key == ("stormer-verlet", "angles"))
+    return [
+        Row(
+            *key,
+            ours.best / steps * 1e9,
+            ours.spread,
+            theirs.best / steps * 1e9,
+            *ratio(ours, theirs),
+            gaps[key],
+            ours.best / steps / verlet,
+        )
+        for key, steps, ours, theirs in pairs
+    ]
+
+
+def lines(rows: list[Row]) -> list[str]:
+    """The table, and what it says."""
+    columns = (
+        ("ns/step", 9),
+        ("spread", 8),
+        ("C", 8),
+        ("/ C", 7),
+        ("of fifths", 11),
+        ("same bits", 14),
+        ("/ Verlet", 10),
+    )
+    table = [f"{'kernel':<42}" + "".join(f"{title:>{width}}" for title, width in columns)]
+    for row in rows:
+        name, fifths = f"{row.name} [{row.chart}]", f"{row.ratio_low:.2f} .. {row.ratio_high:.2f}"
+        same = "yes" if row.difference == 0.0 else f"{row.difference:.0e}"
+        table.append(
+            f"{name:<42}{row.nanoseconds:9.1f}{row.spread:8.0%}{row.in_c:8.1f}{row.ratio:7.2f}  {fifths:<13}{same:>10}"
+            f"{row.verlet_steps:10.2f}"
+        )
+    slow = [row for row in rows if row.ratio > LIMIT]
+    worst = max(rows, key=lambda row: row.ratio)
+    table.append("")
+    table.append(
+        f"{len(rows) - len(slow)} of {len(rows)} kernels are within {LIMIT:g} times their C twin; the slowest is "
+        f"{worst.name} [{worst.chart}] at {worst.ratio:.2f}."
+    )
+    table.append(
+        f"{sum(row.difference == 0.0 for row in rows)} of {len(rows)} twins return the same bits after {CHECKED} steps "
+        "when neither uses a fused multiply-add."
+    )
+    if slow:
+        table.append(f"Slower than that: {', '.join(f'{row.name} [{row.chart}] {row.ratio:.2f}' for row in slow)}.")
+    for name in ("midpoint", "trapezoidal"):
+        row = next(row for row in rows if row.name == name)
+        table.append(f"{name}, solved to rounding, takes {row.verlet_steps:.2f} steps of stormer-verlet.")
+    return table

@@ -7,20 +7,21 @@ import symtop
 from symtop.integrators.registry import Plan
 from symtop.measure.timing import timings
 
-STEPS = 100_000
+STEPS = 20_000
 
 
 @pytest.mark.slow
-def test_implicit_kernels_cost_at_most_three_and_a_half_verlet_steps():
+def test_implicit_kernels_cost_at_most_three_verlet_steps():
     where = symtop.scene("spheroid")
     h = where.nutation_period / 400.37
     plan = Plan(np.array([STEPS * h]), STEPS * h, h, np.array([STEPS]), np.nan)
     names = ("stormer-verlet", "midpoint", "trapezoidal")
     solvers = [symtop.integrator(name).solvers["angles"] for name in names]
-    found = timings([lambda solve=solve: solve(where.top, where.start, plan) for solve in solvers])
+    calls = [lambda solve=solve: solve(where.top, where.start, plan) for solve in solvers]
+    found = timings(calls, batches=60, batch=1e-3)
     verlet, *others = (timing.best for timing in found)
     for other in others:
-        assert other / verlet < 3.5
+        assert other / verlet < 3.0
 
 
 @pytest.mark.slow

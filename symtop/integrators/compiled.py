@@ -17,7 +17,7 @@ from typing import Any
 
 from numba import config, njit
 from numba.cpython.unsafe.tuple import tuple_setitem
-from numba.extending import register_jitable
+from numba.extending import register_jitable as _register
 
 __all__ = ["cache_root", "compile_kernel", "register_jitable", "set_item", "source_digest"]
 
@@ -71,6 +71,15 @@ def _prune(keep: Path) -> None:
     for folder in folders[KEPT:]:
         if folder != keep:
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def register_jitable(function: Callable[..., Any]) -> Any:
+    """Let kernels call a plain function, inlined wherever they do.
+
+    Left to itself LLVM keeps the larger ones, such as the drift of a splitting, as calls that pass their results
+    through memory: 1.3 times the time of a step.
+    """
+    return _register(forceinline=True)(function)
 
 
 def compile_kernel(function: Callable[..., Any], *parts: Callable[..., Any]) -> Any:

@@ -26,9 +26,8 @@ import functools
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.cpython.unsafe.tuple import tuple_setitem
 
-from symtop.integrators.compiled import register_jitable
+from symtop.integrators.compiled import register_jitable, set_item
 from symtop.integrators.drive import Loop, driver
 from symtop.integrators.fixed_step import FixedStep, Prepare, Present, fixed_step
 from symtop.integrators.outcomes import NOT_CONVERGED, OK
@@ -95,72 +94,80 @@ def gauss_rule(stages: int) -> GaussRule:
 
 @register_jitable
 def working_space(field: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
-    """One array for all stages, shape (2s + 1, dimension + 1), because numba counts references to each.
+    """One array for all that a step reads and writes, because numba counts references to each: 10 ns an array.
 
-    Rows 0 .. s-1 hold L_i and, in the last column, h b_i; rows s .. 2s-1 are room for the prediction; the last row
-    scales corrections, by 1 for unit vectors and 1/|L| for L. L_i starts as h b_i f(y).
+    Of its rows, dimension + 1 wide, 0 .. s-1 hold L_i and, in the last column, h b_i; s .. 2s-1 are room for the
+    prediction; 2s .. 3s-1 hold mu and 3s .. 4s-1 the predictor; the last row scales corrections, by 1 for unit vectors
+    and 1/|L| for L. L_i starts as h b_i f(y).
     """
     stages, dimension = len(rule.b), len(state)
-    work = np.ones((2 * stages + 1, dimension + 1))
+    work = np.ones((4 * stages + 1, dimension + 1))
     weights = h * rule.b
     if stages > 2:  # the two ends take the rounding of the inner weights, so that the sum is h
         weights[0] = weights[-1] = 0.5 * (h - np.sum(weights[1:-1]))
     momentum = np.sqrt(state[3] ** 2 + state[4] ** 2 + state[5] ** 2) + np.sqrt(par.I1 * abs(par.mgl))
-    work[2 * stages, 3:6] = 1.0 / momentum if momentum > 0.0 else 1.0
+    work[4 * stages, 3:6] = 1.0 / momentum if momentum > 0.0 else 1.0
     slope = field(par, state)
     for i in range(stages):
         work[i, dimension] = weights[i]
         for m in range(dimension):
             work[i, m] = weights[i] * slope[m]
+        for j in range(stages):
+            work[2 * stages + i, j] = rule.mu[i, j]
+            work[3 * stages + i, j] = rule.predict[i, j]
     return work
 
 
 @register_jitable
-def predict_stages(predict: Any, work: Any, stages: int, dimension: int) -> None:
-    """The last step's polynomial, evaluated at this step's nodes."""
-    for i in range(stages):
+def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C901  (one loop, read in one piece)
+    """Increment of one step, sweeps that it took and the outcome.
+
+    Sums run over the stages outside and the components inside: 1.3 times faster than the other way round. All of it is
+    one function, for an array that is handed to another one is counted once more, 18 ns.
+    """
+    stages, dimension = len(work) // 4, len(state)
+    nothing = state
+    for m in range(dimension):
+        nothing = set_item(nothing, m, 0.0)
+    for i in range(stages):  # the last step's polynomial, evaluated at this step's nodes
+        ahead = nothing
+        for j in range(stages):
+            weight = work[3 * stages + i, j]
+            for m in range(dimension):
+                ahead = set_item(ahead, m, ahead[m] + weight * work[j, m])
         for m in range(dimension):
-            total = 0.0
-            for j in range(stages):
-                total += predict[i, j] * work[j, m]
-            work[stages + i, m] = total
+            work[stages + i, m] = ahead[m]
     for i in range(stages):
         for m in range(dimension):
             work[i, m] = work[stages + i, m]
-
-
-@register_jitable
-def gauss_step(field: Any, par: Any, rule: Any, state: Any, work: Any) -> Any:
-    """Increment of one step, sweeps that it took and the outcome."""
-    mu, stages, dimension = rule.mu, len(rule.b), len(state)
-    predict_stages(rule.predict, work, stages, dimension)
     last, effort, outcome = np.inf, 0, NOT_CONVERGED
     while effort < SWEEPS:
-        correction = 0.0
-        # a sweep stays in this loop: as a function of its own it costs 18 ns a call in reference counts
+        gap = nothing
         for i in range(stages):
-            place = state
+            place = nothing
+            for j in range(stages):
+                weight = work[2 * stages + i, j]
+                for m in range(dimension):
+                    place = set_item(place, m, place[m] + weight * work[j, m])
             for m in range(dimension):
-                total = 0.0
-                for j in range(stages):
-                    total += mu[i, j] * work[j, m]
-                place = tuple_setitem(place, m, state[m] + total)
+                place = set_item(place, m, state[m] + place[m])
             slope = field(par, place)
             for m in range(dimension):
                 value = work[i, dimension] * slope[m]
-                correction = max(correction, abs(value - work[i, m]) * work[2 * stages, m])
+                gap = set_item(gap, m, max(gap[m], abs(value - work[i, m])))
                 work[i, m] = value
         effort += 1
+        correction = 0.0
+        for m in range(dimension):
+            correction = max(correction, gap[m] * work[4 * stages, m])
         if correction == 0.0 or (correction >= last and correction < ROUND_OFF):
             outcome = OK
             break
         last = correction
-    step = state
-    for m in range(dimension):
-        total = 0.0
-        for i in range(stages):
-            total += work[i, m]
-        step = tuple_setitem(step, m, total)
+    step = nothing
+    for i in range(stages):
+        for m in range(dimension):
+            step = set_item(step, m, step[m] + work[i, m])
     return step, effort, outcome if np.isfinite(step[0]) else NOT_CONVERGED
 
 
@@ -176,13 +183,13 @@ def begin_frame(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 def increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (e, L); the work counted is the number of sweeps."""
-    step, effort, outcome = gauss_step(field_axis, par, rule, state, carry)
+    step, effort, outcome = gauss_step(field_axis, par, state, carry)
     return step, carry, effort, outcome
 
 
 def increment_frame(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (e, L, a); the work counted is the number of sweeps."""
-    step, effort, outcome = gauss_step(field_frame, par, rule, state, carry)
+    step, effort, outcome = gauss_step(field_frame, par, state, carry)
     return step, carry, effort, outcome
 
 

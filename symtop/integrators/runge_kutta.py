@@ -48,7 +48,7 @@ def store(slopes: Any, i: int, slope: Any) -> None:
 
 @register_jitable
 def _add(place: Any, slopes: Any, i: int, weight: float) -> Any:
-    """place + weight slopes_i. With the stages as the outer loop rk4 takes 33 ns a step; as the inner one, 52."""
+    """place + weight slopes_i. With the stages as the inner loop rk4 takes 1.6 times as long."""
     for m in range(len(place)):
         place = tuple_setitem(place, m, place[m] + weight * slopes[i, m])
     return place
@@ -86,7 +86,7 @@ def explicit_step(field: Any, par: Any, rule: Any, state: Any, slopes: Any, h: f
 
 
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """Working space for the slopes: 23 % slower than four stages written out by hand, and serves any tableau."""
+    """Working space for the slopes of any tableau; as fast as C that knows the number of stages (`make bench`)."""
     return np.empty((len(rule.b), len(state)))
 
 

@@ -75,10 +75,17 @@ def _embedded(path: Path) -> str:
     return f"data:image/{path.suffix[1:]};base64," + base64.b64encode(path.read_bytes()).decode()
 
 
+BENCHMARKS = ("peers",)  # findings in the form of a study's that another program leaves
+
+
+def _command(name: str) -> str:
+    return f"make {name}" if name in BENCHMARKS else f"symtop study {name}"
+
+
 def gather(results: Path) -> list[dict[str, Any]]:
     """The findings of all studies that were run, in the order of the report, with their pictures."""
     found = []
-    for name in runner.names():
+    for name in [*runner.names(), *BENCHMARKS]:
         findings = store.read_json(results / f"{name}.json")
         if findings is None:
             continue
@@ -86,7 +93,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
             for picture in findings["pictures"]:
                 picture["data"] = _embedded(results / "figures" / picture["file"])
         except (OSError, KeyError, TypeError) as error:
-            msg = f"the findings of {name} in {results} are incomplete ({error}); run it again: symtop study {name}"
+            msg = f"the findings of {name} in {results} are incomplete ({error}); run it again: {_command(name)}"
             raise SymtopError(msg) from error
         findings["charts"] = [{**chart, "prepared": charts.prepared(chart)} for chart in findings.get("charts", [])]
         findings["dataset"] = f"{name}.nc" if (results / f"{name}.nc").is_file() else ""

@@ -163,23 +163,28 @@ def _conclude(known: Round, stamp: str, *, quick: bool) -> dict[str, Any]:
     combined = datasets.describe(known.combined(), study.title, question=study.question)
     datasets.write(combined, results / f"{study.name}.nc")
     store.forget(results, study, known.paths)
-    findings = {
+    findings = findings_of(study, combined, results, failures=known.failures, cases=len(known.paths))
+    findings |= {"quick": quick, "stamp": stamp if not known.failures else ""}
+    store.write_json(results / f"{study.name}.json", findings)
+    return findings
+
+
+def findings_of(study: Study, data: xr.Dataset, results: Path, *, failures: list[str], cases: int) -> dict[str, Any]:
+    """Draw a dataset and say what it shows, as the report wants it."""
+    return {
         "study": study.name,
         "title": study.title,
         "question": study.question,
         "how_to_read": study.how_to_read,
-        "verdict": study.verdict(combined),
-        "tables": [table._asdict() for table in study.tables(combined)],
-        "charts": [chart._asdict() for chart in study.charts(combined)],
-        "pictures": [_save(results, study, picture) for picture in study.pictures(combined)],
-        "failures": known.failures,
-        "cases": len(known.paths),
-        "quick": quick,
-        "stamp": stamp if not known.failures else "",
+        "verdict": study.verdict(data),
+        "tables": [table._asdict() for table in study.tables(data)],
+        "charts": [chart._asdict() for chart in study.charts(data)],
+        "pictures": [_save(results, study, picture) for picture in study.pictures(data)],
+        "failures": failures,
+        "cases": cases,
+        "quick": False,
         "provenance": datasets.provenance(),
     }
-    store.write_json(results / f"{study.name}.json", findings)
-    return findings
 
 
 def status(study: Study, results: Path, *, quick: bool = False, full: bool = False) -> list[dict[str, str]]:

@@ -1,0 +1,1 @@
+"""One file a peer: ``PACKAGE``, the name to install, and ``peers()``, its solvers as Integrator records."""

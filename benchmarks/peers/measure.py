@@ -1,0 +1,203 @@
+"""Error and time of our methods and of the peers, on the same tops, by one code.
+
+Every solver comes as an Integrator record, ours from the registry and the peers' from their adapters. Accuracy: the
+largest angle between the axes over ten nutation periods, at 331 times that never beat with the nutation (for a library
+that would bend its steps to them, at the ends of its own steps), against the closed form with its bound. Time: runs of
+their own, start to horizon with nothing sampled between, all solvers of a scene interleaved in random order.
+
+The knob is searched, not only gridded: for each target the loosest setting of a ladder that meets it is refined by
+halving its last interval three times, for us as for them.
+"""
+
+import importlib.metadata
+import math
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+import symtop
+from benchmarks.peers import Peer
+from symtop import charts
+from symtop.integrators.registry import Integrator
+from symtop.measure.accuracy import SAMPLES, judge_limit, knobs, step_ladder
+from symtop.measure.timing import bare_run, timings
+from symtop.reference import reference
+from symtop.scenes import Scene
+from symtop.simulate import as_dataset, choose_chart, make_plan
+
+SCENES = ("spheroid", "goldstein", "fast")
+TARGETS = (1e-3, 1e-6, 1e-9)
+PERIODS = 10.0
+RUNGS, HALVINGS = 11, 3
+ENOUGH = 0.1 * TARGETS[-1]  # no finer setting is tried below this error
+PATIENCE = 1.5  # seconds of one run after which no finer setting is tried
+BATCHES, BATCH = 10, 0.008
+CONTENDERS = 3  # of our methods for each target, by a rough timing
+OURS, HEYOKA = "symtop", "heyoka"
+
+
+class Point(NamedTuple):
+    """One setting of one solver on one scene."""
+
+    setting: float
+    error: float
+    bound: float
+    steps: int
+    evaluations: int
+    seconds: float  # of the accuracy run, rough
+
+
+def accuracy(scene: Scene, method: Integrator, setting: float) -> Point:
+    """One run with samples, judged."""
+    chart, horizon = choose_chart(method, "axis"), PERIODS * scene.nutation_period
+    plan, _ = make_plan(scene, method, horizon=horizon, samples=SAMPLES, **knobs(method, setting))
+    solve: Any = method.solvers[chart]
+    run = None
+    begun = time.perf_counter()
+    if hasattr(solve, "own_steps"):
+        times, states = solve.own_steps(scene.top, scene.start, plan)
+        elapsed, axis = time.perf_counter() - begun, states[:, :3]
+    else:
+        times, run = plan.times, solve(scene.top, scene.start, plan)
+        elapsed, axis = time.perf_counter() - begun, as_dataset(scene, chart, plan, run)["axis"].values
+    truth = reference(scene, times, precision="closed-form")
+    error = float(np.max(charts.axis_distance(axis, truth["axis"].values)))
+    failed = not math.isfinite(error) or (run is not None and run.outcome != "ok")
+    steps, work = (run.steps, run.force_evaluations) if run is not None else (len(times) - 1, 0)
+    return Point(setting, math.nan if failed else error, judge_limit(scene, truth, "axis"), steps, work, elapsed)
+
+
+def ladder(scene: Scene, method: Integrator) -> list[float]:
+    """Settings from coarse to fine."""
+    if method.knob == "step_size":
+        return step_ladder(method, scene, PERIODS * scene.nutation_period, RUNGS, most=4e5)
+    return [float(value) for value in np.geomspace(1e-3, 1.0001 * max(method.least_tolerance, 1e-15), RUNGS)]
+
+
+def search(scene: Scene, method: Integrator, targets: Sequence[float] = TARGETS) -> list[Point]:
+    """The ladder, as far as it is needed, and for each target the loosest setting that meets it."""
+    rungs: list[Point] = []
+    for setting in ladder(scene, method):
+        rungs.append(accuracy(scene, method, setting))
+        if rungs[-1].error < ENOUGH or rungs[-1].seconds > PATIENCE:
+            break
+    found = list(rungs)
+    for target in targets:
+        good = next((i for i, point in enumerate(rungs) if point.error <= target), 0)
+        if not good:  # nobody, or the coarsest already
+            continue
+        loose, tight = rungs[good - 1].setting, rungs[good].setting
+        for _ in range(HALVINGS):
+            middle = accuracy(scene, method, math.sqrt(loose * tight))
+            found.append(middle)
+            loose, tight = (loose, middle.setting) if middle.error <= target else (middle.setting, tight)
+    return sorted(found, key=lambda point: -point.setting)
+
+
+def worth_timing(points: Sequence[Point], targets: Sequence[float] = TARGETS) -> list[Point]:
+    """Points that no looser setting beats, and the loosest ones that meet a target."""
+    best, kept = math.inf, []
+    for point in points:
+        meets = any(point.error <= target < best for target in targets)
+        if math.isfinite(point.error) and (meets or point.error < 0.3 * best):
+            kept.append(point)
+            best = min(best, point.error)
+    return kept
+
+
+def ours(scene: Scene, tell: Callable[[str], None]) -> list[tuple[Peer, list[Point]]]:
+    """Our compiled integrators that are among the fastest at some target, by a rough timing; and heyoka's."""
+    chosen: dict[str, tuple[Peer, list[Point]]] = {}
+    rough: dict[float, list[tuple[float, str]]] = {target: [] for target in TARGETS}
+    searched = {}
+    for method in symtop.integrators().values():
+        if method.tier != "compiled" or method.knob is None or method.name.startswith("taylor-"):
+            continue  # no knob: the closed form, which is the truth here
+        points = worth_timing(search(scene, method))
+        searched[method.name] = points
+        if method.family == "taylor":
+            chosen[method.name] = (Peer(HEYOKA, method), points)
+            continue
+        for target in TARGETS:
+            best = next((point for point in points if point.error <= target), None)
+            if best is not None:
+                call = bare_run(scene, method, choose_chart(method, "axis"), best.setting, _horizon(scene))
+                rough[target].append((timings([call], batches=5, batch=1e-3)[0].best, method.name))
+    for target, row in rough.items():
+        for _, name in sorted(row)[:CONTENDERS]:
+            chosen[name] = (Peer(OURS, symtop.integrator(name)), searched[name])
+        tell(f"{scene.name}, {target:.0e}: {', '.join(name for _, name in sorted(row)[:CONTENDERS])}")
+    return list(chosen.values())
+
+
+def _horizon(scene: Scene) -> float:
+    return PERIODS * scene.nutation_period
+
+
+def measure(peers: Sequence[Peer], scenes: Sequence[str] = SCENES) -> xr.Dataset:
+    """Everything: dimensions scene, integrator, setting and batch."""
+    cells: dict[tuple[str, str], dict[str, Any]] = {}
+    about: dict[str, Peer] = {}
+    for name in scenes:
+        scene = symtop.scene(name)
+        entries = ours(scene, _tell)
+        for peer in peers:
+            try:
+                entries.append((peer, worth_timing(search(scene, peer.method))))
+            except Exception as error:  # noqa: BLE001  (somebody else's solver must not take the others down)
+                _tell(f"{name}: {peer.method.name} failed, {type(error).__name__}: {error}")
+        calls = [
+            bare_run(scene, peer.method, choose_chart(peer.method, "axis"), point.setting, _horizon(scene))
+            for peer, points in entries
+            for point in points
+        ]
+        _tell(f"{name}: timing {len(calls)} runs of {len(entries)} solvers")
+        timed = iter(timings(calls, batches=BATCHES, batch=BATCH))
+        for peer, points in entries:
+            about[peer.method.name] = peer
+            samples = [next(timed) for _ in points]
+            cells[name, peer.method.name] = {
+                "axis": [point.error for point in points],
+                "axis_bound": [point.bound for point in points],
+                "knob_setting": [point.setting for point in points],
+                "steps": [point.steps for point in points],
+                "force_evaluations": [point.evaluations for point in points],
+                "seconds": [timing.best for timing in samples],
+                "first_call": [timing.first_call for timing in samples],
+                "reliable": [float(timing.reliable) for timing in samples],
+                "seconds_samples": [timing.samples for timing in samples],
+            }
+    return _combined(list(scenes), about, cells)
+
+
+def _combined(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, str], dict[str, Any]]) -> xr.Dataset:
+    names = list(about)
+    most = max((len(cell["axis"]) for cell in cells.values()), default=0)
+    variables = {}
+    for key in next(iter(cells.values())):
+        deep = key == "seconds_samples"
+        values = np.full((len(scenes), len(names), most, *([BATCHES] if deep else [])), np.nan)
+        for (scene, name), cell in cells.items():
+            row = np.array(cell[key], dtype=float)
+            values[scenes.index(scene), names.index(name), : len(row)] = row.reshape(len(row), *values.shape[3:])
+        variables[key] = (("scene", "integrator", "setting", *(["batch"] if deep else [])), values)
+    variables["package"] = ("integrator", [about[name].package for name in names])
+    variables["version"] = ("integrator", [_version(about[name].package) for name in names])
+    variables["formulation"] = ("integrator", [about[name].method.summary for name in names])
+    variables["tier"] = ("integrator", [about[name].method.tier for name in names])
+    return xr.Dataset(variables, coords={"scene": scenes, "integrator": names})
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def _tell(line: str) -> None:
+    print(f"  {line}", file=sys.stderr, flush=True)

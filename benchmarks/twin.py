@@ -1,0 +1,179 @@
+"""The C twin of every compiled fixed-step kernel: built with gcc, fed the same numbers, run the same number of steps.
+
+A twin is one C file for each kernel family (`twins/*.c`), compiled for each length of a table, because numba compiles
+for that length too. It gets what the Python kernel gets: the numbers of the top, the table, the start and the step.
+Built without fused multiply-add it returns the same bits, which is how we know that it is a twin; timed it has all
+that gcc can do with ``-O3 -march=native``.
+"""
+
+import ctypes
+import functools
+import hashlib
+import inspect
+import math
+import shutil
+import subprocess
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.integrators import (
+    discrete_lagrangian,
+    galerkin,
+    gauss,
+    runge_kutta,
+    splitting_angles,
+    splitting_space,
+    unreduced,
+)
+from symtop.integrators.registry import Integrator
+from symtop.scenes import Scene
+
+SOURCES = Path(__file__).resolve().parent / "twins"
+BUILD = Path(__file__).resolve().parent / "build"
+FAST = ("-O3", "-march=native")
+EXACT = (*FAST, "-ffp-contract=off")  # no fused multiply-add: rounds like the Python kernel
+
+
+class Kernel(NamedTuple):
+    """What one solver gives its compiled loop for one run."""
+
+    march: Callable[..., Any]
+    par: Any
+    rule: Any
+    state: tuple[float, ...]
+    h: float
+
+
+def kernel_of(method: Integrator, chart: str, scene: Scene, h: float) -> Kernel:
+    """The loop behind a solver and the numbers it would run on, read from what the solver closes over."""
+    solve: Any = method.solvers[chart]
+    while True:
+        solve = getattr(solve, "solve", solve)
+        inside = inspect.getclosurevars(solve).nonlocals
+        if "march" in inside:
+            break
+        solve = inside["solve"]
+    par, state = inside["prepare"](scene.top, scene.start)
+    if "rule" in inside:
+        rule = inside["rule"]
+    elif callable(inside["stages"]):
+        rule = inside["stages"](scene.top, scene.start, h)
+    else:
+        rule = gauss.gauss_rule(inside["stages"])
+    return Kernel(inside["march"], par, rule, state, h)
+
+
+def _macros(rule: Any, chart: str = "") -> dict[str, int]:
+    """What numba, too, knows when it compiles: the length of the table, and the chart."""
+    lengths = {"drift": "DRIFTS", "nodes": "NODES", "a": "STAGES"}
+    rows = {"a": "b"}  # a tableau is as long as its weights
+    found = {macro: len(getattr(rule, rows.get(row, row))) for row, macro in lengths.items() if hasattr(rule, row)}
+    return found | ({chart: 1} if chart else {})
+
+
+# the loop of a family: its C file, and the macro for its chart
+FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
+    discrete_lagrangian.march: ("discrete_lagrangian", ""),
+    unreduced.march: ("unreduced", ""),
+    galerkin.march: ("galerkin", ""),
+    splitting_angles.march: ("splitting_angles", ""),
+    splitting_space.march_axis: ("splitting_space", ""),
+    splitting_space.march_attitude: ("splitting_space", "ATTITUDE"),
+    runge_kutta.march_angles: ("runge_kutta", "ANGLES"),
+    runge_kutta.march_axis: ("runge_kutta", "AXIS"),
+    gauss.march_axis: ("gauss", "AXIS"),
+    gauss.march_frame: ("gauss", "FRAME"),
+}
+# maps between the variables that are stepped and those that are shown, once a run
+SHOWN: dict[Callable[..., Any], tuple[Callable[..., Any], Callable[..., Any]]] = {
+    splitting_space.march_axis: (splitting_space.enter_axis, splitting_space.present_axis),
+    splitting_space.march_attitude: (splitting_space.enter_attitude, splitting_space.present_attitude),
+}
+
+
+def compiler() -> str | None:
+    """The path of gcc, if there is one."""
+    return shutil.which("gcc")
+
+
+@functools.lru_cache(maxsize=256)
+def library(name: str, macros: tuple[tuple[str, int], ...], flags: Sequence[str]) -> ctypes.CDLL:
+    """A compiled twin, from `benchmarks/build` if its sources have not changed."""
+    options = [*flags, *(f"-D{macro}={value}" for macro, value in macros)]
+    digest = hashlib.sha256(" ".join(options).encode())
+    for path in sorted(SOURCES.iterdir()):
+        digest.update(path.read_bytes())
+    target = BUILD / f"{name}-{digest.hexdigest()[:16]}.so"
+    if not target.is_file():
+        BUILD.mkdir(exist_ok=True)
+        partial = target.with_suffix(".part")
+        command = ["gcc", "-std=gnu11", "-Wall", "-Wextra", "-Werror", *options, "-shared", "-fPIC"]
+        subprocess.run([*command, "-o", str(partial), str(SOURCES / f"{name}.c"), "-lm"], check=True)
+        partial.replace(target)
+    return ctypes.CDLL(str(target))
+
+
+def numbers(record: Any) -> list[float]:
+    """A record of numbers and tuples as the flat row of doubles that the C structs are."""
+    if isinstance(record, gauss.GaussRule):
+        stages, most = len(record.b), max(gauss.STAGES)
+        square = [(0, most - stages), (0, most - stages)]
+        padded = (np.pad(record.mu, square), np.pad(record.b, square[:1]), np.pad(record.predict, square))
+        return [float(stages), *(float(value) for part in padded for value in part.ravel())]
+    return [value for part in record for value in (numbers(part) if isinstance(part, tuple) else [float(part)])]
+
+
+class Twin:
+    """The C twin of one kernel on one scene."""
+
+    def __init__(self, kernel: Kernel, flags: Sequence[str] = FAST) -> None:
+        name, chart = FAMILIES[kernel.march]
+        self.kernel = kernel
+        self._enter, self._present = SHOWN.get(kernel.march, (None, None))
+        self._march = library(name, tuple(_macros(kernel.rule, chart).items()), tuple(flags)).march
+        self._march.restype = ctypes.c_long
+        pointer = ctypes.c_void_p
+        self._march.argtypes = [pointer, pointer, pointer, ctypes.c_double, ctypes.c_long, pointer]
+        self._par, self._rule = np.array(numbers(kernel.par)), np.array(numbers(kernel.rule))
+        start = kernel.state if self._enter is None else self._enter(kernel.par, kernel.rule, kernel.state, kernel.h)
+        self._start = np.array(start)
+
+    def __call__(self, steps: int) -> tuple[np.ndarray, int]:
+        """The state after so many steps, as the kernel steps it, and the work it took."""
+        state, work = self._start.copy(), ctypes.c_long()
+        done = self._march(
+            self._par.ctypes.data, self._rule.ctypes.data, state.ctypes.data, self.kernel.h, steps, ctypes.byref(work)
+        )
+        if done != steps:
+            msg = f"the C twin stopped after {done} of {steps} steps"
+            raise RuntimeError(msg)
+        return state, work.value
+
+    def shown(self, steps: int) -> tuple[np.ndarray, int]:
+        """The state after so many steps, as the Python kernel shows it, and the work it took."""
+        state, work = self(steps)
+        if self._present is None:
+            return state, work
+        kernel = self.kernel
+        return np.array(self._present(kernel.par, kernel.rule, tuple(state.tolist()), steps, kernel.h)), work
+
+
+def ours(kernel: Kernel, steps: int) -> tuple[np.ndarray, int]:
+    """The same from the Python kernel."""
+    done = kernel.march(kernel.par, kernel.rule, kernel.state, kernel.h, np.array([steps]))
+    return done.states[-1], done.work
+
+
+def difference(kernel: Kernel, steps: int, flags: Sequence[str] = EXACT) -> float:
+    """Largest difference of the two states after `steps` steps, relative to their largest number.
+
+    Infinite if the twin is to have the same bits and took another number of iterations.
+    """
+    mine, my_work = ours(kernel, steps)
+    theirs, their_work = Twin(kernel, flags).shown(steps)
+    if my_work != their_work and flags == EXACT:
+        return math.inf
+    return float(np.max(np.abs(mine - theirs)) / np.max(np.abs(mine)))

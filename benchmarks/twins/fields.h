@@ -1,0 +1,55 @@
+/* Right-hand sides: twins of field_axis and field_frame (symtop/integrators/space.py) and of field_angles
+   (symtop/integrators/euler_lagrange.py). -DAXIS, -DFRAME or -DANGLES chooses one, and with it Par and DIM. */
+
+#ifdef ANGLES
+#define DIM 6
+typedef struct { double I1, I3, mgl; } Par;
+
+static inline void field(const Par *par, const double *y, double *f) {
+    double s = sin(y[0]), c = cos(y[0]);
+    f[0] = y[3];
+    f[1] = y[4];
+    f[2] = y[5];
+    if (s == 0.0) {
+        f[3] = f[4] = f[5] = NAN;
+        return;
+    }
+    double spin = par->I3 * (y[5] + y[4] * c);
+    double turn = y[3] * (spin - 2.0 * par->I1 * y[4] * c) / (par->I1 * s);
+    f[3] = s * (y[4] * (par->I1 * y[4] * c - spin) + par->mgl) / par->I1;
+    f[4] = turn;
+    f[5] = y[3] * y[4] * s - turn * c;
+}
+
+static inline int judge(const double *state, const double *step) {
+    double reach = step[1] + step[2] + step[3] + step[4] + step[5];
+    return chart_outcome(state[0] + step[0] + 0.0 * reach);
+}
+#else
+#ifdef FRAME
+#define DIM 9
+#else
+#define DIM 6
+#endif
+typedef struct { double I1, mgl, twist; } Par;
+
+static inline void field(const Par *par, const double *y, double *f) {
+    double inverse = 1.0 / par->I1, wx = inverse * y[3], wy = inverse * y[4], wz = inverse * y[5];
+    f[0] = wy * y[2] - wz * y[1];
+    f[1] = wz * y[0] - wx * y[2];
+    f[2] = wx * y[1] - wy * y[0];
+    f[3] = -par->mgl * y[1];
+    f[4] = par->mgl * y[0];
+    f[5] = 0.0;
+#ifdef FRAME
+    f[6] = wy * y[8] - wz * y[7];
+    f[7] = wz * y[6] - wx * y[8];
+    f[8] = wx * y[7] - wy * y[6];
+#endif
+}
+
+static inline int judge(const double *state, const double *step) {
+    (void)state;
+    return finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5]);
+}
+#endif
