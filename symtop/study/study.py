@@ -27,6 +27,7 @@ NUMERICS = (
     "pairs.py",
     "reference.py",
     "simulate.py",
+    "oscillator.py",
     "integrators/*.py",
     "measure/*.py",
 )
