@@ -186,9 +186,9 @@ def _decay_words(data: xr.Dataset) -> str:
             ]
             words.append(f"b = {b:g}: {', '.join(ends)}.")
     return (
-        f"Largest relative error of the energy at equal cost to T = {LONG:g}: {' '.join(words)} What bounds the energy "
-        "of a discrete Lagrangian is the symplectic structure, and friction takes it away: with b > 0 every method's rate "
-        "of decay is off by a constant, and the error grows with time."
+        f"Largest relative error of the energy at equal cost to T = {LONG:g}: {' '.join(words)} What bounds the "
+        "energy of a discrete Lagrangian is the symplectic structure, and friction takes it away: with b > 0 every "
+        "method's rate of decay is off by a constant, and the error grows with time."
     )
 
 

@@ -209,14 +209,16 @@ def _save(results: Path, study: Study, picture: Picture) -> dict[str, str]:
 
     from symtop.report import style  # noqa: PLC0415
 
-    file = f"{study.name}-{picture.name}.png"
+    suffix = getattr(picture.figure, "suffix", "png")  # a film is a GIF
+    file = f"{study.name}-{picture.name}.{suffix}"
     target = results / "figures" / file
     target.parent.mkdir(parents=True, exist_ok=True)
-    handle, partial = tempfile.mkstemp(prefix=f".{file}.", suffix=".part.png", dir=target.parent)
+    handle, partial = tempfile.mkstemp(prefix=f".{file}.", suffix=f".part.{suffix}", dir=target.parent)
     os.close(handle)
     try:
         picture.figure.savefig(partial, metadata={"Software": None})
-        style.compact(partial)
+        if suffix == "png":
+            style.compact(partial)
         Path(partial).chmod(0o644)
         Path(partial).replace(target)
     finally:
