@@ -93,6 +93,10 @@ def scenes(plugin_files: tuple[str, ...], as_json: bool) -> None:
     )
 
 
+def _say(warning: str) -> None:
+    click.echo(f"symtop: {warning}", err=True)
+
+
 @main.command()
 @click.argument("scene")
 @click.argument("integrator")
@@ -101,11 +105,13 @@ def scenes(plugin_files: tuple[str, ...], as_json: bool) -> None:
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
 @click.option("--samples", type=int, default=501, show_default=True, help="How many samples to keep.")
 @click.option("--observe", help="nutation, axis or attitude; what the scene is watched for by default.")
+@click.option("--budget", type=float, help="Most steps, or force evaluations of an adaptive method.")
+@click.option("--guard/--no-guard", default=True, help="Say before the run what it will be worth, if that is little.")
 @click.option("--output", type=click.Path(), help="Write the run to this netCDF file.")
 @plugin_option
 def run(
     scene: str, integrator: str, step_size: float | None, tolerance: float | None, horizon: float | None, samples: int,
-    observe: str | None, output: str | None, plugin_files: tuple[str, ...],
+    observe: str | None, budget: float | None, guard: bool, output: str | None, plugin_files: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Run one INTEGRATOR on one SCENE and compare it with the truth.
 
@@ -121,8 +127,9 @@ def run(
 
     _load_plugins(plugin_files)
     data = simulate(
-        scene, integrator, step_size=step_size, tolerance=tolerance, horizon=horizon, samples=samples, observe=observe
-    )
+        scene, integrator, step_size=step_size, tolerance=tolerance, horizon=horizon, samples=samples, observe=observe,
+        guard=_say if guard else False, budget=budget,
+    )  # fmt: skip
     if output is not None:
         datasets.write(data, output)
     outcome = data.attrs["outcome"]

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from symtop.checks import SymtopError, label, one_of, positive
+from symtop.checks import SymtopError, finite, label, one_of, positive
 from symtop.top import Angles, SymmetricTop
 
 if TYPE_CHECKING:
@@ -61,11 +61,65 @@ def closed_form(scene: Scene) -> "ClosedForm":
     return _closed_form(scene.top, scene.start)
 
 
-def _fast_nutation(name: str, precession: float, purpose: str) -> Scene:
-    """One fast top (I3 w3 = 10) released at theta = 0.8 with three different precessions."""
-    theta, spin = 0.8, 10.0
-    start = Angles(theta=theta, phi_dot=precession, psi_dot=spin - precession * math.cos(theta))
-    return Scene(name, SymmetricTop(2.0, 1.0, 2.0), start, 20.0, purpose)
+def spinning(spin: float, precession: float = 0.0, *, name: str = "", purpose: str = "") -> Scene:
+    """The family over spin: I1 = 2, I3 = 1, mgl = 2, let go at theta = 0.8 with w3 = `spin` and a precession."""
+    theta, w3, turn = 0.8, finite("spin", spin), finite("precession", precession)
+    start = Angles(theta=theta, phi_dot=turn, psi_dot=w3 - turn * math.cos(theta))
+    said = purpose or f"let go at theta = {theta} with a spin of {w3:g}"
+    return Scene(name or f"spinning-{w3:.12g}", SymmetricTop(2.0, 1.0, 2.0), start, 20.0, said)
+
+
+def grazing(delta: float, *, name: str = "", purpose: str = "") -> Scene:
+    """The family over the gap p_phi - p_psi = `delta`: a fall towards the upper pole that misses it by 1.1 delta.
+
+    I1 = I3 = mgl = p_psi = 1, p_phi = 1 + delta, theta = 1, theta' = -1.2; the horizon is one nutation. The axis passes
+    the pole at abs(theta') of about 1.2, so that the passage lasts about delta and turns phi by half a turn.
+    """
+    gap, theta = finite("delta", delta), 1.0
+    cosine = math.cos(theta)
+    precession = (gap + 2.0 * math.sin(0.5 * theta) ** 2) / math.sin(theta) ** 2  # (p_phi - p_psi cos) / I1 sin^2
+    start = Angles(theta=theta, theta_dot=-1.2, phi_dot=precession, psi_dot=1.0 - precession * cosine)
+    said = purpose or f"passes the upper pole with p_phi - p_psi = {gap:g}"
+    return Scene(name or f"grazing-{gap:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 4.22, said)
+
+
+def sleeping(spin: float, tilt: float = 1e-3, *, name: str = "", purpose: str = "") -> Scene:
+    """The family of tops let go almost upright: I1 = I3 = mgl = 1, w3 = `spin`, theta = `tilt`.
+
+    The upright top is stable for I3 w3 >= 2 sqrt(I1 mgl), here for spin >= 2; below, a tilt grows at the rate
+    sqrt(4 - spin^2)/2 until the top lies at about acos(spin^2/2 - 1), rises again, and so on.
+    """
+    w3 = finite("spin", spin)
+    said = purpose or f"let go almost upright with a spin of {w3:g}"
+    return Scene(name or f"sleeping-{w3:.12g}", SymmetricTop(1.0, 1.0, 1.0), Angles(theta=tilt, psi_dot=w3), 60.0, said)
+
+
+def steady(spin: float, *, name: str = "", purpose: str = "") -> Scene:
+    """The family of steady precessions: I1 = 2, I3 = 1, mgl = 2, theta = 60 degrees, w3 = `spin`, the slow branch.
+
+    The rate is the smaller root of I1 Omega^2 cos(theta) - I3 w3 Omega + mgl = 0, which needs I3 w3 >= 2 sqrt 2 here.
+    """
+    top, theta, w3 = SymmetricTop(2.0, 1.0, 2.0), math.pi / 3.0, positive("spin", spin)
+    momentum, weight = top.I3 * w3, top.I1 * math.cos(theta)
+    room = momentum * momentum - 4.0 * weight * top.mgl
+    if room < 0.0:
+        msg = f"spin must be at least {2.0 * math.sqrt(weight * top.mgl) / top.I3:.6g} to precess steadily, not {w3!r}"
+        raise SymtopError(msg)
+    precession = 2.0 * top.mgl / (momentum + math.sqrt(room))
+    start = Angles(theta=theta, phi_dot=precession, psi_dot=w3 - precession * math.cos(theta))
+    return Scene(name or f"steady-{w3:.12g}", top, start, 20.0, purpose or f"steady precession at a spin of {w3:g}")
+
+
+def _separatrix() -> Scene:
+    """Woodhouse, Introduction to Analytical Dynamics, problem 5.3: u = cos theta = 1/(1 + sech g t), g^2 = mgl/I1.
+
+    theta0 = pi/3, phi' = 2g/sqrt 3, psi' = (3 I1 - I3) g/(I3 sqrt 3).
+    """
+    top = SymmetricTop(2.0, 1.0, 2.0)
+    g, root = math.sqrt(top.mgl / top.I1), math.sqrt(3.0)
+    start = Angles(math.pi / 3.0, phi_dot=2.0 * g / root, psi_dot=(3.0 * top.I1 - top.I3) * g / (top.I3 * root))
+    purpose = "rises towards the upright for ever: every disturbance grows as exp(g t/2), and no step saves a long run"
+    return Scene("separatrix", top, start, 20.0 / g, purpose)
 
 
 def _goldstein(name: str, theta_dot: float, purpose: str) -> Scene:
@@ -111,9 +165,9 @@ def _catalogue() -> dict[str, Scene]:
         _goldstein(
             "goldstein-rising", _ALPHA_RATE, "the second top with the printed alpha = 1.6, theta rising at first"
         ),
-        _fast_nutation("cusp", 0.0, "released from rest: the axis comes to rest again at each cusp"),
-        _fast_nutation("loop", -0.3, "started against its precession: the axis draws loops"),
-        _fast_nutation("wave", 0.1, "started along its precession: the axis draws a wave"),
+        spinning(10.0, name="cusp", purpose="released from rest: the axis comes to rest again at each cusp"),
+        spinning(10.0, -0.3, name="loop", purpose="started against its precession: the axis draws loops"),
+        spinning(10.0, 0.1, name="wave", purpose="started along its precession: the axis draws a wave"),
         Scene(
             "fast",
             SymmetricTop(2.0, 1.0, 2.0),
@@ -150,6 +204,13 @@ def _catalogue() -> dict[str, Scene]:
             2.0,
             "a published benchmark that grazes the lower pole at 0.00004 degrees: no place for angles",
         ),
+        grazing(
+            1e-3, name="grazing", purpose="passes the upper pole at 0.06 degrees: a step in angles may jump over it"
+        ),
+        sleeping(2.5, name="sleeping", purpose="let go almost upright and fast enough to stay there (threshold 2)"),
+        sleeping(1.9, name="sleeping-unstable", purpose="let go almost upright and too slow: it falls and rises again"),
+        steady(20.0, name="steady-fast", purpose="steady precession of a fast top: a large step makes it nutate"),
+        _separatrix(),
     ]
     return {scene.name: scene for scene in catalogue}
 

@@ -7,19 +7,23 @@ golden ratio, and the dataset says so.
 """
 
 import math
+import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from symtop import charts, datasets
-from symtop.checks import SymtopError, one_of, positive, whole
+from symtop.checks import SymtopError, SymtopWarning, one_of, positive, whole
+from symtop.guard import warning
 from symtop.integrators.outcomes import OUTCOMES, sentence
 from symtop.integrators.registry import Integrator, Plan, Run, integrator
 from symtop.scenes import OBSERVABLES, Scene, closed_form, scene
 from symtop.top import SymmetricTop
 
 MOST_STEPS = 20_000_000_000  # ten minutes of the fastest kernel
+MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
 WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
 
 _PREFERENCE = {
@@ -67,9 +71,15 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
 
 
 def make_plan(
-    scene: Scene, method: Integrator, step_size: object, tolerance: object, horizon: float, samples: int
+    scene: Scene,
+    method: Integrator,
+    step_size: object,
+    tolerance: object,
+    horizon: float,
+    samples: int,
+    budget: float | None = None,
 ) -> tuple[Plan, bool]:
-    """Check the knobs against the integrator and lay out steps and samples."""
+    """Check the knobs against the integrator and the budget, and lay out steps and samples."""
     period = scene.nutation_period
     if method.knob == "step_size":
         if tolerance is not None:
@@ -82,8 +92,9 @@ def make_plan(
         if step > horizon:
             msg = f"step_size must be at most the horizon {horizon!r}, not {step!r}"
             raise SymtopError(msg)
-        if horizon / step > MOST_STEPS:
-            msg = f"step_size {step!r} asks for {horizon / step:.3g} steps; the limit is {MOST_STEPS:.3g}"
+        most = MOST_STEPS if budget is None else budget
+        if horizon / step > most:
+            msg = f"step_size {step!r} asks for {horizon / step:.3g} steps; the limit is {most:.3g} (see budget)"
             raise SymtopError(msg)
         steps = max(1, round(horizon / step))
         times, marks, dithered = sample_times(horizon, samples, period, steps)
@@ -95,8 +106,12 @@ def make_plan(
         msg = f"{method.name} has nothing to tune: leave tolerance out, not {tolerance!r}"
         raise SymtopError(msg)
     bound = math.nan if method.knob is None else method.check_tolerance(tolerance)
+    swings = horizon * max(1.0 / period, math.sqrt(abs(scene.top.mgl) / scene.top.I1) / (2.0 * math.pi))
+    if method.knob is not None and swings > MOST_SWINGS:
+        msg = f"horizon {horizon!r} is {swings:.3g} swings of the top; an adaptive method may take {MOST_SWINGS:.3g}"
+        raise SymtopError(msg)
     times, marks, dithered = sample_times(horizon, samples, period)
-    return Plan(times, horizon, math.nan, marks, bound), dithered
+    return Plan(times, horizon, math.nan, marks, bound, budget), dithered
 
 
 def simulate(
@@ -108,15 +123,23 @@ def simulate(
     horizon: float | None = None,
     samples: int = 501,
     observe: str | None = None,
+    guard: bool | Callable[[str], object] = True,
+    budget: float | None = None,
 ) -> xr.Dataset:
     """Run one integrator on one scene and return what it did.
 
     Dimension ``time`` (elapsed) and ``component`` (x, y, z). Variables ``theta``, ``phi``, ``psi`` (unwrapped; absent
     where the chart does not show them), ``axis(time, component)``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, and
     ``quaternion`` where the chart has one. Samples after a failure are NaN; ``outcome``, ``outcome_message`` and
-    ``reached_time`` say what happened. `observe` ("nutation", "axis", "attitude"; default: what the scene is
-    watched for) picks the smallest chart of the integrator that shows it. A run of fewer steps than `samples` shows
-    every step.
+    ``reached_time`` say what happened, ``guard`` what was expected to. `observe` ("nutation", "axis", "attitude";
+    default: what the scene is watched for) picks the smallest chart of the integrator that shows it. A run of fewer
+    steps than `samples` shows every step.
+
+    Before the run the `guard` (`symtop.guard`) forecasts what it will be worth and warns (`SymtopWarning`) in one
+    sentence with a remedy if that is little; the run is the same either way. Give a function to be handed the sentence
+    instead, or False for silence where failures are what is looked for. `budget` is the most steps of a fixed-step run
+    (`MOST_STEPS` by default; more are refused) and the most force evaluations, or Taylor steps, of an adaptive one,
+    which then ends `out_of_budget` (by default after one or two minutes).
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
@@ -128,7 +151,14 @@ def simulate(
         msg = f"samples must be at most {MOST_SAMPLES}, not {count}"
         raise SymtopError(msg)
     chart = choose_chart(method, watched)
-    plan, dithered = make_plan(chosen, method, step_size, tolerance, end, count)
+    limit = None if budget is None else positive("budget", budget)
+    plan, dithered = make_plan(chosen, method, step_size, tolerance, end, count, limit)
+    said = warning(chosen, method, chart, plan) if guard is not False else "off"
+    if guard is not False and said:
+        if callable(guard):
+            guard(said)
+        else:
+            warnings.warn(said, SymtopWarning, stacklevel=2)
     run = _checked(method, chart, plan, _solve(method, chart, chosen, plan))
     return datasets.describe(
         as_dataset(chosen, chart, plan, run),
@@ -146,6 +176,7 @@ def simulate(
         outcome=run.outcome,
         outcome_message=sentence(run.outcome, run.reached, end),
         reached_time=run.reached,
+        guard=said,
         sampling="dithered" if dithered else "uniform",
         top={"I1": chosen.top.I1, "I3": chosen.top.I3, "mgl": chosen.top.mgl},
         start={name: getattr(chosen.start, name) for name in chosen.start.__slots__},

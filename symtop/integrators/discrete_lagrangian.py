@@ -55,6 +55,7 @@ class Quadrature(NamedTuple):
 
 
 SMALLEST = 1e-18  # radians: no correction below this can matter to an angle
+ROUNDING = 1e-12  # radians: a correction below this that does not halve is rounding (a steady precession has no other)
 
 
 class _Sums(NamedTuple):
@@ -164,11 +165,13 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     sums = _node_sums(rule, theta, d, sin_start, cos_start)
     force = _forces(par, sums)
     correction = 0.0
+    size = np.inf
     effort = 1
     outcome = NOT_CONVERGED
     while True:
         correction = (flight - d - scale * force.W0) / (1.0 + scale * force.W0_slope)
-        if abs(correction) <= rule.tolerance * (abs(flight) + abs(scale * force.W0)) + SMALLEST:
+        last, size = size, abs(correction)
+        if size <= rule.tolerance * (abs(flight) + abs(scale * force.W0)) + SMALLEST or 0.5 * last <= size <= ROUNDING:
             d += correction
             outcome = chart_outcome(theta + d)
             break

@@ -178,12 +178,14 @@ def walk(top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_
     slopes[0] = field_angles(par, state)
     t, step = 0.0, first_step(par, state, plan.horizon, plan.tolerance)
     steps, seen, evaluations, outcome = 0, 0, 2, OK
+    budget = plan.most(EVALUATIONS)
+    block = int(min(BLOCK, budget))
     while t < plan.horizon and outcome == OK:
         state, t, step, steps, seen, effort, outcome = march(
-            par, pair, plan.tolerance, plan.horizon, plan.times, BLOCK, state, slopes, t, step, steps, seen, found, ends
+            par, pair, plan.tolerance, plan.horizon, plan.times, block, state, slopes, t, step, steps, seen, found, ends
         )
         evaluations += effort
-        if outcome == OK and t < plan.horizon and evaluations > EVALUATIONS:
+        if outcome == OK and t < plan.horizon and evaluations > budget:
             outcome = OUT_OF_BUDGET
     return Walk(found, ends[:steps], steps, evaluations, OUTCOMES[outcome], plan.horizon if outcome == OK else t)
 

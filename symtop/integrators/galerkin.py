@@ -36,7 +36,7 @@ import numpy as np
 
 from symtop.integrators.angles import chart_outcome, reduced
 from symtop.integrators.compiled import register_jitable
-from symtop.integrators.discrete_lagrangian import SMALLEST
+from symtop.integrators.discrete_lagrangian import ROUNDING, SMALLEST
 from symtop.integrators.drive import driver
 from symtop.integrators.fixed_step import fixed_step
 from symtop.integrators.outcomes import NOT_CONVERGED
@@ -191,11 +191,13 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     m, d = _predict(carry, flight, scale)
     found = _evaluate(par, start, theta + m, theta + d)
     effort = 1
+    size = np.inf
     outcome = NOT_CONVERGED
     while True:
         fix = _correction(found, m, d, flight, scale)
         reach = abs(flight) + scale * (abs(found.V0.value) + abs(found.Vm.value))
-        if abs(fix[0]) + abs(fix[1]) <= rule.tolerance * reach + SMALLEST:
+        last, size = size, abs(fix[0]) + abs(fix[1])
+        if size <= rule.tolerance * reach + SMALLEST or 0.5 * last <= size <= ROUNDING:
             d += fix[1]
             outcome = chart_outcome(theta + d)
             break

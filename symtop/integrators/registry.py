@@ -30,6 +30,11 @@ class Plan(NamedTuple):
     step_size: float  # horizon / steps exactly; nan for an adaptive method
     marks: NDArray[np.int64]  # times / step_size; empty for an adaptive method
     tolerance: float  # nan for a fixed-step method
+    budget: float | None = None  # of an adaptive method: force evaluations or Taylor steps; None for its own limit
+
+    def most(self, limit: float) -> float:
+        """The budget, or a method's own limit where nobody gave one."""
+        return limit if self.budget is None else self.budget
 
 
 class Run(NamedTuple):

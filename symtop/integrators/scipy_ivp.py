@@ -77,19 +77,19 @@ def solver(method: str) -> Solver:
                 except (OverflowError, ZeroDivisionError, ValueError):  # sin of infinity, or no finite Jacobian
                     outcome = "not_finite"
                     break
-                outcome = _judge(stepper, rhs.calls)
+                outcome = _judge(stepper, rhs.calls, plan.most(EVALUATIONS))
         reached = plan.horizon if outcome == "ok" else float(stepper.t)
         return as_run(top, plan.times, found, steps, rhs.calls, outcome, reached)
 
     return solve
 
 
-def _judge(stepper: Any, calls: int) -> str:
+def _judge(stepper: Any, calls: int, budget: float) -> str:
     if not np.isfinite(stepper.y).all():
         return "not_finite"
     if not 0.0 < stepper.y[0] < math.pi:
         return "left_chart"
-    return "out_of_budget" if calls > EVALUATIONS else "ok"
+    return "out_of_budget" if calls > budget and stepper.status == "running" else "ok"
 
 
 def _entry(method: str, summary: str, order: int | None, reference: str, *, explicit: bool) -> Integrator:

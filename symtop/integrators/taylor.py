@@ -24,6 +24,7 @@ from symtop.integrators.registry import Array, Integrator, Plan, Run, Solver
 from symtop.top import Angles, SymmetricTop
 
 EPSILON = float(np.finfo(np.float64).eps)
+MOST_STEPS = {"double": 30_000_000, "longdouble": 5_000_000, "quad": 100_000}  # of one run: about two minutes
 
 
 def equations(chart: str) -> list[Any]:
@@ -121,8 +122,13 @@ class Flight(NamedTuple):
     outcome: str  # heyoka's word
 
 
-def propagate(chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array) -> Flight:
-    """heyoka's states at increasing times, in the working precision; the one place where heyoka is run."""
+def propagate(
+    chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array, most: int = 0
+) -> Flight:
+    """heyoka's states at increasing times, in the working precision; the one place where heyoka is run.
+
+    After `most` steps (0: never) it stops, and the states end at the last time that was reached.
+    """
     integrator, kind = stepper(chart, precision, tolerance), arithmetic(precision).kind
     state, parameters = start_numbers(chart, precision, top, start)
     integrator.time = kind("0")
@@ -130,7 +136,7 @@ def propagate(chart: str, precision: str, tolerance: float, top: SymmetricTop, s
     integrator.pars[:] = parameters[: integrator.pars.size]  # the axis chart does not need the last one
     grid = times if times[0] == 0.0 else np.concatenate([[0.0], times])
     numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
-    outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers)
+    outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=most)
     return Flight(states[grid.size - times.size :], int(steps), int(integrator.order), str(outcome))
 
 
@@ -138,11 +144,18 @@ def solver(chart: str, precision: str) -> Solver:
     """A solver of the registry in one chart and one arithmetic; samples are rounded to double."""
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        flight = propagate(chart, precision, plan.tolerance, top, start, plan.times)
-        p_phi, p_psi = (values.astype(float) for values in space_momenta(chart, flight.states))
-        states = flight.states.astype(float)
+        most = max(1, int(plan.most(MOST_STEPS[precision])))
+        flight = propagate(chart, precision, plan.tolerance, top, start, plan.times, most)
+        missing = ((0, plan.times.size - len(flight.states)), (0, 0))
+        states = np.pad(flight.states.astype(float), missing, constant_values=np.nan)
+        p_phi, p_psi = (
+            np.pad(values.astype(float), missing[:1], constant_values=np.nan)
+            for values in space_momenta(chart, flight.states)
+        )
         good = np.isfinite(states).all(axis=1)
         word = "ok" if good.all() and "time_limit" in flight.outcome else "not_finite"
+        if "step_limit" in flight.outcome and good[: len(flight.states)].all():
+            word = "out_of_budget"
         reached = plan.horizon if word == "ok" else float(plan.times[good][-1]) if good.any() else 0.0
         return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, word, reached)
 

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.reference import reference
-from symtop.scenes import Scene, closed_form, scene
-from symtop.top import Angles, SymmetricTop
+from symtop.scenes import closed_form, scene
 
 REMARK = "an asymmetric free body: tests the solver beside us, not symtop"
 
@@ -31,15 +30,6 @@ class Published(NamedTuple):
     def reproduced(self) -> bool:
         """Do they agree to the last printed digit?"""
         return abs(self.ours - self.published) <= 0.5000001 * self.unit
-
-
-def woodhouse() -> Scene:
-    """Woodhouse's elementary separatrix: theta0 = pi/3, phi' = 2g/sqrt 3, psi' = (3 I1 - I3) g/(I3 sqrt 3)."""
-    top = SymmetricTop(2.0, 1.0, 2.0)
-    g = math.sqrt(top.mgl / top.I1)
-    root = math.sqrt(3.0)
-    start = Angles(math.pi / 3.0, phi_dot=2.0 * g / root, psi_dot=(3.0 * top.I1 - top.I3) * g / (top.I3 * root))
-    return Scene("separatrix", top, start, 20.0 / g)
 
 
 def published_values() -> list[Published]:
@@ -66,7 +56,7 @@ def _bruls_cardona_arnold() -> list[Published]:
 
 
 def _woodhouse() -> list[Published]:
-    where, rows = woodhouse(), []
+    where, rows = scene("separatrix"), []
     g = math.sqrt(where.top.mgl / where.top.I1)
     for t in (1.0, 5.0):
         exact = 1.0 / (1.0 + 1.0 / math.cosh(g * t))
