@@ -6,8 +6,7 @@ A question is a flat mapping of numbers and names, as a page sends it. Every ans
 
 import base64
 import time
-import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from symtop import __version__, charts
-from symtop.checks import SymtopError, SymtopWarning, finite, positive
+from symtop.checks import SymtopError, finite, positive
 from symtop.integrators.registry import Integrator, integrator, integrators
 from symtop.measure.conservation import CONSTANTS, residuals
 from symtop.scenes import Scene, closed_form, scenes
@@ -37,10 +36,9 @@ class Question:
     method: Integrator
     setting: float | None
 
-    @property
-    def knobs(self) -> dict[str, float]:
-        """The keyword of `simulate` that sets the method's knob."""
-        return {} if self.method.knob is None or self.setting is None else {self.method.knob: self.setting}
+    def knob(self, name: str) -> float | None:
+        """The setting, if this is the method's knob."""
+        return self.setting if self.method.knob == name else None
 
     @property
     def samples(self) -> int:
@@ -75,21 +73,23 @@ def question(fields: Mapping[str, Any]) -> Question:
     return Question(where, method, setting)
 
 
-def dataset(asked: Question) -> xr.Dataset:
-    """The run as `simulate` returns it."""
-    return simulate(asked.scene, asked.method, observe="attitude", samples=asked.samples, **asked.knobs)
+def dataset(asked: Question, tell: Callable[[str], object]) -> xr.Dataset:
+    """The run as `simulate` returns it; what its guard has to say goes to `tell`."""
+    return simulate(
+        asked.scene, asked.method, step_size=asked.knob("step_size"), tolerance=asked.knob("tolerance"),
+        observe="attitude", samples=asked.samples, guard=tell,
+    )  # fmt: skip
 
 
 def answer(asked: Question) -> dict[str, Any]:
-    """A run beside the truth: attitudes, residuals, errors, the outcome's sentence and every warning.
+    """A run beside the truth: attitudes, residuals, errors, the outcome's sentence and the guard's.
 
     Arrays are base64 of float32, over `time`: ``attitude`` and ``truth`` (w, x, y, z in turn), ``theta``, ``energy``,
     ``p_phi`` and ``p_psi`` (relative residuals), ``axis_error`` and ``attitude_error`` in radians. NaN after a failure.
     """
     began = time.perf_counter()
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", SymtopWarning)
-        run = dataset(asked)
+    said: list[str] = []
+    run = dataset(asked, said.append)
     ran = time.perf_counter()
     times = run["time"].values
     truth = closed_form(asked.scene).quaternion(times)
@@ -108,7 +108,7 @@ def answer(asked: Question) -> dict[str, Any]:
     return {
         "outcome": run.attrs["outcome"],
         "message": run.attrs["outcome_message"],
-        "warnings": [str(entry.message) for entry in caught if issubclass(entry.category, SymtopWarning)],
+        "warnings": said,
         "steps": int(run.attrs["steps"]),
         "force_evaluations": int(run.attrs["force_evaluations"]),
         "period": float(np.nan_to_num(asked.scene.nutation_period, posinf=0.0)),
@@ -140,7 +140,7 @@ def script(asked: Question) -> str:
     top, start, where = asked.scene.top, asked.scene.start, asked.scene
     shown_top = ", ".join(f"{name}={getattr(top, name)!r}" for name in TOP)
     shown_start = ", ".join(f"{name}={getattr(start, name)!r}" for name in START)
-    knobs = "".join(f", {name}={value!r}" for name, value in asked.knobs.items())
+    knob = "" if asked.method.knob is None else f", {asked.method.knob}={asked.setting!r}"
     return "\n".join(
         [
             f'"""A run that was found with symtop explore, symtop {__version__}."""',
@@ -150,7 +150,7 @@ def script(asked: Question) -> str:
             f"top = symtop.SymmetricTop({shown_top})",
             f"start = symtop.Angles({shown_start})",
             f'scene = symtop.Scene("{where.name}", top, start, horizon={where.horizon!r})',
-            f'run = symtop.simulate(scene, "{asked.method.name}"{knobs}, observe="attitude", samples={asked.samples})',
+            f'run = symtop.simulate(scene, "{asked.method.name}"{knob}, observe="attitude", samples={asked.samples})',
             'run.to_netcdf("explored.nc")',
             'print(run.attrs["title"] + ": " + run.attrs["outcome_message"])',
             "",

@@ -5,7 +5,7 @@
     POST /run  /netcdf  /script                   one run: as arrays, as a file, as a script
 
 It listens on 127.0.0.1 and answers only requests that name this machine as their host and send JSON, so that no page of
-another origin can use it. Runs take turns: a warning belongs to the run that caused it.
+another origin can use it. Runs take turns: mpmath's precision is one for all threads.
 """
 
 import json
@@ -39,7 +39,7 @@ def _run(asked: answers.Question) -> tuple[bytes, str]:
 
 def _netcdf(asked: answers.Question) -> tuple[bytes, str]:
     with tempfile.TemporaryDirectory() as folder:
-        path = datasets.write(answers.dataset(asked), Path(folder) / "explored.nc")
+        path = datasets.write(answers.dataset(asked, str), Path(folder) / "explored.nc")
         return path.read_bytes(), "application/x-netcdf"
 
 

@@ -61,7 +61,7 @@ def figures_kept(values: Any) -> int:
 def residual_history(scene: Scene, method: str, setting: float, samples: int = SAMPLES) -> xr.Dataset:
     """Energy, momenta and their relative residuals of one method over the scene's horizon; dimension ``sample``."""
     knob = {"step_size": setting} if integrators()[method].knob == "step_size" else {"tolerance": setting}
-    run = simulate(scene, method, observe="nutation", samples=samples, **knob)
+    run = simulate(scene, method, observe="nutation", samples=samples, guard=False, **knob)
     found: dict[str, Any] = {"sample_time": ("sample", run["time"].values), "outcome": run.attrs["outcome"]}
     for name, values in residuals(scene, run).items():
         found[name] = ("sample", run[name].values)
@@ -245,7 +245,7 @@ def shadow_table(scene: Scene, method: str, steps: Sequence[float]) -> xr.Datase
     found: dict[str, list[float]] = {"shadow_step_size": [], "energy_swing": [], "modified_swing": []}
     history: dict[str, Any] = {}
     for step in steps:
-        run = simulate(scene, method, step_size=step, observe="nutation", samples=SAMPLES)
+        run = simulate(scene, method, step_size=step, observe="nutation", samples=SAMPLES, guard=False)
         h = run.attrs["step_size"]
         shadow = modified_energy(scene, method, run["theta"].values, run["p_theta"].values, h)
         curves = {"energy_swing": run["energy"].values, "modified_swing": shadow}
@@ -260,7 +260,7 @@ def shadow_table(scene: Scene, method: str, steps: Sequence[float]) -> xr.Datase
 
 def film_table(scene: Scene, method: str, step: float, horizon: float, frames: int) -> xr.Dataset:
     """The attitude of a run and the true one at every frame of an animation; dimension ``frame``."""
-    run = simulate(scene, method, step_size=step, horizon=horizon, observe="attitude", samples=frames)
+    run = simulate(scene, method, step_size=step, horizon=horizon, observe="attitude", samples=frames, guard=False)
     q = charts.quaternion_from_angles(run["theta"].values, run["phi"].values, run["psi"].values)
     truth = closed_form(scene).quaternion(run["time"].values)
     return xr.Dataset(
