@@ -351,14 +351,13 @@ def verdict(data: xr.Dataset) -> list[str]:
         f"Corrected: alpha = {ALPHA:g} contradicts a release at rest (alpha = {float(other['alpha_at_rest']):.6f}; the "
         f"printed one means |theta'| = {float(other['alpha_rate']):.6f}); the drawn path is a quarter turn from the "
         "axis; the inertia is that about the centre of gravity used about the pivot, and one letter stands for the "
-        "polar radius and for the lever arm (`SymmetricTop.from_spheroid(pivot_distance=...)` is the physical reading)."
+        "polar radius and for the lever arm (from_spheroid with a pivot_distance is the physical reading)."
     )
     momenta = (
-        "The momenta of every discrete method are conserved to rounding at any step, because a discrete "
-        "Lagrangian that "
-        "does not change with phi and psi has Noether's theorem exactly: p_phi = D2 L_d = -D1 L_d "
-        f"(largest relative change {_worst(data, 'p_phi', 'p_psi'):.0e}; the solver's "
-        f"{max(float(here[f'{name}_largest']) for name in ('p_phi', 'p_psi')):.0e})."
+        "The momenta of every discrete method are conserved to rounding at any step. A discrete Lagrangian that does "
+        "not change with phi and psi has Noether's theorem exactly, p_phi = D2 L_d = -D1 L_d, and a splitting has it "
+        f"because each of its parts has the symmetry (largest relative change {_worst(data, 'p_phi', 'p_psi'):.0e}; the "
+        f"solver's {max(float(here[f'{name}_largest']) for name in ('p_phi', 'p_psi')):.0e})."
     )
     energy = (
         f"Their energy is bounded, not small: at 118 steps a nutation {len(beaten)} of "

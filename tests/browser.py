@@ -145,6 +145,7 @@ class Browser:
         self._send(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 500
         )
+        self.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
 
     def open(self, address: str) -> None:
         """Go to an address and wait until the page has loaded."""
@@ -181,6 +182,14 @@ class Browser:
     def click(self, selector: str) -> None:
         """Click on an element."""
         self.evaluate(f"document.querySelector({selector!r}).click()")
+
+    def drag(self, selector: str, right: float, down: float) -> None:
+        """Press the mouse in the middle of an element, move it, and let go."""
+        box = self.evaluate(f"document.querySelector({selector!r}).getBoundingClientRect().toJSON()")
+        x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+        for kind, share in (("mousePressed", 0.0), ("mouseMoved", 0.5), ("mouseMoved", 1.0), ("mouseReleased", 1.0)):
+            place = {"x": x + share * right, "y": y + share * down}
+            self._send("Input.dispatchMouseEvent", type=kind, button="left", buttons=1, clickCount=1, **place)
 
     def screenshot(self, path: Path, *, whole: bool = False) -> Path:
         """Save what is in the window, or the whole page, as a PNG."""

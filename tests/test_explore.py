@@ -228,6 +228,14 @@ def test_a_person_can_use_it(site, tmp_path):
         browser.wait_for("document.querySelector('#now').textContent.startsWith('4.0')")
         browser.wait_for(f"document.querySelector('#sphere').toDataURL() !== {json.dumps(scene)}")
 
+        scene = browser.evaluate("document.querySelector('#sphere').toDataURL()")
+        browser.drag("#sphere", 80, 30)  # looked at from elsewhere
+        browser.wait_for(f"document.querySelector('#sphere').toDataURL() !== {json.dumps(scene)}")
+        browser.evaluate("HTMLAnchorElement.prototype.click = function () { window.saved = this.download; }")
+        for button, file in (("#script", "explored.py"), ("#netcdf", "explored.nc")):
+            browser.click(button)
+            browser.wait_for(f"window.saved === {file!r}")
+
         answered(browser, lambda: browser.set("#step_size", 0.6))  # a failing run shows its sentence
         browser.wait_for("document.body.dataset.answer === 'left_chart'")
         assert "theta left (0, pi)" in browser.evaluate(status)

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -239,3 +240,11 @@ def test_the_films_body_axes_are_those_of_the_charts(tmp_path):
         assert film.n_frames == 5
         colors = {color for _, color in film.convert("RGB").getcolors(1 << 20)}
     assert {(0xD5, 0x5E, 0x00), (0x00, 0x9E, 0x73), (0x00, 0x72, 0xB2)} <= colors  # the triad's own
+
+
+def test_the_film_fits_a_page_and_is_embedded_as_what_it_is():
+    from symtop.report import page
+
+    film = Path(__file__).resolve().parent.parent / "results" / "figures" / "notebook-triad.gif"
+    assert film.stat().st_size < 500_000
+    assert page._embedded(film).startswith("data:image/gif;base64,")

@@ -110,7 +110,7 @@ function show(found, began) {
   place = before * last;
   for (const name of PLOTS) {
     const largest = found.largest[name];
-    $(`largest-${name}`).textContent = largest === null ? "" : `largest ${largest.toExponential(1)}`;
+    $(`largest-${name}`).textContent = largest === null ? "" : largest === 0 ? "always zero" : `largest ${largest.toExponential(1)}`;
   }
   const a = found.period && found.steps ? `, ${Math.round((found.steps * found.period) / run.time[last])} a nutation` : "";
   $("status").textContent = `${values.integrator}: ${found.message}; ${found.steps} steps${a}, ${found.force_evaluations} force evaluations, ${found.run_ms.toFixed(0)} ms`;
