@@ -1,4 +1,4 @@
-"""The command line: ``symtop integrators | scenes | run | long | study | claims | report | recommend | doctor``.
+"""The command line: ``symtop integrators | scenes | run | long | study | claims | report | recommend | doctor | explore``.
 
 Exit codes: 0 fine; 1 a case or a check failed; 2 bad input, or a place that cannot be written; 3 a run ended early by
 its outcome (what it had was kept); 130 and 143 a study was interrupted or terminated (what was computed is kept).
@@ -346,6 +346,27 @@ def recommend(
     click.echo(json.dumps(dataclasses.asdict(advice), indent=1) if as_json else str(advice))
     if advice.integrator is None:
         sys.exit(1)
+
+
+@main.command()
+@click.option("--port", type=int, default=0, help="Port to listen on; a free one by default.")
+@click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
+@plugin_option
+def explore(port: int, no_browser: bool, plugin_files: tuple[str, ...]) -> None:
+    """Sliders in a browser: any top, start, integrator and step, beside the truth."""
+    import webbrowser  # noqa: PLC0415
+
+    from symtop.explore.server import address, serve  # noqa: PLC0415
+
+    _load_plugins(plugin_files)
+    with serve(port) as server:
+        click.echo(f"symtop explore: {address(server)} (Ctrl-C ends it)")
+        if not no_browser:
+            webbrowser.open(address(server))
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            click.echo("")
 
 
 if __name__ == "__main__":

@@ -163,6 +163,18 @@ class SymmetricTop:
         arm = finite("pivot_distance", pivot_distance)
         return cls(across + mass * arm * arm, along, mass * gravity * arm)
 
+    def spheroid_radii(self, mass: float) -> tuple[float, float]:
+        """Polar and equatorial radius of the solid spheroid that has this inertia about its centre.
+
+        The way back of `from_spheroid` without a pivot distance. Raises SymtopError where there is no such body.
+        """
+        square = 5.0 * self.I3 / (2.0 * positive("mass", mass))
+        rest = 5.0 * self.I1 / mass - square
+        if rest <= 0.0:
+            msg = f"no spheroid has I1 = {self.I1!r} and I3 = {self.I3!r}: I3 must be below 2 I1"
+            raise SymtopError(msg)
+        return math.sqrt(rest), math.sqrt(square)
+
     def momenta(self, at: Angles) -> Momenta:
         """The conserved momenta of a state, and their pole-safe combinations."""
         p_psi = self.I3 * at.spin

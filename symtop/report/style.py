@@ -129,12 +129,14 @@ def compact(path: str | Path) -> None:
 
 
 def save(figure: Any, target: Path) -> None:
-    """Write a figure as a compact PNG, whole or not at all, and close it."""
+    """Write a figure as a compact PNG, or a film as it is, whole or not at all, and close it."""
     datasets.sweep(target)
-    with datasets.replacing(target, ".png") as partial:
+    with datasets.replacing(target, target.suffix) as partial:
         figure.savefig(partial, metadata={"Software": None})
-        compact(partial)
-    plt.close(figure)
+        if target.suffix == ".png":
+            compact(partial)
+    if isinstance(figure, plt.Figure):
+        plt.close(figure)
 
 
 def panels(rows: int, columns: int, width: float = 9.6, height: float = 3.4, **options: Any) -> Any:

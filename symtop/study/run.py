@@ -217,6 +217,7 @@ def status(study: Study, results: Path, *, quick: bool = False, full: bool = Fal
 def _save(results: Path, study: Study, picture: Picture) -> dict[str, str]:
     from symtop.report import style  # noqa: PLC0415
 
-    file = f"{study.name}-{picture.name}.png"
+    suffix = getattr(picture.figure, "suffix", "png")  # a film is a GIF
+    file = f"{study.name}-{picture.name}.{suffix}"
     style.save(picture.figure, results / "figures" / file)
     return {"name": picture.name, "file": file, "caption": picture.caption, "alt": picture.alt}

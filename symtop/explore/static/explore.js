@@ -1,0 +1,193 @@
+// Controls, questions to the server, and the clock of the animation.
+
+import { Sphere, plot } from "./draw.js";
+
+const $ = (id) => document.getElementById(id);
+// name, label, least, most of the slider, logarithmic
+const TOP = [["I1", "I1", 0.01, 20, true], ["I3", "I3", 0.01, 20, true], ["mgl", "mgl", -40, 160, false]];
+const START = [
+  ["theta", "theta", 0.01, 3.13, false], ["phi", "phi", -3.1416, 3.1416, false], ["psi", "psi", -3.1416, 3.1416, false],
+  ["theta_dot", "theta'", -5, 5, false], ["phi_dot", "phi'", -15, 15, false], ["psi_dot", "psi'", -160, 160, false],
+];
+const KNOBS = [["step_size", "step (s)", 1e-5, 1, true], ["tolerance", "tolerance", 1e-13, 1e-2, true], ["horizon", "time (s)", 0.5, 500, true]];
+const PLOTS = ["axis_error", "energy", "p_phi", "p_psi"];
+
+const values = {};
+const rows = {};
+const sphere = new Sphere($("sphere"));
+let catalogue, run = null, place = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, asking = false, stale = false, drawnAt = -1;
+
+function control([name, label, least, most, logarithmic], where) {
+  const row = document.createElement("div");
+  row.className = "slider";
+  const [words, slider, number] = ["label", "input", "input"].map((tag) => document.createElement(tag));
+  words.textContent = label;
+  words.htmlFor = number.id = name;
+  slider.id = `${name}-slider`;
+  slider.setAttribute("aria-label", label);
+  number.type = "number";
+  number.step = "any";
+  slider.type = "range";
+  const forth = (v) => (logarithmic ? Math.log10(v) : v);
+  const back = (v) => (logarithmic ? 10 ** v : v);
+  Object.assign(slider, { min: forth(least), max: forth(most), step: "any" });
+  row.append(words, slider, number);
+  $(where).append(row);
+  const show = (value) => { number.value = +value.toPrecision(6); slider.value = forth(value); };
+  slider.addEventListener("input", () => { values[name] = +back(+slider.value).toPrecision(6); number.value = values[name]; ask(); });
+  number.addEventListener("change", () => { values[name] = number.value === "" ? null : +number.value; slider.value = forth(values[name]); ask(); });
+  rows[name] = { row, set: (value) => { values[name] = value; show(value); } };
+}
+
+function chosen() {
+  return catalogue.integrators.find((entry) => entry.name === values.integrator);
+}
+
+function chooseScene(name) {
+  const entry = catalogue.scenes.find((known) => known.name === name);
+  $("purpose").textContent = entry.purpose;
+  for (const [key] of [...TOP, ...START]) rows[key].set(entry[key]);
+  rows.horizon.set(entry.horizon);
+  rows.step_size.set(+((entry.period || entry.horizon) / 60).toPrecision(2));
+  place = 0;
+  ask();
+}
+
+function chooseIntegrator(name) {
+  values.integrator = name;
+  const { summary, knob, tolerance } = chosen();
+  $("summary").textContent = summary;
+  rows.step_size.row.hidden = knob !== "step_size";
+  rows.tolerance.row.hidden = knob !== "tolerance";
+  if (knob === "tolerance") rows.tolerance.set(tolerance);
+  ask();
+}
+
+async function post(path) {
+  return fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(values) });
+}
+
+// One question at a time; while it is answered only the newest wish is kept.
+async function ask() {
+  if (asking) { stale = true; return; }
+  asking = true;
+  const began = performance.now();
+  try {
+    const response = await post("run");
+    const found = await response.json();
+    if (found.error) refuse(found.error); else show(found, began);
+  } catch {
+    refuse("the explorer's server does not answer; is symtop explore still running?");
+  }
+  asking = false;
+  if (stale) { stale = false; ask(); }
+}
+
+function unpack(text) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  return new Float32Array(bytes.buffer);
+}
+
+function refuse(sentence) {
+  $("status").textContent = sentence;
+  $("status").className = "failed";
+  $("warnings").replaceChildren();
+  $("netcdf").disabled = $("script").disabled = true;
+  document.body.dataset.answer = "refused";
+}
+
+function show(found, began) {
+  const before = run && run.time.length > 1 ? place / (run.time.length - 1) : 0;
+  run = Object.fromEntries(Object.entries(found.arrays).map(([name, text]) => [name, unpack(text)]));
+  run.color = chosen().color;
+  const last = run.time.length - 1;
+  run.trail = found.period ? Math.ceil((8 * found.period * last) / run.time[last]) : last;
+  run.trueTheta = Array.from({ length: last + 1 }, (_, k) => {
+    const [w, x, y, z] = run.truth.subarray(4 * k, 4 * k + 4);
+    return (2 * Math.atan2(Math.hypot(x, y), Math.hypot(w, z)) * 180) / Math.PI;
+  });
+  run.degrees = run.theta.map((value) => (value * 180) / Math.PI);
+  place = before * last;
+  for (const name of PLOTS) {
+    const largest = found.largest[name];
+    $(`largest-${name}`).textContent = largest === null ? "" : largest === 0 ? "always zero" : `largest ${largest.toExponential(1)}`;
+  }
+  const a = found.period && found.steps ? `, ${Math.round((found.steps * found.period) / run.time[last])} a nutation` : "";
+  $("status").textContent = `${values.integrator}: ${found.message}; ${found.steps} steps${a}, ${found.force_evaluations} force evaluations, ${found.run_ms.toFixed(0)} ms`;
+  $("status").className = found.outcome === "ok" ? "" : "failed";
+  $("warnings").replaceChildren(...found.warnings.map((sentence) => {
+    const item = document.createElement("li");
+    item.textContent = sentence;
+    return item;
+  }));
+  $("netcdf").disabled = $("script").disabled = false;
+  drawPlots();
+  Object.assign(document.body.dataset, {
+    answer: found.outcome, answers: +(document.body.dataset.answers || 0) + 1, steps: found.steps,
+    server: found.all_ms.toFixed(1), elapsed: (performance.now() - began).toFixed(1),
+  });
+}
+
+function drawPlots() {
+  if (!run) return;
+  const now = run.time[Math.round(place)] || 0;
+  plot($("plot-theta"), run.time, [{ values: run.trueTheta, color: "#9a9a9a", dotted: true }, { values: run.degrees, color: run.color }], false, now);
+  for (const name of PLOTS) plot($(`plot-${name}`), run.time, [{ values: run[name], color: run.color }], true, now);
+  drawnAt = performance.now();
+}
+
+let before = performance.now();
+function frame(instant) {
+  const passed = Math.min(0.1, (instant - before) / 1000);
+  before = instant;
+  if (run) {
+    const last = run.time.length - 1;
+    const speed = last / Math.min(run.time[last], 40);  // the whole run in real time, a long one in forty seconds
+    if (playing) place = place + passed * speed > last ? 0 : place + passed * speed;
+    place = Math.min(place, last);
+    $("clock").value = place / last;
+    $("now").textContent = `${run.time[Math.round(place)].toFixed(2)} s`;
+    sphere.draw(run, place);
+    if (playing && instant - drawnAt > 100) drawPlots();
+  }
+  requestAnimationFrame(frame);
+}
+
+async function save(path, name) {
+  const response = await post(path);
+  if (!response.ok) { refuse((await response.json()).error); return; }
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(await response.blob());
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+async function begin() {
+  catalogue = await (await fetch("catalogue")).json();
+  for (const entry of TOP) control(entry, "top");
+  for (const entry of START) control(entry, "start");
+  for (const entry of KNOBS) control(entry, "knobs");
+  for (const { name } of catalogue.scenes) $("scene").append(new Option(name, name));
+  for (const family of new Set(catalogue.integrators.map((entry) => entry.family))) {
+    const group = document.createElement("optgroup");
+    group.label = family;
+    for (const entry of catalogue.integrators) if (entry.family === family) group.append(new Option(entry.name, entry.name));
+    $("integrator").append(group);
+  }
+  $("scene").addEventListener("change", () => chooseScene($("scene").value));
+  $("integrator").addEventListener("change", () => chooseIntegrator($("integrator").value));
+  $("clock").addEventListener("input", () => { place = $("clock").value * (run ? run.time.length - 1 : 0); playing = false; $("play").textContent = "Play"; drawPlots(); });
+  $("play").addEventListener("click", () => { playing = !playing; $("play").textContent = playing ? "Pause" : "Play"; });
+  $("netcdf").addEventListener("click", () => save("netcdf", "explored.nc"));
+  $("script").addEventListener("click", () => save("script", "explored.py"));
+  window.addEventListener("resize", drawPlots);
+  if (!playing) $("play").textContent = "Play";
+  rows.tolerance.set(1e-6);
+  values.integrator = catalogue.integrators[0].name;
+  chooseScene(catalogue.scenes[0].name);
+  chooseIntegrator(values.integrator);
+  requestAnimationFrame(frame);
+}
+
+begin().catch((error) => refuse(`the explorer cannot start: ${error.message}`));

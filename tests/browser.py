@@ -1,0 +1,214 @@
+"""A headless Chromium for tests, driven through its DevTools protocol over a pipe: no package, no port, no network.
+
+    with Browser(width=1280, height=900) as browser:
+        browser.open(path.as_uri())
+        assert browser.evaluate("document.title") == "..."
+        browser.wait_for("document.querySelectorAll('img').length > 0")
+        browser.screenshot(tmp_path / "page.png")
+        assert browser.problems == [] and browser.outside() == []
+
+`problems` are uncaught exceptions, console errors and failed loads; `requests` are the addresses that the page asked
+for. Protocol: https://chromedevtools.github.io/devtools-protocol, messages of JSON ending in a zero byte.
+"""
+
+import base64
+import json
+import os
+import select
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, Self
+
+import pytest
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-dev-shm-usage",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions",
+    "--disable-default-apps", "--no-default-browser-check", "--hide-scrollbars", "--remote-debugging-pipe",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE localhost, EXCLUDE 127.0.0.1",
+)  # fmt: skip
+PATIENCE = 30.0  # seconds; a first start on a busy machine takes five
+
+
+def executable() -> str:
+    """The browser on this machine; a test that needs one is skipped where there is none."""
+    for name in NAMES:
+        if found := shutil.which(name):
+            return found
+    pytest.skip(f"no browser on this machine ({', '.join(NAMES)}); on Debian: apt-get install chromium")
+
+
+class BrowserError(AssertionError):
+    """The browser refused a command, or what was waited for did not happen."""
+
+
+class Browser:
+    """One page of a headless browser; its profile is a new folder that goes with it."""
+
+    def __init__(self, width: int = 1280, height: int = 900) -> None:
+        self.problems: list[str] = []
+        self.requests: list[str] = []
+        self._size = width, height
+        self._count = 0
+        self._buffer = b""
+        self._session = ""
+        self._program = executable()
+
+    def __enter__(self) -> Self:
+        self._profile = tempfile.mkdtemp(prefix="symtop-browser-")
+        self._home = {**os.environ, "HOME": self._profile, "XDG_CONFIG_HOME": self._profile}
+        ours, theirs = os.pipe(), os.pipe()  # we write to ours[1], the browser to theirs[1]
+        # the browser reads commands from descriptor 3 and writes to 4; a shell puts the two ends there
+        script = f'exec "$@" 3<&{ours[0]} 4>&{theirs[1]}'
+        self._process = subprocess.Popen(
+            ["/bin/bash", "-c", script, "browser", self._program, *FLAGS, f"--user-data-dir={self._profile}"],
+            pass_fds=(ours[0], theirs[1]), env=self._home, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )  # fmt: skip
+        os.close(ours[0])
+        os.close(theirs[1])
+        self._write, self._read = ours[1], theirs[0]
+        try:
+            target = self._send("Target.createTarget", url="about:blank")["targetId"]
+            self._session = self._send("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+            for domain in ("Page", "Runtime", "Log", "Network"):
+                self._send(f"{domain}.enable")
+            self.resize(*self._size)
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        try:
+            self._session = ""
+            self._send("Browser.close")
+        except (BrowserError, OSError):
+            pass
+        os.close(self._write)
+        os.close(self._read)
+        try:
+            self._process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            os.killpg(self._process.pid, 9)
+            self._process.wait()
+        shutil.rmtree(self._profile, ignore_errors=True)
+
+    def _send(self, method: str, **params: Any) -> dict[str, Any]:
+        self._count += 1
+        message: dict[str, Any] = {"id": self._count, "method": method, "params": params}
+        if self._session:
+            message["sessionId"] = self._session
+        data = json.dumps(message).encode() + b"\0"
+        while data:
+            data = data[os.write(self._write, data) :]
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            answer = self._receive(deadline - time.monotonic(), method)
+            if answer.get("id") == self._count:
+                if "error" in answer:
+                    raise BrowserError(f"{method}: {answer['error']['message']}")
+                return answer["result"]
+
+    def _receive(self, patience: float, awaited: str) -> dict[str, Any]:
+        while b"\0" not in self._buffer:
+            if not select.select([self._read], [], [], max(patience, 0.0))[0]:
+                raise BrowserError(f"no answer to {awaited} within {PATIENCE:g} s")
+            piece = os.read(self._read, 1 << 20)
+            if not piece:
+                raise BrowserError(f"the browser ended before it answered {awaited}")
+            self._buffer += piece
+        first, _, self._buffer = self._buffer.partition(b"\0")
+        message = json.loads(first)
+        self._note(message.get("method", ""), message.get("params", {}))
+        return message
+
+    def _note(self, event: str, params: dict[str, Any]) -> None:
+        """Keep what a test must not overlook."""
+        if event == "Runtime.exceptionThrown":
+            details = params["exceptionDetails"]
+            self.problems.append(details.get("exception", {}).get("description") or details["text"])
+        elif event == "Runtime.consoleAPICalled" and params["type"] in ("error", "assert", "warning"):
+            self.problems.append(" ".join(str(arg.get("value", arg.get("description"))) for arg in params["args"]))
+        elif event == "Log.entryAdded" and params["entry"]["level"] == "error":
+            self.problems.append(f"{params['entry']['text']} {params['entry'].get('url', '')}".strip())
+        elif event == "Network.requestWillBeSent":
+            self.requests.append(params["request"]["url"])
+
+    def resize(self, width: int, height: int) -> None:
+        """Give the page the window of a desk or, below 500 pixels, of a telephone."""
+        self._size = width, height
+        self._send(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 500
+        )
+        self.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
+
+    def open(self, address: str) -> None:
+        """Go to an address and wait until the page has loaded."""
+        found = self._send("Page.navigate", url=address)
+        if "errorText" in found:
+            raise BrowserError(f"{address}: {found['errorText']}")
+        self.wait_for("document.readyState === 'complete' && location.href !== 'about:blank'")
+
+    def evaluate(self, expression: str) -> Any:
+        """The value of a JavaScript expression; a promise is awaited."""
+        found = self._send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in found:
+            details = found["exceptionDetails"]
+            raise BrowserError(details.get("exception", {}).get("description") or details["text"])
+        return found["result"].get("value")
+
+    def wait_for(self, condition: str, patience: float = PATIENCE) -> Any:
+        """Wait until a JavaScript expression is true, and return it."""
+        deadline = time.monotonic() + patience
+        while time.monotonic() < deadline:
+            if value := self.evaluate(condition):
+                return value
+            time.sleep(0.02)
+        raise BrowserError(f"not true within {patience:g} s: {condition}")
+
+    def set(self, selector: str, value: object) -> None:
+        """Move a slider or choose from a list, as a user's hand would."""
+        self.evaluate(
+            f"(() => {{ const control = document.querySelector({selector!r}); control.value = {json.dumps(str(value))};"
+            "control.dispatchEvent(new Event('input', {bubbles: true}));"
+            "control.dispatchEvent(new Event('change', {bubbles: true})); })()"
+        )
+
+    def click(self, selector: str) -> None:
+        """Click on an element."""
+        self.evaluate(f"document.querySelector({selector!r}).click()")
+
+    def drag(self, selector: str, right: float, down: float) -> None:
+        """Press the mouse in the middle of an element, move it, and let go."""
+        box = self.evaluate(f"document.querySelector({selector!r}).getBoundingClientRect().toJSON()")
+        x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+        for kind, share in (("mousePressed", 0.0), ("mouseMoved", 0.5), ("mouseMoved", 1.0), ("mouseReleased", 1.0)):
+            place = {"x": x + share * right, "y": y + share * down}
+            self._send("Input.dispatchMouseEvent", type=kind, button="left", buttons=1, clickCount=1, **place)
+
+    def screenshot(self, path: Path, *, whole: bool = False) -> Path:
+        """Save what is in the window, or the whole page, as a PNG."""
+        found = self._send("Page.captureScreenshot", format="png", captureBeyondViewport=whole, **self._clip(whole))
+        path.write_bytes(base64.b64decode(found["data"]))
+        return path
+
+    def _clip(self, whole: bool) -> dict[str, Any]:
+        if not whole:
+            return {}
+        size = self._send("Page.getLayoutMetrics")["cssContentSize"]
+        return {"clip": {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}}
+
+    def outside(self) -> list[str]:
+        """What the page asked of other machines: anything but files, data and this one."""
+        near = ("file:", "data:", "blob:", "about:", "http://127.0.0.1", "http://localhost")
+        return [address for address in self.requests if not address.startswith(near)]
+
+    @property
+    def too_wide(self) -> int:
+        """By how many pixels the page is wider than its window."""
+        return int(self.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth"))
