@@ -229,5 +229,7 @@ STUDY = Study(
     tables=tables,
     verdict=verdict,
     follow_up=follow_up,
+    charts=words.charts,
+    opening=words.opening,
     uses=lambda case: case.settings.get("integrators", [case.integrator]),
 )

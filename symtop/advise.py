@@ -23,7 +23,7 @@ import xarray as xr
 
 from symtop.checks import SymtopError, one_of, positive
 from symtop.integrators.registry import Integrator, integrators
-from symtop.measure import meet
+from symtop.measure import meet, ranking
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
 from symtop.scenes import Scene, scene, scenes
@@ -175,33 +175,25 @@ def _candidates(
         return everyone, f"tried all {len(everyone)} compiled methods (the stored study holds no known scene)"
     here = regime(where)
     nearest = min(known, key=lambda name: float(np.sum((regime(known[name]) - here) ** 2)))
-    cell = data.sel(scene=nearest)
-    if "horizon" in cell.dims:
-        periods = horizon / where.nutation_period
-        cell = cell.isel(horizon=int(np.argmin(np.abs(np.log(cell["periods"].values / max(periods, 1e-3))))))
-    ranked: list[tuple[float, str, float | None]] = []
-    for name in map(str, cell["integrator"].values):
-        if name not in usable:
-            continue
-        row = cell.sel(integrator=name)
-        good = np.flatnonzero((row[quantity].values <= accuracy) & np.isfinite(row["seconds"].values))
-        if good.size:
-            best = good[np.argmin(row["seconds"].values[good])]
-            ranked.append((float(row["seconds"].values[best]), name, _setting(row, int(best), where, known[nearest])))
-    if not ranked:
-        return (
-            everyone,
-            f"tried all {len(everyone)} compiled methods (none met it on {nearest}, the nearest stored scene)",
-        )
-    chosen = {name: guess for _, name, guess in sorted(ranked)[:CANDIDATES]}
+    periods = horizon / where.nutation_period
+    far = int(np.argmin(np.abs(np.log(data["horizon"].values / max(periods, 1e-3)))))
+    cell = data.sel(scene=nearest).isel(horizon=far)
+    chosen: dict[str, float | None] = {}
+    for place in ranking.cheapest(cell, accuracy, quantity):
+        if place.integrator in usable and len(chosen) < CANDIDATES:
+            row = cell.sel(integrator=place.integrator).isel(setting=place.setting)
+            chosen[place.integrator] = _setting(row, where, known[nearest])
+    if not chosen:
+        why = f"none met it on {nearest}, the nearest stored scene"
+        return everyone, f"tried all {len(everyone)} compiled methods ({why})"
     return chosen, f"tried the {len(chosen)} methods that are cheapest on {nearest}, the nearest stored scene"
 
 
-def _setting(row: xr.Dataset, place: int, where: Scene, stored: Scene) -> float:
+def _setting(row: xr.Dataset, where: Scene, stored: Scene) -> float:
     """A stored setting in the time scale of this scene."""
-    step = float(row["step_size"].values[place])
+    step = float(row["step_size"])
     if not math.isfinite(step):
-        return float(row["tolerance"].values[place])
+        return float(row["tolerance"])
     scale = where.nutation_period / stored.nutation_period
     return step * scale if math.isfinite(scale) and scale > 0.0 else step
 

@@ -1,4 +1,4 @@
-"""The command line: ``symtop integrators | scenes | run | long | study | claims | report | recommend | doctor | explore``.
+"""The command line: ``symtop integrators | scenes | run | long | study | claims | report | recommend | doctor | ...``.
 
 Exit codes: 0 fine; 1 a case or a check failed; 2 bad input, or a place that cannot be written; 3 a run ended early by
 its outcome (what it had was kept); 130 and 143 a study was interrupted or terminated (what was computed is kept).

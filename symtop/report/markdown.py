@@ -33,8 +33,17 @@ def section(study: Mapping[str, Any]) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
+def opening(study: Mapping[str, Any]) -> str:
+    """What a study has to say on the first screen; empty if nothing."""
+    first = study["opening"]
+    if not first:
+        return ""
+    said = "\n".join(f"- {sentence}" for sentence in first["sentences"])
+    return f"## {first['question']}\n\n{said}\n\n{table(first['table']['header'], first['table']['rows'])}"
+
+
 def page(studies: Sequence[Mapping[str, Any]], opening: Sequence[str], provenance: Mapping[str, str]) -> str:
     """The whole report; ``opening`` comes first, provenance last."""
     facts = table(["what", "which"], [[key, str(value)] for key, value in provenance.items()])
     body = [*opening, *(section(study) for study in studies), f"## Provenance\n\n{facts}"]
-    return "\n\n".join(body) + "\n"
+    return "\n\n".join(part for part in body if part) + "\n"

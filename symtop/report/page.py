@@ -95,6 +95,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
         except (OSError, KeyError, TypeError) as error:
             msg = f"the findings of {name} in {results} are incomplete ({error}); run it again: {_command(name)}"
             raise SymtopError(msg) from error
+        findings.setdefault("opening", None)
         findings["charts"] = [{**chart, "prepared": charts.prepared(chart)} for chart in findings.get("charts", [])]
         findings["dataset"] = f"{name}.nc" if (results / f"{name}.nc").is_file() else ""
         found.append(findings)
@@ -128,7 +129,10 @@ def write(results: Path) -> Path:
     )
     target = results / "report.html"
     store.write_text(target, text)
-    store.write_text(results / "report.md", markdown.page(studies, ["# " + TITLE, INTRODUCTION], facts))
+    store.write_text(
+        results / "report.md",
+        markdown.page(studies, ["# " + TITLE, INTRODUCTION, *map(markdown.opening, studies)], facts),
+    )
     return target
 
 

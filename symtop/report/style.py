@@ -135,8 +135,7 @@ def save(figure: Any, target: Path) -> None:
         figure.savefig(partial, metadata={"Software": None})
         if target.suffix == ".png":
             compact(partial)
-    if isinstance(figure, plt.Figure):
-        plt.close(figure)
+    plt.close(figure)
 
 
 def panels(rows: int, columns: int, width: float = 9.6, height: float = 3.4, **options: Any) -> Any:

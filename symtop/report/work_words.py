@@ -1,9 +1,14 @@
 """What the work-precision study says in words, all of it from the data."""
 
+from collections import Counter
+
 import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
+from symtop.measure.errors import QUANTITIES
+from symtop.measure.work import TARGETS
+from symtop.study.study import Chart, Opening, Series, Table
 
 STRUCTURE = ("midpoint", "trapezoidal", "stormer-verlet", "galerkin-simpson")
 CLASSIC = ("rk4", "rk45-compiled")
@@ -65,7 +70,6 @@ def crossings(data: xr.Dataset) -> list[str]:
                 continue
             top = max(won, key=lambda one: one.gain)
             reach = seconds(float(np.median([one.dearest_won for one in won])))
-            never = f", never on {', '.join(lost)}" if lost else ""
             parts.append(
                 f"{method} on {len(won)} of {len(found)} scenes, there up to {reach} a run (median), at best "
                 f"{top.gain:.2g} times on {top.scene} (error {top.error:.1g})"
@@ -86,3 +90,60 @@ def crossed(data: xr.Dataset) -> str:
         f"method is better at every cost in {sum(one.share == 1.0 for one in known)}, with coarse steps only in "
         f"{coarse}, with fine steps only in {fine}, and nowhere in {sum(one.share == 0.0 for one in known)}."
     )
+
+
+def opening(data: xr.Dataset) -> Opening:
+    """Which method to begin with: for each horizon and target the one closest to the fastest over all scenes."""
+    rows, sentences = [], []
+    names = [str(n) for n in data["integrator"].values if "compiled" in data["tier"].sel(integrator=n).values]
+    ahead: Counter[str] = Counter()
+    for far, span in enumerate(spans(data)):
+        table = ranking.relative(ranking.costs(data.isel(horizon=[far])), names).sel(integrator=names)
+        for number, target in enumerate(TARGETS):
+            ratios = table.isel(target=[number])
+            order = ranking.leaders(ratios, 3)
+            if not order:
+                rows.append([span, f"{target:.0e}", "none", "", "", ""])
+                continue
+            own = ratios.sel(integrator=order[0]).values.ravel()
+            solved = np.isfinite(own)
+            ahead[order[0]] += 1
+            usual, worst = float(np.median(own[solved])), float(own[solved].max())
+            share = f"{int(solved.sum())} of {own.size} scenes"
+            time = f"{usual:.2g} (worst {worst:.2g})"
+            rows.append([span, f"{target:.0e}", order[0], share, time, ", ".join(order[1:])])
+    if ahead:
+        best, times = ahead.most_common(1)[0]
+        others = ", ".join(f"{name} for {count}" for name, count in ahead.most_common()[1:])
+        sentences.append(
+            f"For the direction of the axis, begin with {best}: over all scenes it is closest to the fastest method for "
+            f"{times} of {len(rows)} pairs of horizon and accuracy" + (f"; {others}." if others else ".")
+        )
+    sentences.append(f"For energy {spans(data)[-1]}: {crossed(data)}")
+    sentences.append(
+        "For your own scene and accuracy: symtop recommend SCENE --accuracy 1e-6, which also tries it out."
+    )
+    header = ["horizon", "axis error", "begin with", "meets it on", "time over the fastest", "then"]
+    return Opening("Which integrator should I use?", sentences, Table("A method to begin with", header, rows))
+
+
+def charts(data: xr.Dataset) -> list[Chart]:
+    """Axis error against seconds, every run of every method: one panel a scene and horizon."""
+    panels = {}
+    for scene in data["scene"].values:
+        for far, span in enumerate(spans(data)):
+            cell = data.sel(scene=scene).isel(horizon=far)
+            names = [str(name) for name in cell["integrator"].values]
+            panels[f"{scene}, {span}"] = [_series(cell.sel(integrator=name), name) for name in names]
+    return [Chart("axis", "Point at the runs", "wall time of one run (s)", f"largest {QUANTITIES['axis']}", panels)]
+
+
+def _series(cell: xr.Dataset, name: str) -> Series:
+    keep = np.isfinite(cell["seconds"].values) & np.isfinite(cell["axis"].values) & (cell["outcome"].values == "ok")
+    points = []
+    for k in sorted(np.flatnonzero(keep), key=lambda k: cell["seconds"].values[k]):
+        step, tolerance = float(cell["step_size"].values[k]), float(cell["tolerance"].values[k])
+        knob = f"step {step:.3g}, " if np.isfinite(step) else f"tolerance {tolerance:.1e}, " * np.isfinite(tolerance)
+        time, error = float(f"{cell['seconds'].values[k]:.3g}"), float(f"{cell['axis'].values[k]:.3g}")
+        points.append((time, error, f"{knob}{seconds(time)}, error {error:.1e}"))
+    return Series(name, points)

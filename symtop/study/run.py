@@ -171,6 +171,7 @@ def _conclude(known: Round, stamp: str, *, quick: bool) -> dict[str, Any]:
 
 def findings_of(study: Study, data: xr.Dataset, results: Path, *, failures: list[str], cases: int) -> dict[str, Any]:
     """Draw a dataset and say what it shows, as the report wants it."""
+    opening = None if study.opening is None else study.opening(data)
     return {
         "study": study.name,
         "title": study.title,
@@ -179,6 +180,7 @@ def findings_of(study: Study, data: xr.Dataset, results: Path, *, failures: list
         "verdict": study.verdict(data),
         "tables": [table._asdict() for table in study.tables(data)],
         "charts": [chart._asdict() for chart in study.charts(data)],
+        "opening": None if opening is None else {**opening._asdict(), "table": opening.table._asdict()},
         "pictures": [_save(results, study, picture) for picture in study.pictures(data)],
         "failures": failures,
         "cases": cases,

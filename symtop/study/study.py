@@ -51,6 +51,14 @@ class Table(NamedTuple):
     rows: Sequence[Sequence[str]]
 
 
+class Opening(NamedTuple):
+    """What the page says first: an answer in sentences, and the table they come from."""
+
+    question: str
+    sentences: Sequence[str]
+    table: Table
+
+
 @dataclass(frozen=True)
 class Case:
     """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold.
@@ -84,6 +92,7 @@ class Study:
     verdict: Callable[[xr.Dataset], list[str]]
     tables: Callable[[xr.Dataset], list[Table]] = lambda _: []
     charts: Callable[[xr.Dataset], list[Chart]] = lambda _: []
+    opening: Callable[[xr.Dataset], Opening] | None = None  # for the first screen of the page
     full: Callable[[], list[Case]] | None = None  # a grid that takes much longer, for `--full`
     timed: bool = False  # all cases are
     follow_up: Callable[[xr.Dataset], list[Case]] | None = None  # a second round, made from what the first one found
