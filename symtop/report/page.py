@@ -129,10 +129,8 @@ def write(results: Path) -> Path:
     )
     target = results / "report.html"
     store.write_text(target, text)
-    store.write_text(
-        results / "report.md",
-        markdown.page(studies, ["# " + TITLE, INTRODUCTION, *map(markdown.opening, studies)], facts),
-    )
+    opening = ["# " + TITLE, INTRODUCTION, *map(markdown.opening, studies)]
+    store.write_text(results / "report.md", markdown.page(studies, opening, facts))
     return target
 
 

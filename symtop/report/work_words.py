@@ -116,12 +116,12 @@ def opening(data: xr.Dataset) -> Opening:
         best, times = ahead.most_common(1)[0]
         others = ", ".join(f"{name} for {count}" for name, count in ahead.most_common()[1:])
         sentences.append(
-            f"For the direction of the axis, begin with {best}: over all scenes it is closest to the fastest method for "
-            f"{times} of {len(rows)} pairs of horizon and accuracy" + (f"; {others}." if others else ".")
+            f"For the direction of the axis, begin with {best}: over all scenes it is closest to the fastest method "
+            f"for {times} of {len(rows)} pairs of horizon and accuracy" + (f"; {others}." if others else ".")
         )
     sentences.append(f"For energy {spans(data)[-1]}: {crossed(data)}")
     sentences.append(
-        "For your own scene and accuracy: symtop recommend SCENE --accuracy 1e-6, which also tries it out."
+        "For your own scene and accuracy: symtop recommend SCENE --accuracy 1e-6; it also tries out what it says."
     )
     header = ["horizon", "axis error", "begin with", "meets it on", "time over the fastest", "then"]
     return Opening("Which integrator should I use?", sentences, Table("A method to begin with", header, rows))
@@ -143,7 +143,9 @@ def _series(cell: xr.Dataset, name: str) -> Series:
     points = []
     for k in sorted(np.flatnonzero(keep), key=lambda k: cell["seconds"].values[k]):
         step, tolerance = float(cell["step_size"].values[k]), float(cell["tolerance"].values[k])
-        knob = f"step {step:.3g}, " if np.isfinite(step) else f"tolerance {tolerance:.1e}, " * np.isfinite(tolerance)
+        knob = (
+            f"step {step:.3g}, " if np.isfinite(step) else f"tolerance {tolerance:.1e}, " * bool(np.isfinite(tolerance))
+        )
         time, error = float(f"{cell['seconds'].values[k]:.3g}"), float(f"{cell['axis'].values[k]:.3g}")
         points.append((time, error, f"{knob}{seconds(time)}, error {error:.1e}"))
     return Series(name, points)
