@@ -17,7 +17,7 @@ from symtop.measure.verdicts import VERDICTS
 from symtop.report.atlas_words import Cell, cell
 from symtop.report.style import GREY, OUTCOME_COLORS, legend_below, look, panels, use
 
-RASTER = (150, 430)  # pixels of one map, about those it has in the figure
+RASTER = (110, 430)  # pixels of one map, about those it has in the figure
 SHADE = 0.72  # a hatch line is the same colour, darker
 WORDS = {
     "accurate": "accurate", "bounded_but_wrong": "bounded but wrong", "drifting": "drifting",
@@ -29,7 +29,7 @@ KNOBS = {"step_size": "step (nutation periods)", "tolerance": "tolerance", "none
 
 def _hatch(word: str, rows: Any, columns: Any) -> Any:
     """Which pixels of a raster the hatch of an outcome covers."""
-    down, up = (rows + columns) % 8 == 0, (rows - columns) % 8 == 0
+    down, up = (rows + columns) % 10 == 0, (rows - columns) % 10 == 0
     marks = {
         "left_chart": down,
         "wrong_regime": up,
@@ -147,7 +147,7 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
     use()
     grazed = any(cell(data, "grazing", name) is not None for name in names)
     figure, axes = plt.subplots(
-        len(names), 1 + grazed, figsize=(9.6, 1.9 * len(names) + 0.95), squeeze=False,
+        len(names), 1 + grazed, figsize=(8.4, 1.7 * len(names) + 0.95), squeeze=False,
         gridspec_kw={"width_ratios": [1.25, 1.0][: 1 + grazed]},
     )  # fmt: skip
     seen: set[int] = set()
@@ -174,14 +174,15 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
     ]  # fmt: skip
     if any(_knob(data, family, name) == "step_size" for name in names):
         lines = ((LIMIT, "linear limit"), (THIRD, "a third of a turn a step"), (PASSAGE, "one step passes the pole"))
-        handles += [Line2D([], [], color="black", lw=1.1, ls=dashes, label=word) for dashes, word in lines]
+        shown = lines if grazed else lines[:2]
+        handles += [Line2D([], [], color="black", lw=1.1, ls=dashes, label=word) for dashes, word in shown]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure
 
 
 def _caption(axis: Any, name: str, sentence: str) -> None:
     """The integrator's name, and below it its sentence, over a row of maps."""
-    lines = textwrap.wrap(sentence, 148)
+    lines = textwrap.wrap(sentence, 128)
     axis.set_title("\n".join(["", *lines]), loc="left", fontsize=8.0)
     axis.annotate(
         name, (0.0, 1.0), (0.0, 5.5 + 11.2 * len(lines)), xycoords="axes fraction", textcoords="offset points",
