@@ -74,7 +74,9 @@ def _name_regions(axis: Any, outcome: NDArray[np.uint8], extent: Sequence[float]
             continue
         x = extent[0] + (column + 0.5) / width * (extent[1] - extent[0])
         y = extent[2] + (row + 0.5) / height * (extent[3] - extent[2])
-        x = min(max(x, extent[0] + 0.09 * (extent[1] - extent[0])), extent[1] - 0.09 * (extent[1] - extent[0]))
+        for_word = 0.0085 * len(WORDS[VERDICTS[int(index)]])  # half the width of the text, of the map's
+        x = min(max(x, extent[0] + for_word * (extent[1] - extent[0])), extent[1] - for_word * (extent[1] - extent[0]))
+        y = min(max(y, extent[2] + 0.07 * (extent[3] - extent[2])), extent[3] - 0.07 * (extent[3] - extent[2]))
         dark = VERDICTS[int(index)] in ("not_finite", "not_converged", "accurate", "left_chart")
         axis.text(
             x, y, WORDS[VERDICTS[int(index)]], ha="center", va="center", fontsize=7.5, weight="bold",
@@ -229,6 +231,9 @@ def _pole(axis: Any, data: xr.Dataset) -> None:
     for name, style, at in _each(data):
         x, y = at["parameter_value"].values, at["grazing_error"].values
         axis.plot(x, y, style.marker + "-", color=style.color, ms=0.6 * style.size, markevery=4, lw=1.0, label=name)
+        gone = np.isfinite(x) & ~np.isfinite(y)
+        axis.plot(x[gone], np.full(int(gone.sum()), 1.0), "x", color=style.color, ms=4.0, mew=0.8)
+    axis.plot([], [], "x", color=GREY, ms=4.0, label="run ended early")
     axis.set(xscale="log", yscale="log", xlabel=r"gap $\delta$ to the pole", ylabel="largest axis error (rad)")
     axis.set_title("a pole next to the path")
 
