@@ -240,7 +240,10 @@ def _pole(axis: Any, data: xr.Dataset) -> None:
 
 def _resonance(axis: Any, data: xr.Dataset) -> None:
     for name, style, at in _each(data):
-        x, y = at["phase_value"].values, at["surviving"].values
+        # the resonance lies between two points of the grid
+        x = np.append(at["phase_value"].values, float(at["third_turn_phase"]))
+        y = np.append(at["surviving"].values, float(at["surviving_at_third_turn"]))
+        x, y = x[np.argsort(x)], y[np.argsort(x)]
         axis.plot(x, y, style.marker + "-", color=style.color, ms=0.6 * style.size, markevery=5, lw=1.0, label=name)
     for place, said in ((3.0**0.5, r"$\sqrt{3}$"), (2.0, "2"), (12.0**0.5, r"$2\sqrt{3}$")):
         axis.axvline(place, color=GREY, lw=0.8, ls=(0, (5, 3)), zorder=1)
