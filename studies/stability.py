@@ -110,7 +110,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     if set(SCANS) & set(map(str, data["scene"].values)):
         drawn.append(Picture(
             "mechanisms", atlas_figures.mechanisms(data),
-            "Six ways to fail, each measured alone. " + " ".join(mechanisms.mechanism_sentences(data)),
+            "Six ways to fail, each measured alone. " + " ".join(mechanisms.poles(data) + mechanisms.horizons(data)),
             "Six panels: pole grazing, resonances, sleeping threshold, separatrix, sampling, solver tolerance.",
         ))  # fmt: skip
     return drawn

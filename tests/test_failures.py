@@ -83,6 +83,14 @@ def test_F1_the_trapezoidal_rule_has_its_own_limit_and_the_midpoint_rule_none():
     assert trapezoidal_limit(SymmetricTop(1.0, 1.5, 2.0), 1.0, 1.0) == math.inf
 
 
+def test_F1_the_triple_jump_is_unstable_on_the_other_side():
+    """Yoshida's three Verlet steps leave |t| <= 2 upwards, at the known h omega = 1.573, long before t = -2."""
+    method = integrator("stormer-verlet-yoshida-4")
+    limit, _ = linear_limits(method, STEADY, np.linspace(0.05, 3.0, 60) / OMEGA)
+    assert limit * OMEGA == pytest.approx(1.573, abs=2e-3)
+    assert trace(method, STEADY, 1.02 * limit).trace > 2.0
+
+
 @pytest.mark.parametrize(("name", "turn"), [("stormer-verlet", math.asin), ("midpoint", math.atan)])
 def test_the_trace_is_that_of_the_discrete_nutation(name, turn):
     """Phase per step: 2 asin(h omega/2) for Verlet, 2 atan(h omega/2) for the midpoint rule."""

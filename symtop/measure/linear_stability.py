@@ -5,7 +5,7 @@ Near a steady precession the method's reduced map has a fixed point, and the inc
     theta_{k+1} - t theta_k + d theta_{k-1} = c,       fixed point c/(1 - t + d),     d = 1 for a symmetric method
 
 t is the trace of the linearised map. |t| <= 2: the discrete nutation turns by acos(t/2) a step; beyond, it grows.
-t = -2 is the linear limit, t = -1 a third of a turn a step, the resonance that leaves no neighbourhood of the fixed
+|t| = 2 is the linear limit, t = -1 a third of a turn a step, the resonance that leaves no neighbourhood of the fixed
 point (Moser; Verlet is there at h omega = sqrt 3 and the midpoint rule at 2 sqrt 3). So t(h), which four steps of any
 method show, has the limit and the resonances in it; nothing is assumed about how the method works.
 
@@ -70,7 +70,9 @@ class Trace(NamedTuple):
 
     @property
     def growth(self) -> float:
-        """Spectral radius."""
+        """Spectral radius; NaN if there is no fixed point."""
+        if not math.isfinite(self.trace):
+            return math.nan
         return float(np.max(np.abs(np.roots([1.0, -self.trace, self.determinant]))))
 
 
@@ -172,48 +174,38 @@ def sleeping_threshold(method: Integrator, h: float) -> float:
     return roots[-1] if roots else math.nan
 
 
+STEADILY = 1e-7  # t - 2 beyond rounding
+GROWING = 1e-4  # growth of a nutation per step that counts, for a method that is not symmetric
+
+
 def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[float, float]:
-    """Steps h of a grid at which the discrete nutation first turns by half a turn, and by a third of one; or NaN.
+    """Steps h of a grid at which small nutations first grow, and at which they first turn by a third of a turn; or NaN.
 
     Both at the steady precession of `scene`. A fixed point that is lost between two steps (an implicit equation without
     a solution, say) counts as the end of stability; a window narrower than the grid is not seen. Where a method is not
-    symmetric, nutations grow or shrink at every step, and the limit is where they begin to grow by 1e-4 a step.
+    symmetric, nutations grow or shrink at every step: there the limit is where they begin to grow by 1e-4 a step, and a
+    third of a turn has no meaning.
     """
-    if not method.symmetric:
-        return _growing(method, scene, grid), math.nan
-    values = np.array([trace(method, scene, float(h)).trace for h in grid])
+    found = [trace(method, scene, float(h)) for h in grid]
+
+    def unstable(at: Trace) -> bool:
+        if not method.symmetric:
+            return not at.growth <= 1.0 + GROWING
+        return not -2.0 <= at.trace <= 2.0 + STEADILY  # small steps have t just below 2, up to rounding
+
+    def turned(at: Trace) -> bool:
+        return at.trace <= -1.0
+
     ends = []
-    for level in (-2.0, -1.0):
-        good = np.isfinite(values)
-        below = np.flatnonzero(good & (values <= level))
-        lost = np.flatnonzero(~good)
-        first = min(below[0] if below.size else grid.size, lost[0] if lost.size else grid.size)
-        if first in (0, grid.size) or (level == -1.0 and not (below.size and below[0] == first)):
-            ends.append(math.nan)
-            continue
-        a, b = float(grid[first - 1]), float(grid[first])
-        for _ in range(40):
+    for happens in (unstable, turned):
+        first = next((k for k, at in enumerate(found) if happens(at)), 0)
+        a, b = (float(grid[first - 1]), float(grid[first])) if first else (math.nan, math.nan)
+        for _ in range(40 if first else 0):
             middle = 0.5 * (a + b)
-            a, b = (middle, b) if trace(method, scene, middle).trace > level else (a, middle)
+            a, b = (a, middle) if happens(trace(method, scene, middle)) else (middle, b)
         ends.append(0.5 * (a + b))
-    return ends[0], ends[1]
-
-
-def _growing(method: Integrator, scene: Scene, grid: np.ndarray) -> float:
-    """The step from which on small nutations grow; bisected between two steps of the grid."""
-
-    def grows(h: float) -> bool:
-        found = trace(method, scene, h)
-        return not math.isfinite(found.trace) or found.growth > 1.0001
-
-    first = next((k for k, h in enumerate(grid) if grows(float(h))), 0)
-    if first == 0:
-        return math.nan
-    a, b = float(grid[first - 1]), float(grid[first])
-    for _ in range(40):
-        middle = 0.5 * (a + b)
-        a, b = (a, middle) if grows(middle) else (middle, b)
-    return 0.5 * (a + b)
+    limit, third = ends
+    return limit, third if method.symmetric and not third > limit else math.nan
 
 
 def trapezoidal_limit(top: SymmetricTop, precession: float, theta: float) -> float:

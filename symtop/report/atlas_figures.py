@@ -17,7 +17,7 @@ from symtop.measure.verdicts import VERDICTS
 from symtop.report.atlas_words import Cell, cell
 from symtop.report.style import GREY, OUTCOME_COLORS, legend_below, look, panels, use
 
-RASTER = (150, 430)  # pixels of one map, about those it has in the figure
+RASTER = (110, 430)  # pixels of one map, about those it has in the figure
 SHADE = 0.72  # a hatch line is the same colour, darker
 WORDS = {
     "accurate": "accurate", "bounded_but_wrong": "bounded but wrong", "drifting": "drifting",
@@ -29,7 +29,7 @@ KNOBS = {"step_size": "step (nutation periods)", "tolerance": "tolerance", "none
 
 def _hatch(word: str, rows: Any, columns: Any) -> Any:
     """Which pixels of a raster the hatch of an outcome covers."""
-    down, up = (rows + columns) % 8 == 0, (rows - columns) % 8 == 0
+    down, up = (rows + columns) % 10 == 0, (rows - columns) % 10 == 0
     marks = {
         "left_chart": down,
         "wrong_regime": up,
@@ -74,7 +74,9 @@ def _name_regions(axis: Any, outcome: NDArray[np.uint8], extent: Sequence[float]
             continue
         x = extent[0] + (column + 0.5) / width * (extent[1] - extent[0])
         y = extent[2] + (row + 0.5) / height * (extent[3] - extent[2])
-        x = min(max(x, extent[0] + 0.09 * (extent[1] - extent[0])), extent[1] - 0.09 * (extent[1] - extent[0]))
+        for_word = 0.0085 * len(WORDS[VERDICTS[int(index)]])  # half the width of the text, of the map's
+        x = min(max(x, extent[0] + for_word * (extent[1] - extent[0])), extent[1] - for_word * (extent[1] - extent[0]))
+        y = min(max(y, extent[2] + 0.07 * (extent[3] - extent[2])), extent[3] - 0.07 * (extent[3] - extent[2]))
         dark = VERDICTS[int(index)] in ("not_finite", "not_converged", "accurate", "left_chart")
         axis.text(
             x, y, WORDS[VERDICTS[int(index)]], ha="center", va="center", fontsize=7.5, weight="bold",
@@ -147,7 +149,7 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
     use()
     grazed = any(cell(data, "grazing", name) is not None for name in names)
     figure, axes = plt.subplots(
-        len(names), 1 + grazed, figsize=(9.6, 1.9 * len(names) + 0.95), squeeze=False,
+        len(names), 1 + grazed, figsize=(8.4, 1.7 * len(names) + 0.95), squeeze=False,
         gridspec_kw={"width_ratios": [1.25, 1.0][: 1 + grazed]},
     )  # fmt: skip
     seen: set[int] = set()
@@ -174,14 +176,15 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
     ]  # fmt: skip
     if any(_knob(data, family, name) == "step_size" for name in names):
         lines = ((LIMIT, "linear limit"), (THIRD, "a third of a turn a step"), (PASSAGE, "one step passes the pole"))
-        handles += [Line2D([], [], color="black", lw=1.1, ls=dashes, label=word) for dashes, word in lines]
+        shown = lines if grazed else lines[:2]
+        handles += [Line2D([], [], color="black", lw=1.1, ls=dashes, label=word) for dashes, word in shown]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure
 
 
 def _caption(axis: Any, name: str, sentence: str) -> None:
     """The integrator's name, and below it its sentence, over a row of maps."""
-    lines = textwrap.wrap(sentence, 148)
+    lines = textwrap.wrap(sentence, 128)
     axis.set_title("\n".join(["", *lines]), loc="left", fontsize=8.0)
     axis.annotate(
         name, (0.0, 1.0), (0.0, 5.5 + 11.2 * len(lines)), xycoords="axes fraction", textcoords="offset points",
@@ -228,13 +231,19 @@ def _pole(axis: Any, data: xr.Dataset) -> None:
     for name, style, at in _each(data):
         x, y = at["parameter_value"].values, at["grazing_error"].values
         axis.plot(x, y, style.marker + "-", color=style.color, ms=0.6 * style.size, markevery=4, lw=1.0, label=name)
+        gone = np.isfinite(x) & ~np.isfinite(y)
+        axis.plot(x[gone], np.full(int(gone.sum()), 1.0), "x", color=style.color, ms=4.0, mew=0.8)
+    axis.plot([], [], "x", color=GREY, ms=4.0, label="run ended early")
     axis.set(xscale="log", yscale="log", xlabel=r"gap $\delta$ to the pole", ylabel="largest axis error (rad)")
     axis.set_title("a pole next to the path")
 
 
 def _resonance(axis: Any, data: xr.Dataset) -> None:
     for name, style, at in _each(data):
-        x, y = at["phase_value"].values, at["surviving"].values
+        # the resonance lies between two points of the grid
+        x = np.append(at["phase_value"].values, float(at["third_turn_phase"]))
+        y = np.append(at["surviving"].values, float(at["surviving_at_third_turn"]))
+        x, y = x[np.argsort(x)], y[np.argsort(x)]
         axis.plot(x, y, style.marker + "-", color=style.color, ms=0.6 * style.size, markevery=5, lw=1.0, label=name)
     for place, said in ((3.0**0.5, r"$\sqrt{3}$"), (2.0, "2"), (12.0**0.5, r"$2\sqrt{3}$")):
         axis.axvline(place, color=GREY, lw=0.8, ls=(0, (5, 3)), zorder=1)

@@ -124,7 +124,8 @@ def _use(found: Cell) -> str:
 
 def _fails(data: xr.Dataset, found: Cell, name: str) -> str:
     unit = " of a nutation" if found.knob_name == "step_size" else ""
-    said = [f"{_FATES[word]} from {at:.2g}{unit} on" for at, word in first_failures(found)[:2]]
+    knob = "" if unit else "a tolerance of "
+    said = [f"{_FATES[word]} from {knob}{at:.2g}{unit} on" for at, word in first_failures(found)[:2]]
     share = float(np.mean(found.outcome == BOUNDED_BUT_WRONG))
     if share > 0.05:
         said.append(f"is wrong without a sign in {share:.0%} of its map")
