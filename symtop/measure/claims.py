@@ -233,7 +233,7 @@ def _constant(claim: str, declared: str, run: long.LongRun, found: long.Constant
         why += f", growth exponent {found.exponent:.2f} +- {found.interval:.2f}"
         if kind == "drift":
             why += f", drifting by {found.rise / max(run.steps, 1):.1e} a step"
-    if kind in ("kept", "bounded") and run.outcome != "ok":
+    if run.outcome not in ("ok", "not_finite") or (kind in ("kept", "bounded") and run.outcome != "ok"):
         why += f"; but the run {run.message}"
         return Finding(claim, declared, measured, "undecided", why, found.largest, long.KEPT)
     if kind == "unknown":
