@@ -147,14 +147,12 @@ def _structure(method: Integrator, where: Scene, quick: bool, traces: dict[str, 
             defect = maps.symplectic_defect(step, start)
             gap = maps.restart_gap(step, start)
             brackets.append(_bracket(chart, defect, gap))
-            traces["width"], traces["bracket_defect"] = defect.widths, defect.raw
+            traces["defect_width"], traces["bracket_defect"] = defect.widths, defect.raw
             returns.append(_returned(chart, maps.return_miss(step, start), gap))
         except SymtopError as error:
             unknown = _Chart(chart, None, math.nan, math.nan, undecided("", "", str(error)).why)
             brackets.append(unknown)
             returns.append(unknown)
-    if "width" in traces:
-        traces["defect_width"] = traces.pop("width")
     return {
         "symplectic": _over_charts("symplectic", method.symplectic, brackets),
         "symmetric": _over_charts("symmetric", method.symmetric, returns),

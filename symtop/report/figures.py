@@ -268,7 +268,7 @@ def verdict_matrix(rows: Mapping[str, Sequence[Any]], claims: Sequence[str], sym
                 color="white" if bad else "black", fontweight="bold" if bad else "normal",
             )  # fmt: skip
     axis.set(xlim=(-0.5, len(claims) - 0.5), ylim=(len(rows) - 0.5, -0.5), yticks=range(len(rows)), yticklabels=rows)
-    axis.set_xticks(range(len(claims)), [claim.replace("_", " ") for claim in claims])
+    axis.set_xticks(range(len(claims)), claims)
     axis.tick_params(length=0, top=True, labeltop=True)
     axis.grid(visible=False)
     axis.spines[:].set_visible(False)
