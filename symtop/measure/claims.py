@@ -233,12 +233,12 @@ def _constant(claim: str, declared: str, run: long.LongRun, found: long.Constant
             why += f", drifting by {found.rise / max(run.steps, 1):.1e} a step"
     if run.outcome not in ("ok", "not_finite") or (kind in ("kept", "bounded") and run.outcome != "ok"):
         why += f"; but the run {run.message}"
-        return Finding(claim, declared, measured, "undecided", why, found.largest, long.KEPT)
+        return Finding(claim, declared, measured, "undecided", why, found.largest, found.floor)
     if kind == "unknown":
-        return Finding(claim, declared, measured, "undecided", f"the run {run.message}", found.largest, long.KEPT)
+        return Finding(claim, declared, measured, "undecided", f"the run {run.message}", found.largest, found.floor)
     true = {"kept": kind == "kept", "bounded": kind in ("kept", "bounded")}.get(declared)
     verdict = "measured" if true is None else "confirmed" if true else "refuted"
-    return Finding(claim, declared, measured, verdict, why, found.largest, long.KEPT)
+    return Finding(claim, declared, measured, verdict, why, found.largest, found.floor)
 
 
 def _invariant(method: Integrator, run: long.LongRun) -> Finding:
@@ -304,9 +304,8 @@ def _pole(method: Integrator) -> Finding:
         for one in found
     )  # fmt: skip
     judged = [one for one in found if one.chart != "angles"] or found
-    measured = ", ".join(
-        dict.fromkeys("passes" if one.passes else one.outcome.replace("ok", "wrong") for one in judged)
-    )
+    words = ["passes" if one.passes else "wrong" if one.outcome == "ok" else "ends there" for one in judged]
+    measured = ", ".join(dict.fromkeys(words))
     worst = max(one.finer for one in judged)
     if not declared:
         return Finding("pole", declared, measured, "measured", said, worst, long.POLE_RIGHT)
