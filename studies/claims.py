@@ -100,9 +100,9 @@ def tables(data: xr.Dataset) -> list[Table]:
         if one.verdict in ("refuted", "undecided")
     ]
     legend = ", ".join(f"{SYMBOLS[verdict]} {verdict}" for verdict in VERDICTS)
-    listed = [Table("What was refuted or left open, and why", ["integrator", "scene", "claim", "declared", "verdict", "why"], open_ones)]  # noqa: E501  # fmt: skip
-    header = ["integrator", *map(spoken, CLAIMS)]
-    return [Table(f"Declared | measured, and the verdict: {legend}", header, rows), *(listed if open_ones else [])]
+    whole = Table(f"Declared | measured, and the verdict: {legend}", ["integrator", *map(spoken, CLAIMS)], rows)
+    header = ["integrator", "scene", "claim", "declared", "verdict", "why"]
+    return [whole, Table("What was refuted or left open, and why", header, open_ones)] if open_ones else [whole]
 
 
 def _cell(one: Finding) -> str:
@@ -127,7 +127,8 @@ def verdict(data: xr.Dataset) -> list[str]:
         if np.isfinite(steps) and 0 < steps < data["steps_run"].max()
     ]
     if short:
-        sentences.append(f"The long run had fewer steps than the others' {int(data['steps_run'].max())} for {', '.join(short)}.")  # noqa: E501  # fmt: skip
+        most = int(data["steps_run"].max())
+        sentences.append(f"The long run had fewer steps than the others' {most} for {', '.join(short)}.")
     return sentences
 
 
