@@ -7,7 +7,7 @@ import xarray as xr
 
 from symtop.integrators.registry import integrator, integrators
 from symtop.measure.claims import SCENE, judge
-from symtop.measure.ledger import CLAIMS, VERDICTS, Finding, read
+from symtop.measure.ledger import CLAIMS, VERDICTS, Finding, read, spoken
 from symtop.report import figures, style
 from symtop.scenes import added_scenes, scene
 from symtop.study.study import Case, Picture, Study, Table
@@ -41,7 +41,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     count = Counter(one.verdict for row in rows.values() for one in row)
     matrix = Picture(
         "ledger",
-        figures.verdict_matrix(rows, CLAIMS, SYMBOLS),
+        figures.verdict_matrix(rows, [spoken(claim) for claim in CLAIMS], SYMBOLS),
         f"Every claim of every integrator: {_counted(count)}. The text of a cell is what was measured; grey cells "
         "claim nothing, white ones do not apply.",
         "A matrix of integrators and claims with a symbol for each verdict: "
@@ -94,15 +94,15 @@ def tables(data: xr.Dataset) -> list[Table]:
         for (where, name), row in found.items()
     ]
     open_ones = [
-        [name, where, one.claim.replace("_", " "), one.declared, one.verdict, one.why]
+        [name, where, spoken(one.claim), one.declared, one.verdict, one.why]
         for (where, name), row in found.items()
         for one in row
         if one.verdict in ("refuted", "undecided")
     ]
     legend = ", ".join(f"{SYMBOLS[verdict]} {verdict}" for verdict in VERDICTS)
-    listed = [Table("What was refuted or left open, and why", ["integrator", "scene", "claim", "declared", "verdict", "why"], open_ones)]  # noqa: E501  # fmt: skip
-    header = ["integrator", *(claim.replace("_", " ") for claim in CLAIMS)]
-    return [Table(f"Declared | measured, and the verdict: {legend}", header, rows), *(listed if open_ones else [])]
+    whole = Table(f"Declared | measured, and the verdict: {legend}", ["integrator", *map(spoken, CLAIMS)], rows)
+    header = ["integrator", "scene", "claim", "declared", "verdict", "why"]
+    return [whole, Table("What was refuted or left open, and why", header, open_ones)] if open_ones else [whole]
 
 
 def _cell(one: Finding) -> str:
@@ -118,7 +118,7 @@ def verdict(data: xr.Dataset) -> list[str]:
     sentences = [f"Of the claims of {len(found)} integrators, {_counted(count)}."]
     refuted = [one.sentence(name) for name, one in everything if one.verdict == "refuted"]
     sentences += refuted or ["No claim is refuted."]
-    unknown = [f"{one.claim} of {name}" for name, one in everything if one.verdict == "undecided"]
+    unknown = [f"{spoken(one.claim)} of {name}" for name, one in everything if one.verdict == "undecided"]
     if unknown:
         sentences.append(f"Undecided: {', '.join(unknown)}.")
     short = [
@@ -127,7 +127,8 @@ def verdict(data: xr.Dataset) -> list[str]:
         if np.isfinite(steps) and 0 < steps < data["steps_run"].max()
     ]
     if short:
-        sentences.append(f"The long run had fewer steps than the others' {int(data['steps_run'].max())} for {', '.join(short)}.")  # noqa: E501  # fmt: skip
+        most = int(data["steps_run"].max())
+        sentences.append(f"The long run had fewer steps than the others' {most} for {', '.join(short)}.")
     return sentences
 
 

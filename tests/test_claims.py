@@ -106,15 +106,16 @@ WAVE = 1e-5 * np.sin(37.1 * TIME)  # not commensurate with the samples
         (1e-9 * TIME, "drift"),
         (1e-7 * np.sqrt(TIME) * np.sin(37.1 * TIME), "random walk"),
         (np.full(4001, np.nan), "unknown"),
+        (np.where(TIME > 4.0, 1e-15 * 500.0 * TIME, 0.0), "drift"),  # 1e-15 a step, 2 ms each
     ],
 )
 def test_kinds_of_growth(residual, kind):
-    assert long._judged(TIME, residual, residual[:100]).kind == kind
+    assert long._judged(TIME, residual, residual[:100], 1_000_000).kind == kind
 
 
 def test_a_wave_with_noise_is_never_a_drift():
     draw = np.random.default_rng(5)
-    kinds = [long._judged(TIME, WAVE + 1e-6 * draw.standard_normal(TIME.size), WAVE).kind for _ in range(200)]
+    kinds = [long._judged(TIME, WAVE + 1e-6 * draw.standard_normal(TIME.size), WAVE, 1).kind for _ in range(200)]
     assert set(kinds) == {"bounded"}
 
 

@@ -147,14 +147,12 @@ def _structure(method: Integrator, where: Scene, quick: bool, traces: dict[str, 
             defect = maps.symplectic_defect(step, start)
             gap = maps.restart_gap(step, start)
             brackets.append(_bracket(chart, defect, gap))
-            traces["width"], traces["bracket_defect"] = defect.widths, defect.raw
+            traces["defect_width"], traces["bracket_defect"] = defect.widths, defect.raw
             returns.append(_returned(chart, maps.return_miss(step, start), gap))
         except SymtopError as error:
             unknown = _Chart(chart, None, math.nan, math.nan, undecided("", "", str(error)).why)
             brackets.append(unknown)
             returns.append(unknown)
-    if "width" in traces:
-        traces["defect_width"] = traces.pop("width")
     return {
         "symplectic": _over_charts("symplectic", method.symplectic, brackets),
         "symmetric": _over_charts("symmetric", method.symmetric, returns),
@@ -233,14 +231,14 @@ def _constant(claim: str, declared: str, run: long.LongRun, found: long.Constant
         why += f", growth exponent {found.exponent:.2f} +- {found.interval:.2f}"
         if kind == "drift":
             why += f", drifting by {found.rise / max(run.steps, 1):.1e} a step"
-    if kind in ("kept", "bounded") and run.outcome != "ok":
+    if run.outcome not in ("ok", "not_finite") or (kind in ("kept", "bounded") and run.outcome != "ok"):
         why += f"; but the run {run.message}"
-        return Finding(claim, declared, measured, "undecided", why, found.largest, long.KEPT)
+        return Finding(claim, declared, measured, "undecided", why, found.largest, found.floor)
     if kind == "unknown":
-        return Finding(claim, declared, measured, "undecided", f"the run {run.message}", found.largest, long.KEPT)
+        return Finding(claim, declared, measured, "undecided", f"the run {run.message}", found.largest, found.floor)
     true = {"kept": kind == "kept", "bounded": kind in ("kept", "bounded")}.get(declared)
     verdict = "measured" if true is None else "confirmed" if true else "refuted"
-    return Finding(claim, declared, measured, verdict, why, found.largest, long.KEPT)
+    return Finding(claim, declared, measured, verdict, why, found.largest, found.floor)
 
 
 def _invariant(method: Integrator, run: long.LongRun) -> Finding:
@@ -306,9 +304,8 @@ def _pole(method: Integrator) -> Finding:
         for one in found
     )  # fmt: skip
     judged = [one for one in found if one.chart != "angles"] or found
-    measured = ", ".join(
-        dict.fromkeys("passes" if one.passes else one.outcome.replace("ok", "wrong") for one in judged)
-    )
+    words = ["passes" if one.passes else "wrong" if one.outcome == "ok" else "ends there" for one in judged]
+    measured = ", ".join(dict.fromkeys(words))
     worst = max(one.finer for one in judged)
     if not declared:
         return Finding("pole", declared, measured, "measured", said, worst, long.POLE_RIGHT)

@@ -32,6 +32,7 @@ NUTATIONS = 1.37  # length of the runs that the slope is fitted to
 FALLBACK, LONGER = "goldstein", (40.0, 400.0)
 FINEST = {"compiled": 2e5, "python": 1e4}  # steps of the longest run
 DENSE, DECADES = 10, 2.0
+FURTHER = 0.5  # an error that does not fall must not ask for a million times the steps
 SHARE = 0.37  # of a nutation: length of the runs that are extrapolated to h = 0
 STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
 ROUNDING = 1e-11  # a limit as close as this is the true motion
@@ -105,7 +106,8 @@ def _asymptotic(method: Integrator, found: Order) -> list[float]:
         return []
     finest = good[np.argmin(found.step_size[good])]
     power = method.order or 2
-    first = float(found.step_size[finest] * (20.0 * found.bound[finest] / found.error[finest]) ** (1.0 / power))
+    further = (20.0 * found.bound[finest] / found.error[finest]) ** (1.0 / power)
+    first = float(found.step_size[finest]) * max(float(further), FURTHER)
     return [first * 10.0 ** (DECADES / power * k / (DENSE - 1)) for k in range(DENSE)]
 
 

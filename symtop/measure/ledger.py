@@ -5,6 +5,7 @@ why). `value` is the number that a verdict rests on, `resolution` the least that
 """
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,11 @@ CLAIMS = (
 )  # fmt: skip
 VERDICTS = ("confirmed", "refuted", "measured", "undecided", "inapplicable")
 LONGEST = 240  # characters of somebody else's error message
+
+
+def spoken(claim: str) -> str:
+    """The name of a claim in a sentence or a heading."""
+    return claim if claim.startswith("p_") else claim.replace("_", " ")
 
 
 class Finding(NamedTuple):
@@ -32,7 +38,7 @@ class Finding(NamedTuple):
     def sentence(self, name: str) -> str:
         """The verdict in words."""
         said = f"claims {self.declared}" if self.declared else "claims nothing"
-        return f"{name}, {self.claim.replace('_', ' ')}: {said}; {self.verdict}: {self.why}."
+        return f"{name}, {spoken(self.claim)}: {said}; {self.verdict}: {self.why}."
 
     def plain(self) -> dict[str, str | float | None]:
         """The finding as JSON can hold it: no number is null."""
@@ -48,7 +54,8 @@ def undecided(claim: str, declared: str, why: str) -> Finding:
     return Finding(claim, declared, "", "undecided", short.rstrip("."))
 
 
-class Ledger(NamedTuple):
+@dataclass(frozen=True)
+class Ledger:
     """Everything the battery found about one integrator."""
 
     integrator: str
@@ -56,7 +63,7 @@ class Ledger(NamedTuple):
     findings: tuple[Finding, ...]
     traces: dict[str, np.ndarray]  # errors by step, defects by differencing width, length of the long run
 
-    def __getitem__(self, claim: str) -> Finding:  # type: ignore[override]
+    def __getitem__(self, claim: str) -> Finding:
         return next(found for found in self.findings if found.claim == claim)
 
     def sentences(self) -> list[str]:

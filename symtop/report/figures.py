@@ -197,11 +197,11 @@ def verdict_matrix(rows: Mapping[str, Sequence[Any]], claims: Sequence[str], sym
             said = f"{one.declared} | {one.measured}" if bad else one.measured
             said = f"{symbols[one.verdict]} {said}".replace(" +- ", "±").rstrip()
             axis.text(
-                column, line, said, ha="center", va="center", fontsize=min(7.5, 130.0 / len(said)),
+                column, line, said, ha="center", va="center", fontsize=min(7.5, (108.0 if bad else 130.0) / len(said)),
                 color="white" if bad else "black", fontweight="bold" if bad else "normal",
             )  # fmt: skip
     axis.set(xlim=(-0.5, len(claims) - 0.5), ylim=(len(rows) - 0.5, -0.5), yticks=range(len(rows)), yticklabels=rows)
-    axis.set_xticks(range(len(claims)), [claim.replace("_", " ") for claim in claims])
+    axis.set_xticks(range(len(claims)), claims)
     axis.tick_params(length=0, top=True, labeltop=True)
     axis.grid(visible=False)
     axis.spines[:].set_visible(False)
