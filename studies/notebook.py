@@ -33,6 +33,7 @@ from symtop.measure.notebook import (
     figures_kept,
     film_table,
     notebook_path,
+    notebook_top,
     residual_history,
     shadow_table,
 )
@@ -342,8 +343,10 @@ def verdict(data: xr.Dataset) -> list[str]:
         for method in data["integrator"].values
         if method != SOLVER and float(cell(data, "spheroid", method)["energy_largest"]) < float(here["energy_largest"])
     ]
+    top, (polar, equatorial) = notebook_top()
     reproduced = (
-        f"Reproduced: mgl = {scene('spheroid').top.mgl:.4f}, and with an LSODA solver {_figures_words(data)} to t = 8; "
+        f"Reproduced: the spheroid of radii {polar:.5f} and {equatorial:.5f} has I1 = {top.I1:g} and I3 = {top.I3:g} "
+        f"and back, mgl = {top.mgl:.4f}; with an LSODA solver {_figures_words(data)} to t = 8; "
         f"both derivations agree to {float(data['ways_gap'].max()):.0e} rad, and both energies to "
         f"{float(data['energy_gap'].max()):.0e} once E1 = E - p_psi^2/2 I3."
     )
@@ -356,8 +359,8 @@ def verdict(data: xr.Dataset) -> list[str]:
     momenta = (
         "The momenta of every discrete method are conserved to rounding at any step. A discrete Lagrangian that does "
         "not change with phi and psi has Noether's theorem exactly, p_phi = D2 L_d = -D1 L_d, and a splitting has it "
-        f"because each of its parts has the symmetry (largest relative change {_worst(data, 'p_phi', 'p_psi'):.0e}; the "
-        f"solver's {max(float(here[f'{name}_largest']) for name in ('p_phi', 'p_psi')):.0e})."
+        f"because each of its parts has the symmetry (largest relative change {_worst(data, 'p_phi', 'p_psi'):.0e}; "
+        f"the solver's {max(float(here[f'{name}_largest']) for name in ('p_phi', 'p_psi')):.0e})."
     )
     energy = (
         f"Their energy is bounded, not small: at 118 steps a nutation {len(beaten)} of "

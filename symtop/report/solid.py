@@ -100,4 +100,6 @@ class Film(Figure):
         ours = [value for color in (*TRIAD, GREY, BLACK, "#FFFFFF") for value in getrgb(color)]
         palette.putpalette((ours + (frames[-1].quantize(26).getpalette() or []))[: 3 * 32])
         shown = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-        shown[0].save(fname, save_all=True, append_images=shown[1:], duration=self._pause, loop=0, optimize=True)
+        shown[0].save(
+            fname, format="GIF", save_all=True, append_images=shown[1:], duration=self._pause, loop=0, optimize=True
+        )

@@ -72,11 +72,16 @@ async function ask() {
   if (asking) { stale = true; return; }
   asking = true;
   const began = performance.now();
+  const patience = setTimeout(() => {
+    $("status").textContent = `${values.integrator}: computing; the first run of a method compiles it`;
+  }, 400);
   try {
     const response = await post("run");
     const found = await response.json();
+    clearTimeout(patience);
     if (found.error) refuse(found.error); else show(found, began);
   } catch {
+    clearTimeout(patience);
     refuse("the explorer's server does not answer; is symtop explore still running?");
   }
   asking = false;
