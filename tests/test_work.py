@@ -221,6 +221,7 @@ def cell(samples, errors=None, tiers=None, races=None):
                 ("integrator", "setting"),
                 np.full((count, 1), 1.0) if races is None else np.array(races)[:, None],
             ),
+            "force_evaluations": (("integrator", "setting"), np.full((count, 1), 100.0)),
             "axis": (("integrator", "setting"), errors[:, None]),
             "outcome": (("integrator", "setting"), np.full((count, 1), "ok")),
             "tier": (("integrator", "setting"), np.array(tiers or ["compiled"] * count)[:, None]),

@@ -68,8 +68,7 @@ def crossings(data: xr.Dataset) -> list[str]:
             never = f", never on {', '.join(lost)}" if lost else ""
             parts.append(
                 f"{method} on {len(won)} of {len(found)} scenes, there up to {reach} a run (median), at best "
-                f"{top.gain:.2g} times on {top.scene} (error {top.error:.1g})"
-                + (f", never on {', '.join(lost)}" if lost else "")
+                f"{top.gain:.2g} times on {top.scene} (error {top.error:.1g}){never}"
             )
         sentences.append(f"At equal cost energy is kept better than by {classic}: by " + "; by ".join(parts) + ".")
     return sentences
