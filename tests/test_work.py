@@ -13,7 +13,7 @@ from symtop.measure import ranking
 from symtop.measure.phase import phase, split
 from symtop.measure.race import Entry, anchors, entries, field, line, race
 from symtop.measure.timing import timings
-from symtop.measure.work import TARGETS, Walk, work_table
+from symtop.measure.work import TARGETS, Walk, spans, work_table
 from symtop.reference import reference
 from symtop.scenes import closed_form
 from symtop.study import run as runner
@@ -148,6 +148,14 @@ def test_attitude_errors_come_from_a_chart_that_shows_them():
     row = work_table(where, method, [5.0], 2e4).isel(horizon=0)
     assert np.isfinite(row["attitude"].values[0])
     assert row["attitude"].values[0] >= 0.5 * row["axis"].values[0]
+
+
+def test_a_separatrix_has_spans_too():
+    top, third = symtop.SymmetricTop(1.0, 1.0, 1.0), 1.0 / math.sqrt(3.0)
+    edge = symtop.Scene("edge", top, symtop.Angles(theta=math.pi / 3, phi_dot=2 * third, psi_dot=2 * third), 10.0)
+    assert all(math.isfinite(span) for span in spans(edge, [10.0, 100.0]))
+    where = symtop.scene("fast")
+    assert spans(where, [10.0]) == [10.0 * where.nutation_period]
 
 
 def entry(name, far=0, place=0, work=100.0, targets=()):
