@@ -170,9 +170,11 @@ def test_a_line_of_cost_goes_through_two_runs_and_never_pays_for_starting():
 
 def test_anchors_are_a_short_and_a_longer_run_near_a_target():
     runs = [entry("a", place=k, work=10.0**k, targets=[0] if k in (2, 4) else []) for k in range(8)]
-    assert [run.place for run in anchors(runs, "compiled")] == [2, 4]
+    assert [run.place for run in anchors(runs, "compiled")] == [0, 4]
     alone = [entry("a", place=k, work=10.0**k, targets=[0] if k == 2 else []) for k in range(8)]
-    assert [run.place for run in anchors(alone, "compiled")] == [2, 5]
+    assert [run.place for run in anchors(alone, "compiled")] == [0, 2]
+    coarse = [entry("a", place=k, work=10.0**k, targets=[0] if k == 0 else []) for k in range(8)]
+    assert [run.place for run in anchors(coarse, "compiled")] == [0, 5]
 
 
 def test_the_field_of_a_race_is_whoever_may_win():

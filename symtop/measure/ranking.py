@@ -1,14 +1,14 @@
 """Who is fastest at an accuracy, and whether the lead is more than noise.
 
-The cost of a target is that of the run that met it with the fewest force evaluations. Two methods are compared by the
-ratios of their samples round by round, which were taken within a second or two of each other: a slow spell of the
-machine hits both. A lead is sure if every round agrees on it and both its median and the ratio of the smallest samples
-are at least `MARGIN`, because the same code in another process, elsewhere in memory, may differ by some per cent;
-otherwise the two are level. A rival that was not timed itself, because it was foreseen behind, is behind for sure if it
-is so by `FAR`.
+The cost of a target is that of a method's fastest raced run that met it, or of its run of least work if none was raced.
+Two methods are compared by the ratios of their samples round by round, which were taken within a second or two of each
+other: a slow spell of the machine hits both. A lead is sure if every round agrees on it and both its median and the
+ratio of the smallest samples are at least `MARGIN`, because the same code in another process, elsewhere in memory, may
+differ by some per cent; otherwise the two are level. A rival that was not timed itself, because it was foreseen behind,
+is behind for sure if it is so by `FAR`.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -59,7 +59,7 @@ def cheapest(
 ) -> list[Place]:
     """Methods that meet a target, cheapest first; `cell` is one scene and one horizon of the study's dataset.
 
-    Each takes part with its run of the fewest force evaluations, whatever the cost: the one that was raced.
+    Each takes part with the fastest of its runs that were raced, or, if none was, with that of the least work.
     """
     found = []
     for name in cell["integrator"].values:
@@ -67,11 +67,20 @@ def cheapest(
         good = meeting(own, target, quantity) & (own["outcome"].values == "ok") & np.isfinite(own[cost].values)
         if not good.any():
             continue
-        k = int(np.argmin(np.where(good, own["force_evaluations"].values, np.inf)))
+        raced = good & (own["seconds_race"].values > 0.0)
+        k = (
+            _least(raced, own["seconds"])
+            if raced.any() and cost == "seconds"
+            else _least(good, own["force_evaluations"])
+        )
         kind = str(own["tier"].values.flat[0])
         if tier in (None, kind):
             found.append(Place(float(own[cost].values[k]), str(name), kind, k, float(own[quantity].values[k])))
     return sorted(found)
+
+
+def _least(good: Any, values: xr.DataArray) -> int:
+    return int(np.argmin(np.where(good, values.values, np.inf)))
 
 
 def lead(cell: xr.Dataset, first: Place, second: Place) -> Lead:
