@@ -195,7 +195,7 @@ def verdict(data: xr.Dataset) -> list[str]:
     slow = [str(m) for m in data["integrator"].values if "python" in data["tier"].sel(integrator=m).values]
     if slow:
         sentences.append(
-            f"Only compiled methods are ranked. Those with an inner loop in plain Python ({', '.join(slow)}) are ranked "
+            f"Only compiled methods are ranked. Those in plain Python ({', '.join(slow)}) are ranked "
             "among themselves in the table; compare them with the rest by force evaluations."
         )
     timed, known = data["seconds_timed"].values == 1.0, np.isfinite(data["seconds"].values)
