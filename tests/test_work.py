@@ -257,6 +257,13 @@ def test_a_slow_spell_that_hits_a_whole_round_does_not_blur_a_lead():
     assert not apart.reliable  # samples of different races are no pairs
 
 
+def test_a_rival_that_was_only_foreseen_is_behind_by_no_less_than_forecasts_miss():
+    data = cell([[1.0] * 3, [2.0] * 3], races=[1.0, 0.0])
+    assert ranking.win(data, 1e-6).reliable
+    doubtful = data.assign(foreseen_miss=("integrator", [1.5, np.nan]))
+    assert ranking.win(doubtful, 1e-6).level == ("b",)
+
+
 def test_plain_python_is_ranked_apart_and_a_failure_does_not_win():
     data = cell([[0.1] * 3, [1.0] * 3, [0.5] * 3], errors=[1e-7, 1e-7, 1e-4], tiers=["python", "compiled", "compiled"])
     assert ranking.win(data, 1e-6).best.integrator == "b"
