@@ -254,6 +254,8 @@ def test_a_slow_spell_that_hits_a_whole_round_does_not_blur_a_lead():
     won = ranking.win(cell([[1.0, 3.0, 1.0], [1.3, 4.0, 1.3]]), 1e-6)
     assert won.reliable
     apart = ranking.win(cell([[1.0, 3.0, 1.0], [1.3, 4.0, 1.3]], races=[1.0, 2.0]), 1e-6)
+    restless = ranking.win(cell([[1.0, 1.0, 1.0], [1.3, 5.0, 6.0]]), 1e-6)
+    assert not restless.reliable
     assert not apart.reliable  # samples of different races are no pairs
 
 

@@ -2,7 +2,8 @@
 
 The cost of a target is that of a method's fastest raced run that met it, or of its run of least work if none was raced.
 Two methods are compared by the ratios of their samples round by round, which were taken within a second or two of each
-other: a slow spell of the machine hits both. A lead is sure if every round agrees on it and both its median and the
+other: a slow spell of the machine hits both.
+A lead is sure if both methods' samples are steady (see `timing`), every round agrees on it, and both its median and the
 ratio of the smallest samples are at least `MARGIN`, because the same code in another process, elsewhere in memory, may
 differ by some per cent; otherwise the two are level. A rival that was not timed itself, because it was foreseen behind,
 is behind for sure if it is so by `FAR` and by more than any forecast on that scene was seen to miss.
@@ -14,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.race import WITHIN
+from symtop.measure.timing import NOISY
 from symtop.measure.work import TARGETS, meeting
 
 MARGIN = 1.1
@@ -101,7 +103,8 @@ def lead(cell: xr.Dataset, first: Place, second: Place) -> Lead:
         return Lead(ratio, np.nan, np.nan, bool(ratio >= max(FAR, MARGIN * (1.0 + _worst_miss(cell)))))
     ratios = theirs[both] / ours[both]
     middle, low, high = float(np.median(ratios)), float(ratios.min()), float(ratios.max())
-    return Lead(middle, low, high, low > 1.0 and min(middle, second.cost / first.cost) >= MARGIN)
+    steady = all(np.median(row[both]) < (1.0 + NOISY) * row[both].min() for row in (ours, theirs))
+    return Lead(middle, low, high, bool(steady and low > 1.0 and min(middle, second.cost / first.cost) >= MARGIN))
 
 
 def win(
