@@ -13,7 +13,7 @@ from symtop.measure import ranking
 from symtop.measure.phase import phase, split
 from symtop.measure.race import Entry, anchors, entries, field, line, race
 from symtop.measure.timing import timings
-from symtop.measure.work import TARGETS, Walk, work_table
+from symtop.measure.work import TARGETS, Walk, spans, work_table
 from symtop.reference import reference
 from symtop.scenes import closed_form
 from symtop.study import run as runner
@@ -150,6 +150,14 @@ def test_attitude_errors_come_from_a_chart_that_shows_them():
     assert row["attitude"].values[0] >= 0.5 * row["axis"].values[0]
 
 
+def test_a_separatrix_has_spans_too():
+    top, third = symtop.SymmetricTop(1.0, 1.0, 1.0), 1.0 / math.sqrt(3.0)
+    edge = symtop.Scene("edge", top, symtop.Angles(theta=math.pi / 3, phi_dot=2 * third, psi_dot=2 * third), 10.0)
+    assert all(math.isfinite(span) for span in spans(edge, [10.0, 100.0]))
+    where = symtop.scene("fast")
+    assert spans(where, [10.0]) == [10.0 * where.nutation_period]
+
+
 def entry(name, far=0, place=0, work=100.0, targets=()):
     return Entry(name, far, place, 0.1, work, tuple(targets))
 
@@ -162,9 +170,11 @@ def test_a_line_of_cost_goes_through_two_runs_and_never_pays_for_starting():
 
 def test_anchors_are_a_short_and_a_longer_run_near_a_target():
     runs = [entry("a", place=k, work=10.0**k, targets=[0] if k in (2, 4) else []) for k in range(8)]
-    assert [run.place for run in anchors(runs, "compiled")] == [2, 4]
+    assert [run.place for run in anchors(runs, "compiled")] == [0, 4]
     alone = [entry("a", place=k, work=10.0**k, targets=[0] if k == 2 else []) for k in range(8)]
-    assert [run.place for run in anchors(alone, "compiled")] == [2, 5]
+    assert [run.place for run in anchors(alone, "compiled")] == [0, 2]
+    coarse = [entry("a", place=k, work=10.0**k, targets=[0] if k == 0 else []) for k in range(8)]
+    assert [run.place for run in anchors(coarse, "compiled")] == [0, 5]
 
 
 def test_the_field_of_a_race_is_whoever_may_win():
@@ -221,6 +231,7 @@ def cell(samples, errors=None, tiers=None, races=None):
                 ("integrator", "setting"),
                 np.full((count, 1), 1.0) if races is None else np.array(races)[:, None],
             ),
+            "force_evaluations": (("integrator", "setting"), np.full((count, 1), 100.0)),
             "axis": (("integrator", "setting"), errors[:, None]),
             "outcome": (("integrator", "setting"), np.full((count, 1), "ok")),
             "tier": (("integrator", "setting"), np.array(tiers or ["compiled"] * count)[:, None]),
@@ -243,7 +254,16 @@ def test_a_slow_spell_that_hits_a_whole_round_does_not_blur_a_lead():
     won = ranking.win(cell([[1.0, 3.0, 1.0], [1.3, 4.0, 1.3]]), 1e-6)
     assert won.reliable
     apart = ranking.win(cell([[1.0, 3.0, 1.0], [1.3, 4.0, 1.3]], races=[1.0, 2.0]), 1e-6)
+    restless = ranking.win(cell([[1.0, 1.0, 1.0], [1.3, 5.0, 6.0]]), 1e-6)
+    assert not restless.reliable
     assert not apart.reliable  # samples of different races are no pairs
+
+
+def test_a_rival_that_was_only_foreseen_is_behind_by_no_less_than_forecasts_miss():
+    data = cell([[1.0] * 3, [2.0] * 3], races=[1.0, 0.0])
+    assert ranking.win(data, 1e-6).reliable
+    doubtful = data.assign(foreseen_miss=("integrator", [1.5, np.nan]))
+    assert ranking.win(doubtful, 1e-6).level == ("b",)
 
 
 def test_plain_python_is_ranked_apart_and_a_failure_does_not_win():

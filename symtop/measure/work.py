@@ -26,8 +26,8 @@ Row = dict[str, Any]
 
 QUANTITY_LABELS = {**QUANTITIES, **FREQUENCIES}  # the eight quantities an accuracy is asked in
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
-DECADES = 1.6  # of error between neighbours of the first walk
-NOTCHES = 2.0  # decades of tolerance likewise
+DECADES = 1.9  # of error between neighbours of the first walk
+NOTCHES = 2.5  # decades of tolerance likewise
 CLOSE = 0.6  # an error between CLOSE times the target and the target is near enough
 AIM = 0.85
 REFINEMENTS = 2
@@ -36,6 +36,12 @@ MOST = 24  # runs of one walk
 FLAT = 1.5  # two steps in a row that gain less than this, below `ROUNDED`, have met rounding
 ROUNDED = 1e-8
 STOPS = ("all targets met", "rounding", "budget", "least tolerance", "nothing to set", "too many runs")
+
+
+def spans(scene: Scene, periods: Sequence[float]) -> list[float]:
+    """Times of so many nutation periods; on a separatrix, of so many tenths of the scene's horizon."""
+    period = scene.nutation_period if math.isfinite(scene.nutation_period) else 0.1 * scene.horizon
+    return [count * period for count in periods]
 
 
 def first_setting(method: Integrator, scene: Scene, horizon: float) -> float:

@@ -65,6 +65,9 @@ def crossings(data: xr.Dataset) -> list[str]:
             found = [one for cell in cells if (one := ranking.crossing(cell, method, classic))]
             won = [one for one in found if one.share > 0.0]
             lost = [one.scene for one in found if one.share == 0.0]
+            if not found:
+                parts.append(f"{method} nowhere, as no costs are common")
+                continue
             if not won:
                 parts.append(f"{method} on none of {len(found)} scenes")
                 continue
@@ -72,8 +75,7 @@ def crossings(data: xr.Dataset) -> list[str]:
             reach = seconds(float(np.median([one.dearest_won for one in won])))
             parts.append(
                 f"{method} on {len(won)} of {len(found)} scenes, there up to {reach} a run (median), at best "
-                f"{top.gain:.2g} times on {top.scene} (error {top.error:.1g})"
-                + (f", never on {', '.join(lost)}" if lost else "")
+                f"{top.gain:.2g} times on {top.scene} (error {top.error:.1g}){never}"
             )
         sentences.append(f"At equal cost energy is kept better than by {classic}: by " + "; by ".join(parts) + ".")
     return sentences
