@@ -2,7 +2,8 @@
 integrators.
 
 The mass is 1 and the centre of gravity a tenth of sqrt(I1) from the joint. The target accuracy is the knob; the
-largest step is a tenth of a nutation. Drake stops at every time it is asked for, so its accuracy is judged at its own steps.
+largest step is a tenth of a nutation. Drake stops at every time it is asked for, so its accuracy is judged at its own
+steps.
 """
 
 import functools
