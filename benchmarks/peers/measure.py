@@ -36,6 +36,7 @@ RUNGS, HALVINGS = 11, 3
 ENOUGH = 0.1 * TARGETS[-1]  # no finer setting is tried below this error
 PATIENCE = 0.6  # seconds of one run after which no finer setting is tried
 BATCHES, BATCH = 8, 0.006
+LONG = 0.2  # processor seconds of a run that is timed only if it meets a target
 CONTENDERS = 3  # of our methods for each target, by a rough timing
 OURS, HEYOKA = "symtop", "heyoka"
 
@@ -99,11 +100,11 @@ def search(scene: Scene, method: Integrator, targets: Sequence[float] = TARGETS)
 
 
 def worth_timing(points: Sequence[Point], targets: Sequence[float] = TARGETS) -> list[Point]:
-    """Points that no looser setting beats, and the loosest ones that meet a target."""
+    """Points that no looser setting beats, the long ones left out, and the loosest ones that meet a target."""
     best, kept = math.inf, []
     for point in points:
         meets = any(point.error <= target < best for target in targets)
-        if math.isfinite(point.error) and (meets or point.error < 0.3 * best):
+        if math.isfinite(point.error) and (meets or (point.error < 0.3 * best and point.seconds < LONG)):
             kept.append(point)
             best = min(best, point.error)
     return kept
