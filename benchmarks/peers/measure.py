@@ -82,7 +82,9 @@ def ladder(scene: Scene, method: Integrator) -> list[float]:
 def search(scene: Scene, method: Integrator, targets: Sequence[float] = TARGETS) -> list[Point]:
     """The ladder, as far as it is needed, and for each target the loosest setting that meets it."""
     rungs: list[Point] = []
-    for setting in ladder(scene, method):
+    settings = ladder(scene, method)
+    accuracy(scene, method, settings[0])  # what is compiled at the first call would look like a lack of patience
+    for setting in settings:
         rungs.append(accuracy(scene, method, setting))
         if rungs[-1].error < ENOUGH or rungs[-1].seconds > PATIENCE:
             break
