@@ -80,7 +80,7 @@ def compiled_field(top: SymmetricTop) -> Callable[[float, Any], Array]:
     """f(t, y) compiled, returning a new array."""
     inverse, mgl = 1.0 / top.I1, top.mgl
 
-    @njit("float64[::1](float64, float64[::1])")
+    @njit("float64[::1](float64, float64[:])")  # Radau hands over columns
     def field(_, y):
         f = np.empty(6)
         wx, wy, wz = inverse * y[3], inverse * y[4], inverse * y[5]

@@ -58,14 +58,33 @@ def _times(seconds: float) -> str:
     return f"{seconds * 1e6:.3g} us"
 
 
-def judgement(mine: Best, theirs: Best) -> str:
-    """Who is faster, by how much, and how far to trust it."""
+class Standing(NamedTuple):
+    """How we stand to a peer: ahead, behind, level, or not to be told from the noise."""
+
+    word: str
+    ratio: float  # their time over ours
+    low: float
+    high: float
+
+
+def standing(mine: Best, theirs: Best) -> Standing:
+    """A difference counts if it exceeds `LEVEL` and every fifth of the batches has the same sign."""
     whole, low, high = ratio(theirs.timing, mine.timing)
-    if whole > LEVEL and low > 1.0:
-        return f"symtop is {whole:.3g} times faster ({low:.3g} to {high:.3g})"
-    if whole < 1.0 / LEVEL and high < 1.0:
-        return f"it is {1.0 / whole:.3g} times faster than symtop ({1.0 / high:.3g} to {1.0 / low:.3g})"
-    return f"level with symtop (ratio {whole:.2f}, {low:.2f} to {high:.2f})"
+    if 1.0 / LEVEL <= whole <= LEVEL:
+        return Standing("level", whole, low, high)
+    certain = low > 1.0 or high < 1.0
+    return Standing("noise" if not certain else "ahead" if whole > 1.0 else "behind", whole, low, high)
+
+
+def judgement(found: Standing) -> str:
+    """Who is faster, by how much, and how far to trust it."""
+    if found.word == "ahead":
+        return f"symtop is {found.ratio:.3g} times faster ({found.low:.3g} to {found.high:.3g})"
+    if found.word == "behind":
+        gain, least, most = 1.0 / found.ratio, 1.0 / found.high, 1.0 / found.low
+        return f"it is {gain:.3g} times faster than symtop ({least:.3g} to {most:.3g})"
+    word = "level with symtop" if found.word == "level" else "not told apart from symtop by so noisy a run"
+    return f"{word} (ratio {found.ratio:.2f}, {found.low:.2f} to {found.high:.2f})"
 
 
 def verdict(data: xr.Dataset) -> list[str]:
@@ -84,7 +103,7 @@ def verdict(data: xr.Dataset) -> list[str]:
                 parts.append(
                     f"{package} does not get there"
                     if theirs is None
-                    else f"{theirs.method} {_times(theirs.timing.best)}, {judgement(mine, theirs)}"
+                    else f"{theirs.method} {_times(theirs.timing.best)}, {judgement(standing(mine, theirs))}"
                 )
             sentences.append(start + "; ".join(parts) + ".")
     return [*_wins(data), *sentences]
@@ -92,32 +111,34 @@ def verdict(data: xr.Dataset) -> list[str]:
 
 def _wins(data: xr.Dataset) -> list[str]:
     """The two questions of the house: 100 times SciPy, and ahead of every compiled peer."""
-    ratios, ahead, level, behind = [], [], [], []
+    scipys: list[Standing] = []
+    sorted_by: dict[str, list[str]] = {"ahead": [], "level": [], "behind": [], "noise": []}
     for scene in data["scene"].values:
         for target in JUDGED:
             mine = best_of(data, str(scene), OURS, target)
-            for package in packages(data) if mine is not None else []:
+            for package in packages(data):
                 theirs = best_of(data, str(scene), package, target)
                 if mine is None or theirs is None:
                     continue
-                whole = theirs.timing.best / mine.timing.best
+                found = standing(mine, theirs)
                 if package == "scipy":
-                    ratios.append(whole)
-                    continue
-                where = f"{theirs.method} on {scene} at {target:.0e}"
-                (ahead if whole > LEVEL else behind if whole < 1.0 / LEVEL else level).append(where)
+                    scipys.append(found)
+                else:
+                    sorted_by[found.word].append(f"{theirs.method} on {scene} at {target:.0e}")
     said = []
-    if ratios:
-        word = "At least" if min(ratios) >= WANTED else f"Less than the wanted {WANTED:g}: at least"
-        said.append(f"{word} {min(ratios):.3g} and up to {max(ratios):.3g} times faster than the best of SciPy.")
-    if ahead or level or behind:
-        count = len(ahead) + len(level) + len(behind)
+    if scipys:
+        least, most = min(scipys, key=lambda found: found.ratio), max(scipys, key=lambda found: found.ratio)
+        word = "At least" if least.ratio >= WANTED else f"Less than the wanted {WANTED:g}: at least"
         said.append(
-            f"Against compiled peers symtop's best method is ahead in {len(ahead)} of {count} comparisons"
-            + (f"; level with {', '.join(level)}" if level else "")
-            + (f"; behind {', '.join(behind)}" if behind else "; no peer is ahead")
-            + "."
+            f"{word} {least.ratio:.3g} ({least.low:.3g} to {least.high:.3g}) and up to {most.ratio:.3g} times faster "
+            "than the best of SciPy."
         )
+    if count := sum(map(len, sorted_by.values())):
+        tails = {"level": "level with", "noise": "not told apart from", "behind": "behind"}
+        parts = [f"{tail} {', '.join(sorted_by[word])}" for word, tail in tails.items() if sorted_by[word]]
+        parts += [] if sorted_by["behind"] else ["no peer is ahead"]
+        ahead = f"ahead in {len(sorted_by['ahead'])} of {count} comparisons"
+        said.append(f"Against compiled peers symtop's best method is {'; '.join([ahead, *parts])}.")
     return said
 
 

@@ -56,6 +56,8 @@ class BulirschStoer:
                 break
             times.append(simulation.t)
             states.append(ode.y[:6])
+        else:
+            states[-1] = [np.nan] * 6  # a run that does not end is a failure
         return np.array(times), np.array(states)
 
 
