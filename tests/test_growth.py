@@ -83,11 +83,11 @@ def test_laws_of_growth_of_a_symplectic_method_and_of_runge_kutta():
     where = symtop.scene("spheroid")
     period = where.nutation_period
     found = {
-        name: history(where, symtop.integrator(name), horizon=3000.0 * period, samples=3001, **knob)
+        name: history(where, symtop.integrator(name), horizon=6000.0 * period, samples=3001, **knob)
         for name, knob in {
             "stormer-verlet": {"step_size": period / 60.37},
             "strang": {"step_size": period / 60.37},
-            "rk4": {"step_size": period / 110.37},
+            "rk4": {"step_size": period / 60.37},  # a wrong frequency rules for the first 75 nutations, energy then
             "rk45-compiled": {"tolerance": 1e-8},
         }.items()
     }

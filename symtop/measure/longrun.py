@@ -92,7 +92,9 @@ def watch(where: Scene, method: Integrator, h: float) -> Gauge:
         return states if solver.present is None else solver.present(par, np.zeros(len(states)), states)
 
     first = shown(solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES)).states)
+    first = first[np.isfinite(first).all(axis=1)]  # a run may fail in its first steps
     seen = shown(solver.loop(par, rule, state, h, np.array([0])).states)
+    first = first if len(first) else seen
     energy_start = float(shadow.energy(where, chart, seen)[0])
     series, modified_start = shadow.oscillation(
         *shadow.section(chart, first), shadow.modified_energy(where, method.name, chart, first, h)

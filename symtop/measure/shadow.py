@@ -114,7 +114,9 @@ def _harmonics(angle: Array, count: int) -> Array:
 
 
 def oscillation(x: Array, y: Array, values: Array, harmonics: int = HARMONICS) -> tuple[Oscillation, float]:
-    """Fit the series to values on the points of a closed curve, and their mean along it."""
+    """Fit the series to values on the points of a closed curve, and their mean; too few points give no series."""
+    if x.size < 4 * harmonics or np.ptp(x) == 0.0 or not np.any(y):
+        return Oscillation(0.0, 1.0, 1.0, np.zeros(0)), float(values.mean())
     least, largest = float(x.min()), float(x.max())
     curve = Oscillation(0.5 * (least + largest), 0.5 * (largest - least), float(np.abs(y).max()), np.zeros(0))
     columns = np.concatenate([np.ones((x.size, 1)), _harmonics(curve.angle(x, y), harmonics)], axis=1)

@@ -73,6 +73,7 @@ def crossings(data: xr.Dataset) -> list[str]:
                 continue
             top = max(won, key=lambda one: one.gain)
             reach = seconds(float(np.median([one.dearest_won for one in won])))
+            never = f", never on {', '.join(lost)}" if lost else ""
             parts.append(
                 f"{method} on {len(won)} of {len(found)} scenes, there up to {reach} a run (median), at best "
                 f"{top.gain:.2g} times on {top.scene} (error {top.error:.1g}){never}"
