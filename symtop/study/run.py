@@ -194,16 +194,11 @@ def status(study: Study, results: Path, *, quick: bool = False, full: bool = Fal
     rows = []
     for path, case in known.paths.items():
         record = store.read_json(store.failure_path(path))
-        state = (
-            DONE
-            if path in known.done
-            else FAILED
-            if isinstance(record, dict)
-            else STALE
-            if store.label_of(path) in older
-            else MISSING
-        )
-        message = str(record.get("message", "")) if state == FAILED and isinstance(record, dict) else ""
+        state, message = STALE if store.label_of(path) in older else MISSING, ""
+        if path in known.done:
+            state = DONE
+        elif isinstance(record, dict):
+            state, message = FAILED, str(record.get("message", ""))
         rows.append({"scene": case.scene, "integrator": case.integrator, "state": state, "message": message})
     return rows
 
