@@ -215,17 +215,17 @@ def test_a_copy_of_the_package_with_one_kernel_edited(tmp_path):
     for name in ("symtop", "studies"):
         shutil.copytree(depends.PACKAGE.parent / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     words = ["study", PROBE, "--results", tmp_path / "r"]
-    assert ended(symtop_command(*words, PYTHONPATH=tmp_path))[0] == 0
+    assert ended(symtop_command(*words, cwd=tmp_path, PYTHONPATH=tmp_path))[0] == 0
     with (tmp_path / "symtop" / "integrators" / "gauss.py").open("a") as file:
         file.write("\n# edited\n")
-    code, out, _ = ended(symtop_command(*words, "--status", "--json", PYTHONPATH=tmp_path))
+    code, out, _ = ended(symtop_command(*words, "--status", "--json", cwd=tmp_path, PYTHONPATH=tmp_path))
     assert code == 0
     rows = json.loads(out)["probe"]
     assert {row["integrator"] for row in rows if row["state"] == "stale"} == {"gauss-4"}
     assert sum(row["state"] == "done" for row in rows) == 10
-    code, out, _ = ended(symtop_command(*words, PYTHONPATH=tmp_path))
+    code, out, _ = ended(symtop_command(*words, cwd=tmp_path, PYTHONPATH=tmp_path))
     assert "2 of 12 cases computed" in out
-    code, out, _ = ended(symtop_command(*words, "--status", PYTHONPATH=tmp_path))
+    code, out, _ = ended(symtop_command(*words, "--status", cwd=tmp_path, PYTHONPATH=tmp_path))
     assert out == "probe: 12 done\n"
 
 
