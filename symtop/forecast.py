@@ -27,12 +27,16 @@ from symtop.integrators.registry import Integrator, Plan, Run, integrator
 from symtop.scenes import Scene, closed_form
 from symtop.top import Angles, SymmetricTop
 
-STEPS = {"compiled": 2000, "python": 50}  # a probe may always take these: 0.05 to 0.5 ms
-SHARE = 0.1  # of the run's own steps, or time, which a probe may always take
+STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these, 0.05 to 3 ms
+AT_LEAST = 0.25  # of them a probe takes in any case, up to the whole run
+SHARE = 0.1  # of the run, which a probe may always take, but no more than the next two:
+MOST_NUTATIONS = 20.0
+MOST_STEPS = 20_000  # 0.6 ms of Stormer-Verlet
 POINTS = 300  # of a probe that are compared with the closed form
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
 PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
+LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nutation: a few of its steps, milliseconds
 TWINS = {"rk45": "rk45-compiled"}  # takes the same steps in a hundredth of the time
 LEAST_GROWTH = 0.05  # of the error of a piece: less growth from the first to the second is luck
 RESOLVED = 0.3  # rad that the axis may precess in one step at a pole: coarser probes say nothing about the passage
@@ -160,19 +164,22 @@ def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
     """The largest axis error to expect, and the probe that says so."""
     straight = bool(method.symplectic or method.symmetric)
     period = marks.period if math.isfinite(marks.period) else plan.horizon
-    share, twice = SHARE * plan.horizon, min(2.0 * period, plan.horizon)
+    share, twice = min(SHARE * plan.horizon, MOST_NUTATIONS * period), min(2.0 * period, plan.horizon)
     if method.knob == "tolerance":
         cheap = integrator(TWINS[method.name]) if method.tier == "python" and method.name in TWINS else method
-        piece = share if cheap.tier == "python" else max(share, twice)
-        partial = piece < min(period, plan.horizon)
+        least = twice if cheap.tier == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
+        piece = max(share, least)
+        partial = piece < min(period, 0.5 * plan.horizon)
         since = max(0.0, _closest_time(scene, period) - 0.5 * piece) if partial else 0.0
         probe = _probe(scene, cheap, chart, plan, piece, math.nan, since)
         expected = grown(probe, plan.horizon, straight=straight) * (PARTIAL if partial else 1.0)
         return max(expected, plan.tolerance), probe  # an error below what was asked for is luck
     step = plan.step_size
+    share = min(share, MOST_STEPS * step)
     allowed = max(STEPS[method.tier] * step, share)
     if twice <= allowed:
-        probe = _probe(scene, method, chart, plan, min(plan.horizon, allowed), step)
+        piece = max(twice, share, AT_LEAST * STEPS[method.tier] * step)
+        probe = _probe(scene, method, chart, plan, min(plan.horizon, piece), step)
         return grown(probe, plan.horizon, straight=straight), probe
     coarse = twice / round(allowed / step)
     probe = _probe(scene, method, chart, plan, twice, coarse)

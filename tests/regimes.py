@@ -76,8 +76,7 @@ def trial(draw: random.Random, name: str) -> Trial:
         nutations = min(nutations, MOST_NUTATIONS.get(method.name, slow))
         knob = {"tolerance": max(tolerance, method.least_tolerance, 1e-6 if method.name == "radau" else 0.0)}
     horizon = nutations * period
-    observe = draw.choice(["axis", "attitude"] if "axis" not in method.solvers or len(method.solvers) > 1 else ["axis"])
-    observe = "axis" if method.name == "rk4" else observe
+    observe = draw.choice(["axis", "attitude"])
     plan, _ = make_plan(where, method, knob.get("step_size"), knob.get("tolerance"), horizon, 501)
     said = guard.warning(where, method, choose_chart(method, observe), plan)
     run = symtop.simulate(where, method, horizon=horizon, observe=observe, guard=False, **knob)

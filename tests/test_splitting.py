@@ -170,7 +170,7 @@ def canonical_map(method, h, point):
     start = symtop.Angles(theta, phi, psi, p_theta / TOP.I1, phi_dot, p_psi / TOP.I3 - phi_dot * math.cos(theta))
     scene = symtop.Scene("map", TOP, start, h)
     if method.knob == "tolerance":
-        done = symtop.simulate(scene, method, tolerance=1e-2, samples=2)
+        done = symtop.simulate(scene, method, tolerance=1e-2, samples=2, guard=False)
         return np.array([done[name].values[-1] for name in ("theta", "phi", "psi", "p_theta", "p_phi", "p_psi")])
     done = run(method, scene, h, [1], chart=method.charts()[-1])
     if method.charts() == ("angles",):
@@ -335,7 +335,7 @@ def test_the_pole_benchmark_of_bruls_cardona_arnold():
     table = error_table(scene, METHODS["strang"], [2.0 / n for n in (2000, 4000, 8000, 16000, 32000)], 2.0, "axis")
     assert table["axis"][0] < 1e-5
     assert power_law(table["step_size"].values, table["axis"].values).slope == pytest.approx(2.0, abs=0.02)
-    verlet = symtop.simulate(scene, "stormer-verlet", step_size=1e-3)
+    verlet = symtop.simulate(scene, "stormer-verlet", step_size=1e-3, guard=False)
     assert verlet.attrs["outcome"] != "ok" or verlet["axis"].values[-1] @ closed_form(scene).axis(2.0) < 0.99
 
 
