@@ -26,8 +26,9 @@ from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import PARTS
 from symtop.measure.race import Entry, entries, race
 from symtop.measure.timing import BATCH
-from symtop.measure.work import TARGETS, work_table
+from symtop.measure.work import TARGETS, spans, work_table
 from symtop.report import work_figures as figures
+from symtop.report import work_words as words
 from symtop.scenes import added_scenes, scene
 from symtop.study.study import Case, Picture, Study, Table
 
@@ -38,8 +39,6 @@ PERIODS = ([10.0, 1000.0], [10.0, 100.0])  # in full, and quick
 BUDGET = {"compiled": 1e6, "python": 4e4}  # force evaluations of one run
 SOFTWARE = {"taylor-quad": 4e4}  # quadruple precision costs 2 us an evaluation
 DECADES = tuple(10.0**-k for k in range(2, 14))
-STRUCTURE = ("midpoint", "trapezoidal", "stormer-verlet", "galerkin-simpson")
-CLASSIC = ("rk4", "rk45-compiled")
 LEADERS = 9
 
 
@@ -49,7 +48,7 @@ def cases(quick: bool) -> list[Case]:
     for name in [*(SCENES[:2] if quick else SCENES), *added_scenes()]:
         for method in integrators().values():
             budget = SOFTWARE.get(method.name, BUDGET[method.tier]) / (20.0 if quick else 1.0)
-            grid.append(Case(name, method.name, {"periods": PERIODS[quick], "budget": budget, "quick": quick}))
+            grid.append(Case(name, method.name, {"periods": PERIODS[quick], "budget": budget}))
     return grid
 
 
@@ -70,7 +69,7 @@ def follow_up(data: xr.Dataset) -> list[Case]:
 def measure(case: Case) -> xr.Dataset:
     """Errors and work of one method on a scene, or seconds of all of them."""
     where, options = scene(case.scene), case.settings
-    horizons = [count * where.nutation_period for count in options["periods"]]
+    horizons = spans(where, options["periods"])
     if case.timed:
         runs = [Entry(*run) for run in options["runs"]]
         found = race(where, horizons, runs, options["rounds"], options["batch"], options["size"])
@@ -79,13 +78,9 @@ def measure(case: Case) -> xr.Dataset:
     return found.assign_coords(horizon=options["periods"])
 
 
-def _spans(data: xr.Dataset) -> list[str]:
-    return [f"over {value:g} nutation periods" for value in data["horizon"].values]
-
-
 def pictures(data: xr.Dataset) -> list[Picture]:
     """Fronts at both horizons, winners, profiles, energy at the long horizon, and the parts of the error."""
-    spans, scenes = _spans(data), [str(name) for name in data["scene"].values]
+    over, scenes = words.spans(data), [str(name) for name in data["scene"].values]
     drawn = []
     for name, far, cost, label in (
         ("front-short", 0, "seconds", "wall time of one run (s)"),
@@ -97,7 +92,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
             Picture(
                 name,
                 figure,
-                f"Largest axis error {spans[far]} against {label}; every method is a thin line. No compiled method is "
+                f"Largest axis error {over[far]} against {label}; every method is a thin line. No compiled method is "
                 f"below or left of the black step line, their front: {', '.join(on)} are on it. Dashed: methods whose "
                 "inner loop is plain Python, with a front of their own. Grey: the reference's own bound.",
                 f"Log-log work-precision plots of the axis error against {label}, one panel a scene.",
@@ -109,7 +104,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     drawn.append(
         Picture(
             "winners",
-            figures.winner_strips(wins, scenes, spans, DECADES),
+            figures.winner_strips(wins, scenes, over, DECADES),
             f"The fastest compiled method for each decade of axis error. Most often: {most}, of {len(wins)} cells. "
             "Pale and with a tilde: level with at least one other method. Methods were raced at 1e-3, 1e-6, 1e-9 and "
             "1e-12; in between some times are foreseen.",
@@ -135,56 +130,44 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         Picture(
             "energy-long",
             figures.small_multiples(
-                data.isel(horizon=-1), [*STRUCTURE, *CLASSIC], "energy", "seconds",
+                data.isel(horizon=-1), [*words.STRUCTURE, *words.CLASSIC], "energy", "seconds",
                 ("wall time of one run (s)", f"largest {QUANTITIES['energy']}"), (1e-16, 30.0),
             ),
-            f"Energy error {spans[-1]} against cost. " + " ".join(_crossings(data)),
+            f"Energy error {over[-1]} against cost. {words.crossed(data)}",
             "Log-log plots of energy error against time at the long horizon for six methods, one panel a scene.",
         )
     )  # fmt: skip
     name = scenes[0]
     few = ["midpoint", "stormer-verlet", "takahashi-imada", "rk4", "rk45-compiled", "gauss-8"]
-    cells = {f"{name}, {spans[far]}": data.sel(scene=name).isel(horizon=far) for far in (0, -1)}
-    grown = {part: _growth(data.sel(scene=name), few, part) for part in PARTS}
+    cells = {f"{name}, {over[far]}": data.sel(scene=name).isel(horizon=far) for far in (0, -1)}
     drawn.append(
         Picture(
             "parts",
             figures.few_curves(cells, few, PARTS, "force_evaluations", "force evaluations of one run"),
             f"What the axis error on {name} is made of. From {data['horizon'].values[0]:g} to "
-            f"{data['horizon'].values[-1]:g} nutation periods, at the same step, the shape error grows "
-            + ", ".join(f"{value:.3g}-fold with {method}" for method, value in grown["shape"].items())
-            + "; the nutation lag "
-            + ", ".join(f"{value:.3g}-fold with {method}" for method, value in grown["nutation_lag"].items())
-            + ".",
+            f"{data['horizon'].values[-1]:g} nutation periods, at the same step or tolerance, the shape error grows "
+            f"{words.growth(data.sel(scene=name), few, 'shape')}; the nutation lag "
+            f"{words.growth(data.sel(scene=name), few, 'nutation_lag')}.",
             "Shape error, nutation lag and precession lag against work at two horizons.",
         )
     )
     return drawn
 
 
-def _growth(data: xr.Dataset, names: list[str], part: str) -> dict[str, float]:
-    """Median growth of a part of the error from the first to the last horizon, at settings that were run at both."""
-    return {name: ranking.growth_at_equal_settings(data.sel(integrator=name), part) for name in names}
-
-
-def _seconds(value: float) -> str:
-    return f"{value * 1e6:.3g} us" if value < 1e-3 else f"{value * 1e3:.3g} ms" if value < 1.0 else f"{value:.3g} s"
-
-
 def tables(data: xr.Dataset) -> list[Table]:
     """Winners, and every method's cost."""
     found = []
     header = [f"axis error {target:.0e}" for target in TARGETS]
-    for far, span in enumerate(_spans(data)):
+    for far, span in enumerate(words.spans(data)):
         winners, costs = [], []
         for name in data["scene"].values:
             cell = data.sel(scene=name).isel(horizon=far)
             for tier in ("compiled", "python"):
                 won = [ranking.win(cell, target, tier=tier) for target in TARGETS]
-                winners.append([str(name), tier, *(_cell(one) for one in won)])
+                winners.append([str(name), tier, *(words.winner(one) for one in won)])
             reached = [{place.integrator: place for place in ranking.cheapest(cell, target)} for target in TARGETS]
             for method in cell["integrator"].values:
-                row = [_seconds(r[str(method)].cost) if str(method) in r else "-" for r in reached]
+                row = [words.seconds(r[str(method)].cost) if str(method) in r else "-" for r in reached]
                 costs.append([str(name), str(method), *row, str(cell["stopped"].sel(integrator=method).values)])
         found.append(Table(f"Fastest method to an axis error {span}", ["scene", "tier", *header], winners))
         columns = ["scene", "integrator", *header, "ended by"]
@@ -192,61 +175,22 @@ def tables(data: xr.Dataset) -> list[Table]:
     return found
 
 
-def _cell(won: ranking.Win | None) -> str:
-    if won is None:
-        return "nobody"
-    level = f", level with {', '.join(won.level)}" if won.level else ""
-    return f"{won.best.integrator}, {_seconds(won.best.cost)}{level}"
-
-
-def _said(target: float, cell: xr.Dataset) -> str:
-    won = ranking.win(cell, target)
-    if won is None:
-        return f"{target:.0e} nobody"
-    said = f"{target:.0e} {won.best.integrator} in {_seconds(won.best.cost)}"
-    if won.level:
-        said += f" (inside the noise of {', '.join(won.level)})"
-    elif won.behind and won.lead:
-        said += f" ({won.lead.ratio:.1f} times ahead of {won.behind.integrator})"
-    if won.best.integrator == "exact" and (other := ranking.win(cell, target, without=("exact",))):
-        said += f", the fastest that steps {other.best.integrator} in {_seconds(other.best.cost)}"
-    return said
-
-
-def _crossings(data: xr.Dataset) -> list[str]:
-    """For each classic method, on how many scenes which discrete Lagrangian method is better in energy, and where."""
-    sentences = []
-    for classic in CLASSIC:
-        for method in STRUCTURE:
-            cells = [data.sel(scene=name).isel(horizon=-1) for name in data["scene"].values]
-            found = [one for cell in cells if (one := ranking.crossing(cell, method, classic))]
-            won = [one for one in found if one.share > 0.0]
-            if not found:
-                continue
-            if not won:
-                sentences.append(f"{method} beats {classic} on energy at no cost, on none of {len(found)} scenes.")
-                continue
-            top = max(won, key=lambda one: one.gain)
-            reach = float(np.median([one.dearest_won for one in won]))
-            always = [one.scene for one in won if one.share == 1.0]
-            sentences.append(
-                f"{method} beats {classic} on energy at equal cost on {len(won)} of {len(found)} scenes, up to "
-                f"{_seconds(reach)} (median), at best {top.gain:.2g}-fold on {top.scene} (error {top.error:.1g})"
-                + (f", and at every cost compared on {', '.join(always)}." if always else "; spend more and it loses.")
-            )
-    return sentences
-
-
 def verdict(data: xr.Dataset) -> list[str]:
     """The fastest method for each scene, horizon and target, the crossover in energy, and what the times are worth."""
-    sentences = []
+    wins = [won for won in ranking.winners(data).values() if won]
+    count = Counter(won.best.integrator for won in wins)
+    sentences = [
+        f"Of {len(wins)} pairs of a problem and a target that somebody met, fastest is "
+        + ", ".join(f"{name} on {times}" for name, times in count.most_common())
+        + f"; {sum(won.reliable for won in wins)} of these leads are beyond the noise."
+    ]
     for name in data["scene"].values:
-        for far, span in enumerate(_spans(data)):
+        for far, span in enumerate(words.spans(data)):
             cell = data.sel(scene=name).isel(horizon=far)
             sentences.append(
-                f"{name}, axis error {span}: " + "; ".join(_said(target, cell) for target in TARGETS) + "."
+                f"{name}, axis error {span}: " + "; ".join(words.lead(target, cell) for target in TARGETS) + "."
             )
-    sentences.append(f"Energy {_spans(data)[-1]}: " + " ".join(_crossings(data)))
+    sentences.append(f"Energy {words.spans(data)[-1]}: " + " ".join(words.crossings(data)))
     slow = [str(m) for m in data["integrator"].values if "python" in data["tier"].sel(integrator=m).values]
     if slow:
         sentences.append(

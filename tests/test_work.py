@@ -13,7 +13,7 @@ from symtop.measure import ranking
 from symtop.measure.phase import phase, split
 from symtop.measure.race import Entry, anchors, entries, field, line, race
 from symtop.measure.timing import timings
-from symtop.measure.work import TARGETS, Walk, work_table
+from symtop.measure.work import TARGETS, Walk, spans, work_table
 from symtop.reference import reference
 from symtop.scenes import closed_form
 from symtop.study import run as runner
@@ -150,6 +150,14 @@ def test_attitude_errors_come_from_a_chart_that_shows_them():
     assert row["attitude"].values[0] >= 0.5 * row["axis"].values[0]
 
 
+def test_a_separatrix_has_spans_too():
+    top, third = symtop.SymmetricTop(1.0, 1.0, 1.0), 1.0 / math.sqrt(3.0)
+    edge = symtop.Scene("edge", top, symtop.Angles(theta=math.pi / 3, phi_dot=2 * third, psi_dot=2 * third), 10.0)
+    assert all(math.isfinite(span) for span in spans(edge, [10.0, 100.0]))
+    where = symtop.scene("fast")
+    assert spans(where, [10.0]) == [10.0 * where.nutation_period]
+
+
 def entry(name, far=0, place=0, work=100.0, targets=()):
     return Entry(name, far, place, 0.1, work, tuple(targets))
 
@@ -221,6 +229,7 @@ def cell(samples, errors=None, tiers=None, races=None):
                 ("integrator", "setting"),
                 np.full((count, 1), 1.0) if races is None else np.array(races)[:, None],
             ),
+            "force_evaluations": (("integrator", "setting"), np.full((count, 1), 100.0)),
             "axis": (("integrator", "setting"), errors[:, None]),
             "outcome": (("integrator", "setting"), np.full((count, 1), "ok")),
             "tier": (("integrator", "setting"), np.array(tiers or ["compiled"] * count)[:, None]),
@@ -279,10 +288,12 @@ def test_a_crossing_of_two_power_laws_is_found_where_it_is():
     )
     found = ranking.crossing(data, "a", "b")
     assert found.dearest_won == pytest.approx(100.0, rel=0.06)
-    assert found.cheapest_won == pytest.approx(1.0)
+    assert (found.at_least, found.at_most) == (True, False)
     assert found.share == pytest.approx(0.5, abs=0.01)
     assert found.gain == pytest.approx(100.0)
-    assert ranking.crossing(data, "b", "a").cheapest_won == pytest.approx(100.0, rel=0.06)
+    turned = ranking.crossing(data, "b", "a")
+    assert (turned.at_least, turned.at_most) == (False, True)
+    assert turned.dearest_won == pytest.approx(1e4)
 
 
 def test_costs_relative_to_the_best_keep_failures_visible():

@@ -73,8 +73,9 @@ def entries(data: xr.Dataset, targets: Sequence[float] = TARGETS) -> list[Entry]
 
 
 def anchors(own: Sequence[Entry], tier: str) -> list[Entry]:
-    """The two runs over the short horizon that a method's line of cost is drawn through."""
-    near = sorted((entry for entry in own if entry.far == 0), key=lambda entry: entry.work)
+    """The two runs over its shortest horizon that a method's line of cost is drawn through."""
+    shortest = min(entry.far for entry in own)
+    near = sorted((entry for entry in own if entry.far == shortest), key=lambda entry: entry.work)
     useful = [entry for entry in near if entry.targets] or near
     fits = [entry for entry in useful if entry.work <= LARGEST[tier]] or useful[:1]
     first, last = fits[0], fits[-1]

@@ -1,10 +1,11 @@
 """Who is fastest at an accuracy, and whether the lead is more than noise.
 
-The cost of a target is that of the cheapest run that met it. Two methods are compared by the ratios of their samples
-round by round, which were taken within a second of each other: a slow spell of the machine hits both. A lead is sure
-if every round agrees on it and its median is at least `MARGIN`, the most by which two processes that
-run the same code differed here (code and data lie elsewhere in memory); otherwise the two are level. A rival that was
-not timed itself, because it was foreseen behind, is behind for sure if it is so by `FAR`.
+The cost of a target is that of the run that met it with the fewest force evaluations. Two methods are compared by the
+ratios of their samples round by round, which were taken within a second or two of each other: a slow spell of the
+machine hits both. A lead is sure if every round agrees on it and both its median and the ratio of the smallest samples
+are at least `MARGIN`, because the same code in another process, elsewhere in memory, may differ by some per cent;
+otherwise the two are level. A rival that was not timed itself, because it was foreseen behind, is behind for sure if it
+is so by `FAR`.
 """
 
 from typing import NamedTuple
@@ -56,17 +57,20 @@ class Win(NamedTuple):
 def cheapest(
     cell: xr.Dataset, target: float, quantity: str = "axis", cost: str = "seconds", tier: str | None = None
 ) -> list[Place]:
-    """Methods that meet a target, cheapest first; `cell` is one scene and one horizon of the study's dataset."""
+    """Methods that meet a target, cheapest first; `cell` is one scene and one horizon of the study's dataset.
+
+    Each takes part with its run of the fewest force evaluations, whatever the cost: the one that was raced.
+    """
     found = []
     for name in cell["integrator"].values:
         own = cell.sel(integrator=name)
-        spent = np.where(meeting(own, target, quantity) & (own["outcome"].values == "ok"), own[cost].values, np.nan)
-        if not np.isfinite(spent).any():
+        good = meeting(own, target, quantity) & (own["outcome"].values == "ok") & np.isfinite(own[cost].values)
+        if not good.any():
             continue
-        k = int(np.nanargmin(spent))
+        k = int(np.argmin(np.where(good, own["force_evaluations"].values, np.inf)))
         kind = str(own["tier"].values.flat[0])
         if tier in (None, kind):
-            found.append(Place(float(spent[k]), str(name), kind, k, float(own[quantity].values[k])))
+            found.append(Place(float(own[cost].values[k]), str(name), kind, k, float(own[quantity].values[k])))
     return sorted(found)
 
 
@@ -166,8 +170,9 @@ class Crossing(NamedTuple):
     first: str
     second: str
     share: float  # of the common range, in the logarithm of cost
-    cheapest_won: float  # seconds of the cheapest and
-    dearest_won: float  # of the dearest cost at which the first is better; NaN if none
+    at_least: bool  # is the first better at the least common cost,
+    at_most: bool  # at the largest?
+    dearest_won: float  # the largest cost at which the first is better; NaN if none
     error: float  # energy error of the first where its lead is largest (or its lag smallest)
     gain: float  # ratio of the energy errors there, second over first
 
@@ -197,10 +202,9 @@ def crossing(
     ahead, best = ours < theirs, int(np.argmax(theirs - ours))
     won = np.exp(at[ahead]) if ahead.any() else np.array([np.nan])
     name = str(cell["scene"].values)
-    gain = float(np.exp(theirs[best] - ours[best]))
-    return Crossing(
-        name, first, second, float(ahead.mean()), float(won[0]), float(won[-1]), float(np.exp(ours[best])), gain
-    )
+    gain, error = float(np.exp(theirs[best] - ours[best])), float(np.exp(ours[best]))
+    ends = bool(ahead[0]), bool(ahead[-1])
+    return Crossing(name, first, second, float(ahead.mean()), *ends, float(won[-1]), error, gain)
 
 
 def growth_at_equal_settings(own: xr.Dataset, quantity: str, far: int = -1) -> float:

@@ -38,6 +38,12 @@ ROUNDED = 1e-8
 STOPS = ("all targets met", "rounding", "budget", "least tolerance", "nothing to set", "too many runs")
 
 
+def spans(scene: Scene, periods: Sequence[float]) -> list[float]:
+    """Times of so many nutation periods; on a separatrix, of so many tenths of the scene's horizon."""
+    period = scene.nutation_period if math.isfinite(scene.nutation_period) else 0.1 * scene.horizon
+    return [count * period for count in periods]
+
+
 def first_setting(method: Integrator, scene: Scene, horizon: float) -> float:
     """The coarsest setting that is tried at first; incommensurate with the nutation."""
     if method.knob == "tolerance":

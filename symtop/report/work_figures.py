@@ -1,5 +1,6 @@
 """The drawings of the work-precision study: fronts, winners, profiles, and a few methods against cost."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.report.figures import pareto
-from symtop.report.style import BLACK, GREY, legend_below, look, panels
+from symtop.report.style import BLACK, GREY, legend_below, look, panels, slope_guide
 
 SHORT = {
     "stormer-verlet": "verlet", "takahashi-imada": "takahashi", "suzuki-umeno-8": "umeno-8",
@@ -75,9 +76,10 @@ def _front(axis: Any, cell: xr.Dataset, cost: str, quantity: str, tier: str, lin
     for name in dict.fromkeys(str(owner) for owner in owners):
         pick = owners == name
         style = look(name)
+        edge = {"mec": style.color, "mew": 1.6} if style.marker in "x+" else {"mec": "white", "mew": 0.4}
         axis.plot(
-            steps[0][pick], steps[1][pick], style.marker, ls="none", color=style.color, mec="white", mew=0.4,
-            ms=style.size + 2.0, zorder=4, label=name,
+            steps[0][pick], steps[1][pick], style.marker, ls="none", color=style.color, ms=style.size + 2.0, zorder=4,
+            label=name, **edge,
         )  # fmt: skip
     return list(dict.fromkeys(str(owner) for owner in owners))
 
@@ -164,12 +166,12 @@ def few_curves(
 ) -> Any:
     """A few methods against cost: one row a quantity and its label, one column a dataset of one scene and horizon."""
     figure, axes = panels(len(rows), len(columns), width=11.5, height=3.0, sharex=True, sharey="row")
+    for axis, title in zip(axes[0], columns, strict=True):
+        axis.set_title(title)
     for line, (quantity, label) in zip(axes, rows.items(), strict=True):
-        for axis, (title, cell) in zip(line, columns.items(), strict=True):
+        for axis, cell in zip(line, columns.values(), strict=True):
             draw_curves(axis, cell, names, quantity, cost)
             axis.set(xscale="log", yscale="log")
-            if line is axes[0]:
-                axis.set_title(title)
         line[0].set_ylabel(label)
     for axis in axes[-1]:
         axis.set_xlabel(xlabel)
@@ -208,6 +210,10 @@ def small_multiples(
         axis.set(xscale="log", yscale="log", title=scene, ylim=limits)
     for axis in axes.flat[len(scenes) :]:
         axis.set_visible(False)
+    for power, level in ((-2.0, 1e-2), (-4.0, 1e-6)):
+        least, most = axes.flat[0].get_xlim()
+        middle = math.sqrt(least * most)
+        slope_guide(axes.flat[0], power, (0.1 * middle, 0.6 * middle), level * 1e-4, f"cost$^{{{power:g}}}$")
     for axis in axes[-1]:
         axis.set_xlabel(labels[0])
     for axis in axes[:, 0]:
