@@ -198,15 +198,21 @@ def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
         text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 52\nMETHODS = ("),
         text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(51)\n",
         text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(53)\n",
+        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 51\n",
+        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 53\n",
+        text.replace("samples=51", "samples=Few().count()")
+        + "\n\nclass Few:\n    def count(self):\n        return 51\n",
+        text.replace("samples=51", "samples=Few().count()")
+        + "\n\nclass Few:\n    def count(self):\n        return 53\n",
     ):
-        script.write_text(version)
+        script.write_text("import functools\n" + version)
         sys.modules.pop("symtop_study_counted", None)
         linecache.checkcache()
         importlib.invalidate_caches()
         shutil.rmtree(tmp_path / "__pycache__", ignore_errors=True)
         study = runner.load(str(script))
         digests.add(study.digest(study.cases(True)[0]))
-    assert len(digests) == 5
+    assert len(digests) == 9  # the caption alone changes nothing
 
 
 @pytest.mark.slow
