@@ -82,7 +82,7 @@ class Workers:
             _kill(pool)
 
     def stop(self) -> None:
-        """End all processes at once, with what they are computing; what was computed is on disk."""
+        """End all processes at once, with what they are computing, for good; what was computed is on disk."""
         for size in list(self._pools):
             self.drop(size)
         self._leave()
