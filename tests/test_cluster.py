@@ -92,8 +92,17 @@ def test_a_scheduler_that_is_none_is_one_sentence(address, tmp_path, monkeypatch
     monkeypatch.setattr("symtop.study.pools.PATIENCE", 0.5)
     done = CliRunner().invoke(main, ["study", str(PROBE), "--results", str(tmp_path), "--scheduler", address])
     assert done.exit_code == 2, done.output
-    assert "scheduler must be the address of a dask scheduler that answers" in done.output
+    assert "scheduler must be the address of a dask scheduler that answers and has workers" in done.output
     assert "Traceback" not in done.output
+
+
+def test_a_cluster_without_workers_is_one_sentence(monkeypatch):
+    monkeypatch.setattr("symtop.study.pools.PATIENCE", 2)
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as empty,
+        pytest.raises(SymtopError, match="has workers"),
+    ):
+        Workers(scheduler=empty.scheduler_address)
 
 
 def test_without_the_package_it_says_how_to_get_it(monkeypatch):

@@ -16,10 +16,12 @@ from pathlib import Path
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from numba.core.caching import IndexDataCacheFile
 
 from symtop import datasets
 from symtop.checks import SymtopError
 from symtop.cli import main
+from symtop.integrators import compiled
 from symtop.study import run as runner
 from symtop.study import store, work
 from tests.commands import PROBE, contents, ended, leftovers, symtop
@@ -91,6 +93,42 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
     assert "Traceback" not in done.stderr
     assert not list((tmp_path / "small").rglob("*.nc"))
     assert not leftovers(tmp_path / "small")
+
+
+TWICE = "def twice(x):\n    return 2.0 * x\n"
+
+
+@pytest.fixture
+def kernel(tmp_path, monkeypatch):
+    """Compiles a small function, as a new process would, with a cache of its own."""
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "twice.py").write_text(TWICE)
+    space = {"__name__": "twice", "__file__": str(tmp_path / "twice.py")}
+    exec(compile(TWICE, str(tmp_path / "twice.py"), "exec"), space)
+    return lambda: compiled.compile_kernel(space["twice"], space["twice"])
+
+
+def test_a_full_disk_under_the_cache_of_kernels_costs_time_and_no_run(kernel, tmp_path, monkeypatch):
+    def full(*arguments):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(IndexDataCacheFile, "_save_data", full)
+    assert kernel()(2.0) == 4.0
+    assert not list(tmp_path.rglob("*.nbc"))
+    monkeypatch.undo()
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "cache"))
+    assert kernel()(2.0) == 4.0
+    assert list(tmp_path.rglob("*.nbc"))
+
+
+@pytest.mark.parametrize("kind", ["*.nbc", "*.nbi"])
+def test_a_damaged_cache_of_kernels_costs_time_and_no_run(kernel, tmp_path, kind):
+    assert kernel()(2.0) == 4.0
+    (victim,) = tmp_path.rglob(kind)
+    victim.write_bytes(victim.read_bytes()[:40])
+    again = kernel()
+    assert again(2.0) == 4.0
+    assert not again.stats.cache_hits
 
 
 @pytest.mark.parametrize("place", ["quick", "quick/cases", "quick/cases/probe", "quick/figures"])
@@ -242,8 +280,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quic
     assert time.monotonic() - start < 10.0
     assert ended_with == code
     assert err == f"symtop: {says}; what was computed is kept, and the same command goes on from there\n"
-    left = [name for name in leftovers(tmp_path / "r") if not name.endswith((".lock", ".trace"))]
-    assert not left  # no partial file; a worker that was ended leaves its lock, which holds nothing up
+    assert not leftovers(tmp_path / "r")
     kept = len(list((tmp_path / "r").rglob("cases/probe/*.nc")))
     assert kept >= 1
     code, out, err = ended(symtop(*words, PROBE_LOG=log))
@@ -321,7 +358,7 @@ def test_a_worker_that_is_killed_costs_no_more_than_what_it_was_computing(tmp_pa
 # ---- methods ---------------------------------------------------------------------------------------------------------
 
 BAD = """
-import os, signal, time
+import itertools, os, time
 import numpy as np
 import symtop
 from symtop.integrators.registry import Run
@@ -334,9 +371,7 @@ def hangs(top, start, plan):
         time.sleep(0.01)
 
 def deaf(top, start, plan):
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})  # as a compiled loop is
-    while True:
-        time.sleep(0.01)
+    sum(itertools.repeat(0))  # never returns to the interpreter, like a compiled loop
 
 def exits(top, start, plan):
     os._exit(7)

@@ -20,6 +20,7 @@ from symtop.integrators.registry import Integrator
 from symtop.measure import commutation
 from symtop.study import check, depends
 from symtop.study import run as runner
+from symtop.study.study import Case
 from tests.commands import PROBE, ended
 from tests.commands import symtop as symtop_command
 
@@ -107,6 +108,12 @@ def stale_after(edited: str, study) -> set[str]:
     return {case.integrator for case, one, two in zip(cases, before, after, strict=True) if one != two}
 
 
+def of_everyone():
+    """The probe with every integrator of the registry."""
+    cases = [Case("goldstein", name, {}) for name in symtop.integrators()]
+    return dataclasses.replace(runner.load(str(PROBE)), cases=lambda quick: cases)
+
+
 GAUSS = {f"gauss-{order}" for order in (2, 4, 6, 8, 10, 12)}
 SCIPY = {"rk45", "dop853", "lsoda", "radau"}
 SPLITTING = {name for name, method in symtop.integrators().items() if method.family == "splitting"}
@@ -133,15 +140,14 @@ STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "
     ],
 )
 def test_editing_a_kernel_makes_the_cases_that_use_it_stale_and_no_others(edited, stale):
-    """The drift study runs every integrator and compares with no reference, which is made by `taylor.py`."""
-    assert stale_after(edited, runner.load("drift")) == stale
+    """In a study that runs every integrator and compares with no reference, which is made by `taylor.py`."""
+    assert stale_after(edited, of_everyone()) == stale
 
 
 def test_what_all_cases_depend_on_makes_all_stale():
-    drift, convergence = runner.load("drift"), runner.load("convergence")
-    everyone = {case.integrator for case in drift.cases(True)}
-    for edited in ("top.py", "scenes.py", "simulate.py", "measure/conservation.py", "integrators/registry.py"):
-        assert stale_after(edited, drift) == everyone, edited
+    convergence = runner.load("convergence")
+    for edited in ("top.py", "scenes.py", "simulate.py", "integrators/registry.py"):
+        assert stale_after(edited, of_everyone()) == set(symtop.integrators()), edited
     for edited in ("reference.py", "integrators/taylor.py", "measure/accuracy.py"):
         assert stale_after(edited, convergence) == {case.integrator for case in convergence.cases(True)}, edited
 
@@ -152,9 +158,8 @@ def test_a_study_that_asks_the_registry_depends_on_all_of_it_unless_it_says_what
     assert depends.used(reduction, twins) == sorted([twins.integrator, f"{twins.integrator}-unreduced"])
     silent = dataclasses.replace(reduction, uses=None)
     assert depends.used(silent, twins) == sorted(symtop.integrators())
-    drift = runner.load("drift")
-    starred = dataclasses.replace(drift.cases(True)[0], integrator="*")
-    assert depends.used(drift, starred) == sorted(symtop.integrators())
+    starred = Case("goldstein", "*", {})
+    assert depends.used(of_everyone(), starred) == sorted(symtop.integrators())
 
 
 LOOKUPS = ("convergence", "drift", "stability", "reduction", "truth")
@@ -198,15 +203,21 @@ def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
         text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 52\nMETHODS = ("),
         text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(51)\n",
         text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(53)\n",
+        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 51\n",
+        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 53\n",
+        text.replace("samples=51", "samples=Few().count()")
+        + "\n\nclass Few:\n    def count(self):\n        return 51\n",
+        text.replace("samples=51", "samples=Few().count()")
+        + "\n\nclass Few:\n    def count(self):\n        return 53\n",
     ):
-        script.write_text(version)
+        script.write_text("import functools\n" + version)
         sys.modules.pop("symtop_study_counted", None)
         linecache.checkcache()
         importlib.invalidate_caches()
         shutil.rmtree(tmp_path / "__pycache__", ignore_errors=True)
         study = runner.load(str(script))
         digests.add(study.digest(study.cases(True)[0]))
-    assert len(digests) == 5
+    assert len(digests) == 9  # the caption alone changes nothing
 
 
 @pytest.mark.slow
@@ -215,17 +226,17 @@ def test_a_copy_of_the_package_with_one_kernel_edited(tmp_path):
     for name in ("symtop", "studies"):
         shutil.copytree(depends.PACKAGE.parent / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     words = ["study", PROBE, "--results", tmp_path / "r"]
-    assert ended(symtop_command(*words, PYTHONPATH=tmp_path))[0] == 0
+    assert ended(symtop_command(*words, cwd=tmp_path, PYTHONPATH=tmp_path))[0] == 0
     with (tmp_path / "symtop" / "integrators" / "gauss.py").open("a") as file:
         file.write("\n# edited\n")
-    code, out, _ = ended(symtop_command(*words, "--status", "--json", PYTHONPATH=tmp_path))
+    code, out, _ = ended(symtop_command(*words, "--status", "--json", cwd=tmp_path, PYTHONPATH=tmp_path))
     assert code == 0
     rows = json.loads(out)["probe"]
     assert {row["integrator"] for row in rows if row["state"] == "stale"} == {"gauss-4"}
     assert sum(row["state"] == "done" for row in rows) == 10
-    code, out, _ = ended(symtop_command(*words, PYTHONPATH=tmp_path))
+    code, out, _ = ended(symtop_command(*words, cwd=tmp_path, PYTHONPATH=tmp_path))
     assert "2 of 12 cases computed" in out
-    code, out, _ = ended(symtop_command(*words, "--status", PYTHONPATH=tmp_path))
+    code, out, _ = ended(symtop_command(*words, "--status", cwd=tmp_path, PYTHONPATH=tmp_path))
     assert out == "probe: 12 done\n"
 
 

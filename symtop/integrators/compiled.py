@@ -6,6 +6,7 @@ every source file of this package that a kernel may come from, and of the file t
 A kernel found on disk loads in a few milliseconds; a cold one compiles in about half a second.
 """
 
+import contextlib
 import functools
 import hashlib
 import inspect
@@ -82,6 +83,27 @@ def register_jitable(function: Callable[..., Any]) -> Any:
     return _register(forceinline=True)(function)
 
 
+def _forgiving(kernel: Any) -> Any:
+    """A kernel for which a cache on a full disk, or a damaged one, costs a compilation and not the run."""
+    cache = kernel._cache
+    load, save = cache.load_overload, cache.save_overload
+
+    def attempt_load(*arguments: Any) -> Any:
+        try:
+            return load(*arguments)
+        except Exception:  # noqa: BLE001  (a truncated pickle raises nearly anything)
+            with contextlib.suppress(Exception):
+                cache.flush()  # begin anew: what is damaged would stand in the way of saving, too
+            return None
+
+    def attempt_save(*arguments: Any) -> None:
+        with contextlib.suppress(OSError):
+            save(*arguments)
+
+    cache.load_overload, cache.save_overload = attempt_load, attempt_save
+    return kernel
+
+
 def compile_kernel(function: Callable[..., Any], *parts: Callable[..., Any]) -> Any:
     """``njit`` with the disk cache; `parts` are the functions that `function` closes over.
 
@@ -102,7 +124,7 @@ def compile_kernel(function: Callable[..., Any], *parts: Callable[..., Any]) -> 
         _prune(folder)
     try:
         config.CACHE_DIR = str(folder)  # numba reads it while it decorates, so nobody else's cache moves
-        return njit(cache=True, error_model="numpy")(function)
+        return _forgiving(njit(cache=True, error_model="numpy")(function))
     except RuntimeError:  # the cache folder cannot be written: slower, never wrong
         return njit(error_model="numpy")(function)
     finally:

@@ -40,6 +40,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 PLUMBING = {PACKAGE / name for name in ("checks.py", "datasets.py")} | set(PACKAGE.rglob("__init__.py"))
 RESOLVERS = {PACKAGE / name for name in ("simulate.py", "integrators/registry.py")}  # they look up what they are given
 WORDS = ("summary", "reference")  # of an Integrator: said, not computed
+SCRIPTS = ("symtop_study_", "symtop_plugin_")  # what modules of scripts and plug-ins are called
 EVERY = "*"  # in place of an integrator's name: all of them
 
 
@@ -114,7 +115,8 @@ class Ingredients:
             self.values.append(repr(thing))
         elif id(thing) not in self._seen:
             self._seen[id(thing)] = thing
-            thing = getattr(thing, "py_func", thing)  # compiled by numba
+            if not isinstance(thing, (FunctionType, type)):  # compiled by numba, or cached
+                thing = getattr(thing, "py_func", getattr(thing, "__wrapped__", thing))
             parts = next((parts(thing) for kind, parts in _CONTAINERS if isinstance(thing, kind)), None)
             if parts is None:
                 self._add_one(thing)
@@ -128,7 +130,8 @@ class Ingredients:
             self._is_ours(thing)
         elif isinstance(thing, type):
             self.values.append(f"{thing.__module__}.{thing.__qualname__}")
-            self._is_ours(sys.modules.get(thing.__module__))
+            if not self._is_ours(sys.modules.get(thing.__module__)) and thing.__module__.startswith(SCRIPTS):
+                self._add_all(part for _, part in sorted(vars(thing).items()) if isinstance(part, FunctionType))
         elif isinstance(thing, np.ndarray):
             self.values.append(f"{thing.dtype}{thing.shape}{hashlib.sha256(thing.tobytes()).hexdigest()}")
         elif is_dataclass(thing):

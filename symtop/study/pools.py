@@ -39,8 +39,8 @@ class Workers:
     def __init__(self, jobs: int | None = None, scheduler: str | None = None) -> None:
         self.jobs = jobs or _cores()
         self.scheduler = scheduler
-        self._pools: dict[int, Executor] = {HERE: InProcess()}
         self._client: Any = None
+        self._pools: dict[int, Executor] = {HERE: InProcess()}
         if scheduler:
             self._connect(scheduler)
 
@@ -54,8 +54,11 @@ class Workers:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # other versions there; the digest of every case is compared anyway
                 self._client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+                self._client.wait_for_workers(1, timeout=PATIENCE)
         except (OSError, ValueError, RuntimeError) as error:
-            msg = f"scheduler must be the address of a dask scheduler that answers, not {address!r} ({_short(error)})"
+            self._leave()
+            must = "the address of a dask scheduler that answers and has workers"
+            msg = f"scheduler must be {must}, not {address!r} ({_short(error)})"
             raise SymtopError(msg) from error
         self._pools[CLUSTER] = self._client.get_executor(pure=False)
 
@@ -79,7 +82,7 @@ class Workers:
             _kill(pool)
 
     def stop(self) -> None:
-        """End all processes at once, with what they are computing; what was computed is on disk."""
+        """End all processes at once, with what they are computing, for good; what was computed is on disk."""
         for size in list(self._pools):
             self.drop(size)
         self._leave()

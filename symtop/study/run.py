@@ -116,13 +116,17 @@ def _drawn(study: Study, results: Path, stamp: str) -> dict[str, Any] | None:
 
 
 @contextlib.contextmanager
-def _hired(workers: Workers | None, jobs: int | None) -> Iterator[Workers]:
-    """Those workers, or some of our own for as long as it takes."""
-    if workers is not None:
-        yield workers
-        return
-    with Workers(jobs) as own:
-        yield own
+def _hired(workers: Workers | None, jobs: int | None, results: Path, study: Study) -> Iterator[Workers]:
+    """Those workers, or some of our own for as long as it takes; an early end leaves nothing lying about."""
+    hired = workers or Workers(jobs)
+    try:
+        yield hired
+    except BaseException:
+        hired.stop()
+        store.tidy(results, study)
+        raise
+    if workers is None:
+        hired.close()
 
 
 def run(study: Study, results: Path, *, quick: bool = False, full: bool = False, fresh: bool = False,
@@ -145,7 +149,7 @@ def run(study: Study, results: Path, *, quick: bool = False, full: bool = False,
     before = _drawn(study, results, stamp)
     if before is not None and not missing:
         return {**before, "computed": 0, "seconds": time.monotonic() - began}
-    with _hired(workers, jobs) as hired:
+    with _hired(workers, jobs, results, study) as hired:
         known.compute(missing, hired, seconds, fresh=fresh, quiet=quiet)
         if study.follow_up is not None:
             later = known.add(study.follow_up(known.combined()), fresh=fresh)
@@ -202,16 +206,11 @@ def status(study: Study, results: Path, *, quick: bool = False, full: bool = Fal
     rows = []
     for path, case in known.paths.items():
         record = store.read_json(store.failure_path(path))
-        state = (
-            DONE
-            if path in known.done
-            else FAILED
-            if isinstance(record, dict)
-            else STALE
-            if store.label_of(path) in older
-            else MISSING
-        )
-        message = str(record.get("message", "")) if state == FAILED and isinstance(record, dict) else ""
+        state, message = STALE if store.label_of(path) in older else MISSING, ""
+        if path in known.done:
+            state = DONE
+        elif isinstance(record, dict):
+            state, message = FAILED, str(record.get("message", ""))
         rows.append({"scene": case.scene, "integrator": case.integrator, "state": state, "message": message})
     return rows
 

@@ -258,7 +258,12 @@ def forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
     for path in cases.glob("[!.]*.failed.json"):
         if path.name not in wanted and label_of(path) in labels:
             path.unlink(missing_ok=True)
-    for lock in cases.glob(".*.lock"):  # each of them is held, or was by somebody who was killed
+    tidy(results, study)
+
+
+def tidy(results: Path, study: Study) -> None:
+    """Remove what processes that were killed have left beside the cases of a study, and nobody holds any more."""
+    for lock in (results / "cases" / study.name).glob(".*.lock"):
         path = lock.with_name(f"{lock.name[1:].removesuffix('.lock')}.nc")
         with claim(path, wait=False) as ours:
             if ours:

@@ -129,13 +129,15 @@ def limited(seconds: float, trace: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _last_resort(seconds: float, trace: Path) -> Iterator[None]:
-    with trace.open("w") as file:
-        faulthandler.dump_traceback_later(seconds, exit=True, file=file)
-        try:
-            yield
-        finally:
-            faulthandler.cancel_dump_traceback_later()
-    trace.unlink(missing_ok=True)
+    try:
+        with trace.open("w") as file:
+            faulthandler.dump_traceback_later(seconds, exit=True, file=file)
+            try:
+                yield
+            finally:
+                faulthandler.cancel_dump_traceback_later()
+    finally:
+        trace.unlink(missing_ok=True)
 
 
 def obey(parent: int) -> None:
