@@ -49,12 +49,13 @@ def kernels() -> dict[tuple[str, str], twin.Kernel]:
     """Every compiled fixed-step kernel that has a twin, by integrator and chart."""
     scene = symtop.scene(SCENE)
     h = scene.nutation_period / PER_NUTATION
-    return {
+    found = {
         (method.name, chart): twin.kernel_of(method, chart, scene, h)
         for method in symtop.integrators().values()
         if method.knob == "step_size" and method.tier == "compiled"
         for chart in method.solvers
     }
+    return {key: kernel for key, kernel in found.items() if kernel is not None}
 
 
 def measure() -> list[Row]:

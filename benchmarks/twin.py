@@ -9,7 +9,6 @@ that gcc can do with ``-O3 -march=native``.
 import ctypes
 import functools
 import hashlib
-import inspect
 import math
 import shutil
 import subprocess
@@ -28,6 +27,7 @@ from symtop.integrators import (
     splitting_space,
     unreduced,
 )
+from symtop.integrators.fixed_step import inside
 from symtop.integrators.registry import Integrator
 from symtop.scenes import Scene
 
@@ -47,23 +47,10 @@ class Kernel(NamedTuple):
     h: float
 
 
-def kernel_of(method: Integrator, chart: str, scene: Scene, h: float) -> Kernel:
-    """The loop behind a solver and the numbers it would run on, read from what the solver closes over."""
-    solve: Any = method.solvers[chart]
-    while True:
-        solve = getattr(solve, "solve", solve)
-        inside = inspect.getclosurevars(solve).nonlocals
-        if "march" in inside:
-            break
-        solve = inside["solve"]
-    par, state = inside["prepare"](scene.top, scene.start)
-    if "rule" in inside:
-        rule = inside["rule"]
-    elif callable(inside["stages"]):
-        rule = inside["stages"](scene.top, scene.start, h)
-    else:
-        rule = gauss.gauss_rule(inside["stages"])
-    return Kernel(inside["march"], par, rule, state, h)
+def kernel_of(method: Integrator, chart: str, scene: Scene, h: float) -> Kernel | None:
+    """The loop behind a solver and the numbers it would run on; None if it is no fixed-step loop of ours."""
+    found = inside(method.solvers[chart])
+    return None if found is None else Kernel(found.loop, *found.setup(scene.top, scene.start, h), h)
 
 
 def _macros(rule: Any, chart: str = "") -> dict[str, int]:

@@ -4,6 +4,7 @@
 
 #define DIM 4
 #define SMALLEST 1e-18
+#define ROUNDING 1e-12
 
 typedef struct { double I1, I3, mgl, p_psi, north, south; } Par;
 typedef struct { double nodes[NODES], weights[NODES], tolerance, iterations; } Rule;
@@ -82,7 +83,8 @@ static void begin(const Par *par, const Rule *rule, const double *state, double 
 static inline int increment(
     const Par *par, const Rule *rule, const double *state, Carry *carry, double h, double *step, long *work
 ) {
-    double theta = state[0], flight = h * state[1] / par->I1, scale = h * h / par->I1, s, c, correction;
+    double theta = state[0], lever = h / par->I1, flight = lever * state[1], scale = lever * h, s, c, correction;
+    double size = INFINITY, last;
     double *past = carry->W0;
     start_trig(rule, theta, &s, &c);
     double d = flight - scale * (4.0 * (past[0] + past[2]) - 6.0 * past[1] - past[3]);
@@ -91,8 +93,11 @@ static inline int increment(
     long effort = 1, most = (long)rule->iterations;
     int outcome = 2;
     for (;;) {
-        correction = (flight - d - scale * force.W0) / (1.0 + scale * force.W0_slope);
-        if (fabs(correction) <= rule->tolerance * (fabs(flight) + fabs(scale * force.W0)) + SMALLEST) {
+        correction = (lever * (state[1] - h * force.W0) - d) / (1.0 + scale * force.W0_slope);
+        last = size;
+        size = fabs(correction);
+        if (size <= rule->tolerance * (fabs(flight) + fabs(scale * force.W0)) + SMALLEST ||
+            (0.5 * last <= size && size <= ROUNDING)) {
             d += correction;
             outcome = chart_outcome(theta + d);
             break;
@@ -104,6 +109,7 @@ static inline int increment(
         effort++;
     }
     double W0 = force.W0 + force.W0_slope * correction, W1 = force.W1 + force.W1_slope * correction;
+    d = lever * (state[1] - h * W0);
     double v = force.v + force.v_slope * correction, C = sums.C - sums.P1 * correction;
     step[0] = d;
     step[1] = -h * (W0 + W1);

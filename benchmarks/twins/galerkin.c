@@ -4,6 +4,7 @@
 
 #define DIM 4
 #define SMALLEST 1e-18
+#define ROUNDING 1e-12
 
 typedef struct { double I1, I3, mgl, p_psi, north, south; } Par;
 typedef struct { double tolerance, iterations; } Rule;
@@ -97,10 +98,13 @@ static inline int increment(
     Trial found = evaluate(par, &start, theta + m, theta + d);
     long effort = 1, most = (long)rule->iterations;
     int outcome = 2;
+    double size = INFINITY, last;
     for (;;) {
         correct(&found, m, d, flight, scale, fix);
         double reach = fabs(flight) + scale * (fabs(found.V0.value) + fabs(found.Vm.value));
-        if (fabs(fix[0]) + fabs(fix[1]) <= rule->tolerance * reach + SMALLEST) {
+        last = size;
+        size = fabs(fix[0]) + fabs(fix[1]);
+        if (size <= rule->tolerance * reach + SMALLEST || (0.5 * last <= size && size <= ROUNDING)) {
             d += fix[1];
             outcome = chart_outcome(theta + d);
             break;
