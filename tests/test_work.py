@@ -170,9 +170,11 @@ def test_a_line_of_cost_goes_through_two_runs_and_never_pays_for_starting():
 
 def test_anchors_are_a_short_and_a_longer_run_near_a_target():
     runs = [entry("a", place=k, work=10.0**k, targets=[0] if k in (2, 4) else []) for k in range(8)]
-    assert [run.place for run in anchors(runs, "compiled")] == [2, 4]
+    assert [run.place for run in anchors(runs, "compiled")] == [0, 4]
     alone = [entry("a", place=k, work=10.0**k, targets=[0] if k == 2 else []) for k in range(8)]
-    assert [run.place for run in anchors(alone, "compiled")] == [2, 5]
+    assert [run.place for run in anchors(alone, "compiled")] == [0, 2]
+    coarse = [entry("a", place=k, work=10.0**k, targets=[0] if k == 0 else []) for k in range(8)]
+    assert [run.place for run in anchors(coarse, "compiled")] == [0, 5]
 
 
 def test_the_field_of_a_race_is_whoever_may_win():
@@ -252,7 +254,16 @@ def test_a_slow_spell_that_hits_a_whole_round_does_not_blur_a_lead():
     won = ranking.win(cell([[1.0, 3.0, 1.0], [1.3, 4.0, 1.3]]), 1e-6)
     assert won.reliable
     apart = ranking.win(cell([[1.0, 3.0, 1.0], [1.3, 4.0, 1.3]], races=[1.0, 2.0]), 1e-6)
+    restless = ranking.win(cell([[1.0, 1.0, 1.0], [1.3, 5.0, 6.0]]), 1e-6)
+    assert not restless.reliable
     assert not apart.reliable  # samples of different races are no pairs
+
+
+def test_a_rival_that_was_only_foreseen_is_behind_by_no_less_than_forecasts_miss():
+    data = cell([[1.0] * 3, [2.0] * 3], races=[1.0, 0.0])
+    assert ranking.win(data, 1e-6).reliable
+    doubtful = data.assign(foreseen_miss=("integrator", [1.5, np.nan]))
+    assert ranking.win(doubtful, 1e-6).level == ("b",)
 
 
 def test_plain_python_is_ranked_apart_and_a_failure_does_not_win():

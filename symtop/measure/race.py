@@ -2,8 +2,8 @@
 
 There are too many settings to time them all, and most cannot win. So:
 
-    1  every method is timed at its coarsest and its finest setting that met a target over the short horizon; with
-       W force evaluations a run takes  o + c W  seconds, and these two runs give the overhead o and the slope c
+    1  every method is timed at its coarsest setting over the short horizon and at the finest that met a target there;
+       with W force evaluations a run takes  o + c W  seconds, and these two runs give the overhead o and the slope c
     2  the cost of every other setting is foreseen with that line: `seconds_foreseen`
     3  for every horizon and target the methods foreseen within `WITHIN` of the fastest, at most `FIELD` of them, are
        timed again in rounds, each method once a round in random order, so that samples of a round are pairs; if one
@@ -28,7 +28,7 @@ from symtop.scenes import Scene
 from symtop.simulate import choose_chart
 
 WITHIN = 1.6
-FIELD = 5
+FIELD = 4
 MOST_RACES = 4
 CELLS = ("seconds", "seconds_timed", "seconds_foreseen", "seconds_race", "spread", "reliable")
 LARGEST = {"compiled": 1e5, "python": 1e4}  # force evaluations of the longer run of step 1
@@ -78,7 +78,7 @@ def anchors(own: Sequence[Entry], tier: str) -> list[Entry]:
     near = sorted((entry for entry in own if entry.far == shortest), key=lambda entry: entry.work)
     useful = [entry for entry in near if entry.targets] or near
     fits = [entry for entry in useful if entry.work <= LARGEST[tier]] or useful[:1]
-    first, last = fits[0], fits[-1]
+    first, last = near[0], fits[-1]
     if last.work < SMALLEST_GAP * first.work:
         wider = [entry for entry in near if SMALLEST_GAP * first.work <= entry.work <= LARGEST[tier]]
         last = wider[-1] if wider else first

@@ -26,8 +26,8 @@ Row = dict[str, Any]
 
 QUANTITY_LABELS = {**QUANTITIES, **FREQUENCIES}  # the eight quantities an accuracy is asked in
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
-DECADES = 1.6  # of error between neighbours of the first walk
-NOTCHES = 2.0  # decades of tolerance likewise
+DECADES = 1.9  # of error between neighbours of the first walk
+NOTCHES = 2.5  # decades of tolerance likewise
 CLOSE = 0.6  # an error between CLOSE times the target and the target is near enough
 AIM = 0.85
 REFINEMENTS = 2

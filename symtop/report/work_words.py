@@ -60,6 +60,9 @@ def crossings(data: xr.Dataset) -> list[str]:
             found = [one for cell in cells if (one := ranking.crossing(cell, method, classic))]
             won = [one for one in found if one.share > 0.0]
             lost = [one.scene for one in found if one.share == 0.0]
+            if not found:
+                parts.append(f"{method} nowhere, as no costs are common")
+                continue
             if not won:
                 parts.append(f"{method} on none of {len(found)} scenes")
                 continue
