@@ -1,36 +1,41 @@
-"""What a second process is worth: the convergence study with one process and with two, kernels compiled before.
+"""What a second process is worth: a study's accuracy grid with one worker and with two, kernels compiled before.
 
-    python benchmarks/scaling.py [STUDY ...]
+    python benchmarks/scaling.py [STUDY]
 
-Each run has a results folder of its own; the seconds are those of the whole command, start-up, combining and drawing
-included. Needs a machine with two cores that does nothing else. Exit code 1 below `ENOUGH`.
+Timed is the computing of all cases, the start of the workers included; combining and drawing, which one process does in
+either case, are not. Needs a machine with two cores that does nothing else. Exit code 1 below `ENOUGH`.
 """
 
 import os
-import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+from symtop.study import run as runner
+from symtop.study.pools import Workers
+
 ENOUGH = 1.7  # times faster
 
 
-def seconds(studies: list[str], jobs: int, *options: str) -> float:
-    """Wall time of one command that computes everything."""
+def seconds(name: str, jobs: int, *, quick: bool = False) -> float:
+    """Wall time of computing a study's grid."""
+    study = runner.load(name)
     with tempfile.TemporaryDirectory() as results:
+        grid = runner.Round(study, Path(results))
+        missing = grid.add(study.grid(quick=quick), fresh=True)
         start = time.perf_counter()
-        words = ["study", *studies, "--jobs", str(jobs), "--results", str(Path(results)), *options]
-        subprocess.run([sys.executable, "-m", "symtop.cli", *words], check=True, stdout=subprocess.DEVNULL)
+        with Workers(jobs) as workers:
+            grid.compute(missing, workers, study.limit, fresh=True, quiet=True)
         return time.perf_counter() - start
 
 
 def main() -> int:
     """Warm the caches, then measure."""
-    studies = sys.argv[1:] or ["convergence"]
-    seconds(studies, 2, "--quick")
-    one, two = (seconds(studies, jobs) for jobs in (1, 2))
-    print(f"{' '.join(studies)}: {one:.1f} s with one process, {two:.1f} s with two, {one / two:.2f} times faster")
+    name = (sys.argv[1:] or ["convergence"])[0]
+    seconds(name, 2, quick=True)
+    one, two = (seconds(name, jobs) for jobs in (1, 2))
+    print(f"{name}: {one:.1f} s with one worker, {two:.1f} s with two, {one / two:.2f} times faster")
     print(f"load average of the last minute (2 would be this alone): {os.getloadavg()[0]:.1f}")
     return 0 if one / two >= ENOUGH else 1
 
