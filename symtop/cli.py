@@ -354,10 +354,15 @@ def recommend(
 @plugin_option
 def explore(port: int, no_browser: bool, plugin_files: tuple[str, ...]) -> None:
     """Sliders in a browser: any top, start, integrator and step, beside the truth."""
+    import signal  # noqa: PLC0415
     import webbrowser  # noqa: PLC0415
 
     from symtop.explore.server import address, serve  # noqa: PLC0415
 
+    def end(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, end)
     _load_plugins(plugin_files)
     with serve(port) as server:
         click.echo(f"symtop explore: {address(server)} (Ctrl-C ends it)")

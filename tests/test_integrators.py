@@ -123,7 +123,7 @@ def test_a_rule_that_is_not_symmetric_misses_the_start():
     lopsided = symtop.discrete_lagrangian("left", (0.0, 2.0 / 3.0), (0.25, 0.75))
     assert lopsided.symmetric is False
     where = random_scenes(1, seed=5)[0]
-    assert return_miss(one_step(lopsided, "angles", where, 0.02), where.start) > 1e-7
+    assert return_miss(one_step(lopsided, "angles", where, 0.02), where.start) > 5e-9  # of the largest coordinate
 
 
 def test_midpoint_is_the_implicit_midpoint_rule_of_the_reduced_hamiltonian():

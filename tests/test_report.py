@@ -13,7 +13,10 @@ from symtop.study import run as runner
 from symtop.study.study import Case
 from tests.browser import Browser
 
-FEW = ("midpoint", "stormer-verlet", "takahashi-imada", "rk4", "rk45-compiled", "gauss-8", "taylor", "rk45")
+FEW = (
+    "midpoint", "trapezoidal", "galerkin-simpson", "stormer-verlet", "takahashi-imada", "rk4", "rk45-compiled", "gauss-8",
+    "taylor", "rk45",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

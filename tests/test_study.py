@@ -8,6 +8,7 @@ import shutil
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
@@ -16,7 +17,7 @@ import symtop
 from symtop import datasets
 from symtop.cli import main
 from symtop.integrators import registry
-from symtop.integrators.registry import Integrator
+from symtop.integrators.registry import Integrator, is_built_in
 from symtop.measure import commutation
 from symtop.study import check, depends
 from symtop.study import run as runner
@@ -141,7 +142,8 @@ STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "
 )
 def test_editing_a_kernel_makes_the_cases_that_use_it_stale_and_no_others(edited, stale):
     """In a study that runs every integrator and compares with no reference, which is made by `taylor.py`."""
-    assert stale_after(edited, of_everyone()) == stale
+    found = stale_after(edited, of_everyone())
+    assert {name for name in found if is_built_in(name)} == stale  # other tests add methods of their own
 
 
 def test_what_all_cases_depend_on_makes_all_stale():
@@ -290,7 +292,7 @@ def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
     assert "4 of 4 cases computed again, the same to the last bit" in done.output
     victim = next((tmp_path / "quick" / "cases" / "probe").glob("*.nc"))
     data = datasets.read(victim)
-    data["energy"][3] += 1e-15
+    data["energy"][3] = np.nextafter(data["energy"].values[3], np.inf)
     datasets.write(data.assign_attrs(content=datasets.fingerprint(data)), victim)  # well made, and wrong
     done = probe(tmp_path, "--check", "--fresh")
     assert done.exit_code == 1

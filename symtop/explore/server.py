@@ -83,7 +83,8 @@ class Handler(BaseHTTPRequestHandler):
             self._refuse(415, "a question must be JSON")
             return
         try:
-            length = whole("the length of a question", self.headers.get("Content-Length", "0"), 0)
+            given = self.headers.get("Content-Length", "0")
+            length = whole("the length of a question", int(given) if given.isdecimal() else given, 0)
             if length > LONGEST:
                 self._refuse(413, f"a question must be at most {LONGEST} bytes, not {length}")
                 return

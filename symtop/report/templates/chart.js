@@ -2,7 +2,9 @@
 // Every chart also exists as a figure; this adds nothing that cannot be read without it.
 "use strict";
 (() => {
-  const SVG = "http://www.w3.org/2000/svg";
+  const sample = document.createElement("template");
+  sample.innerHTML = "<svg></svg>";
+  const SVG = sample.content.firstChild.namespaceURI;
   const MARKS = { // outlines in a box of two by two around the point
     o: "M-1 0a1 1 0 1 0 2 0a1 1 0 1 0 -2 0z", s: "M-.9-.9H.9V.9H-.9z", "^": "M0-1.1L1 .8H-1z", v: "M0 1.1L1-.8H-1z",
     "<": "M-1.1 0L.8-1V1z", ">": "M1.1 0L-.8-1V1z", D: "M0-1.2L1.2 0L0 1.2L-1.2 0z", d: "M0-1.2L.8 0L0 1.2L-.8 0z",
