@@ -185,9 +185,7 @@ def test_a_bad_port_is_refused(site):
 
 def test_the_command_serves_until_it_is_ended():
     command = [sys.executable, "-m", "symtop.cli", "explore", "--no-browser"]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[1], preexec_fn=_listen
-    ) as process:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[1]) as process:
         try:
             port = int(re.search(r":(\d+)/", process.stdout.readline()).group(1))
             connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)

@@ -14,8 +14,8 @@ from symtop.study.study import Case
 from tests.browser import Browser
 
 FEW = (
-    "midpoint", "trapezoidal", "galerkin-simpson", "stormer-verlet", "takahashi-imada", "rk4", "rk45-compiled", "gauss-8",
-    "taylor", "rk45",
+    "midpoint", "trapezoidal", "galerkin-simpson", "stormer-verlet", "takahashi-imada", "rk4", "rk45-compiled",
+    "gauss-8", "taylor", "rk45",
 )  # fmt: skip
 
 
