@@ -21,7 +21,6 @@ from symtop.measure.notebook import (
     energies,
     figures_kept,
     hard_way,
-    modified_energy,
     notebook_top,
     nutation_cubic,
     rate_of_alpha,
@@ -30,6 +29,7 @@ from symtop.measure.notebook import (
     with_alpha,
 )
 from symtop.measure.order import power_law
+from symtop.measure.shadow import modified_energy
 from symtop.report import solid
 
 FIRST = symtop.scene("spheroid").top
@@ -211,11 +211,9 @@ def test_the_modified_energy_is_kept_to_fourth_order(method):
 def test_the_modified_energy_of_another_method_does_not_serve():
     where = symtop.scene("spheroid")
     run = symtop.simulate(where, "midpoint", step_size=0.01, guard=False)
-    theta, p_theta, h = run["theta"].values, run["p_theta"].values, run.attrs["step_size"]
-    own, other = (np.ptp(modified_energy(where, name, theta, p_theta, h)) for name in ("midpoint", "stormer-verlet"))
+    states, h = np.stack([run["theta"].values, run["p_theta"].values], axis=1), run.attrs["step_size"]
+    own, other = (np.ptp(modified_energy(where, name, "angles", states, h)) for name in ("midpoint", "stormer-verlet"))
     assert own < 0.02 * np.ptp(run["energy"].values) < other
-    with pytest.raises(SymtopError, match="trapezoidal"):
-        modified_energy(where, "trapezoidal", theta, p_theta, h)
 
 
 def test_every_discrete_method_keeps_the_momenta_and_is_shown():

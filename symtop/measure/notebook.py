@@ -29,10 +29,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop import charts
-from symtop.checks import SymtopError, positive
+from symtop.checks import SymtopError
 from symtop.integrators.registry import integrators
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import energy_scale
+from symtop.measure.shadow import modified_energy
 from symtop.scenes import Scene, closed_form
 from symtop.simulate import simulate
 from symtop.top import SymmetricTop
@@ -222,21 +223,6 @@ def alpha_table(scene: Scene, alpha: float, samples: int = 501) -> xr.Dataset:
     return xr.Dataset(found)
 
 
-def modified_energy(scene: Scene, method: str, theta: Array, p_theta: Array, h: float) -> Array:
-    """The energy that the map of `midpoint` or `stormer-verlet` keeps to O(h^4)."""
-    top = scene.top
-    momenta = top.momenta(scene.start)
-    bend, slope = top.potential_curvature(theta, momenta), top.potential_slope(theta, momenta)
-    fast, steep = bend * p_theta**2 / top.I1**2, slope**2 / top.I1
-    H: Array = top.reduced_energy(theta, p_theta, momenta.p_phi, momenta.p_psi)
-    corrections = {"midpoint": -(fast + steep) / 24.0, "stormer-verlet": fast / 12.0 - steep / 24.0}
-    if method not in corrections:
-        msg = f"method must be one of {', '.join(corrections)}, not {method!r}"
-        raise SymtopError(msg)
-    shadow: Array = H + positive("h", h) ** 2 * corrections[method]
-    return shadow
-
-
 def shadow_table(scene: Scene, method: str, steps: Sequence[float]) -> xr.Dataset:
     """Largest change of the energy and of the modified energy at several steps, and both over time at the first.
 
@@ -247,7 +233,8 @@ def shadow_table(scene: Scene, method: str, steps: Sequence[float]) -> xr.Datase
     for step in steps:
         run = simulate(scene, method, step_size=step, observe="nutation", samples=SAMPLES, guard=False)
         h = run.attrs["step_size"]
-        shadow = modified_energy(scene, method, run["theta"].values, run["p_theta"].values, h)
+        states = np.stack([run["theta"].values, run["p_theta"].values], axis=1)
+        shadow = modified_energy(scene, method, "angles", states, h)
         curves = {"energy_swing": run["energy"].values, "modified_swing": shadow}
         found["shadow_step_size"].append(h)
         for name, values in curves.items():

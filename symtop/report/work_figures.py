@@ -14,6 +14,7 @@ SHORT = {
     "stormer-verlet": "verlet", "takahashi-imada": "takahashi", "suzuki-umeno-8": "umeno-8",
     "sofroniou-spaletta-10": "sofroniou-10", "taylor-longdouble": "taylor-long", "rk45-compiled": "rk45-comp",
     "stormer-verlet-yoshida-4": "verlet-y4", "stormer-verlet-suzuki-4": "verlet-s4", "galerkin-simpson": "galerkin",
+    "midpoint-unreduced": "midpoint-u", "trapezoidal-unreduced": "trapezoidal-u",
     "stormer-verlet-blanes-moan-6": "verlet-bm6",
 }  # fmt: skip
 

@@ -1,6 +1,7 @@
 """What the work-precision study says in words, all of it from the data."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -24,11 +25,20 @@ def seconds(value: float) -> str:
     return f"{value * 1e6:.3g} us" if value < 1e-3 else f"{value * 1e3:.3g} ms" if value < 1.0 else f"{value:.3g} s"
 
 
+MOST_NAMES = 3
+
+
+def few(names: Sequence[str]) -> str:
+    """The first names, and how many more there are."""
+    more = len(names) - MOST_NAMES
+    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
 def winner(won: ranking.Win | None) -> str:
     """Who won, in how long, and who is level."""
     if won is None:
         return "nobody"
-    level = f", level with {', '.join(won.level)}" if won.level else ""
+    level = f", level with {few(won.level)}" if won.level else ""
     return f"{won.best.integrator}, {seconds(won.best.cost)}{level}"
 
 
@@ -39,7 +49,7 @@ def lead(target: float, cell: xr.Dataset) -> str:
         return f"{target:.0e} nobody"
     said = f"{target:.0e} {won.best.integrator} in {seconds(won.best.cost)}"
     if won.level:
-        said += f" (inside the noise of {', '.join(won.level)})"
+        said += f" (inside the noise of {few(won.level)})"
     elif won.behind and won.lead:
         said += f" ({won.lead.ratio:.1f} times ahead of {won.behind.integrator})"
     if won.best.integrator == "exact" and (other := ranking.win(cell, target, without=("exact",))):
@@ -98,7 +108,7 @@ def crossed(data: xr.Dataset) -> str:
 def opening(data: xr.Dataset) -> Opening:
     """Which method to begin with: for each horizon and target the one closest to the fastest over all scenes."""
     rows, sentences = [], []
-    names = [str(n) for n in data["integrator"].values if "compiled" in data["tier"].sel(integrator=n).values]
+    names = [name for name in map(str, data["integrator"].values) if _steps(data.sel(integrator=name))]
     ahead: Counter[str] = Counter()
     for far, span in enumerate(spans(data)):
         table = ranking.relative(ranking.costs(data.isel(horizon=[far])), names).sel(integrator=names)
@@ -128,6 +138,12 @@ def opening(data: xr.Dataset) -> Opening:
     )
     header = ["horizon", "axis error", "begin with", "meets it on", "time over the fastest", "then"]
     return Opening("Which integrator should I use?", sentences, Table("A method to begin with", header, rows))
+
+
+def _steps(cell: xr.Dataset) -> bool:
+    """Is it compiled, and does it step? The closed form does not."""
+    turned = np.isfinite(cell["step_size"].values) | np.isfinite(cell["tolerance"].values)
+    return bool(turned.any()) and "compiled" in cell["tier"].values
 
 
 def charts(data: xr.Dataset) -> list[Chart]:
