@@ -185,12 +185,6 @@ def verdict(data: xr.Dataset) -> list[str]:
         + ", ".join(f"{name} on {times}" for name, times in count.most_common())
         + f"; {sum(won.reliable for won in wins)} of these leads are beyond the noise."
     ]
-    for name in data["scene"].values:
-        for far, span in enumerate(words.spans(data)):
-            cell = data.sel(scene=name).isel(horizon=far)
-            sentences.append(
-                f"{name}, axis error {span}: " + "; ".join(words.lead(target, cell) for target in TARGETS) + "."
-            )
     sentences.append(f"Energy {words.spans(data)[-1]}: " + " ".join(words.crossings(data)))
     slow = [str(m) for m in data["integrator"].values if "python" in data["tier"].sel(integrator=m).values]
     if slow:
@@ -209,6 +203,12 @@ def verdict(data: xr.Dataset) -> list[str]:
         if np.isfinite(miss).any()
         else f"{int(timed.sum())} of {int(known.sum())} run times were measured."
     )
+    for name in data["scene"].values:
+        for far, span in enumerate(words.spans(data)):
+            cell = data.sel(scene=name).isel(horizon=far)
+            sentences.append(
+                f"{name}, axis error {span}: " + "; ".join(words.lead(target, cell) for target in TARGETS) + "."
+            )
     return sentences
 
 
