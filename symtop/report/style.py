@@ -83,8 +83,8 @@ def use() -> None:
     mpl.use("Agg")
     plt.rcParams.update(
         {
-            "figure.dpi": 110,
-            "savefig.dpi": 110,
+            "figure.dpi": 100,
+            "savefig.dpi": 100,
             "figure.constrained_layout.use": True,
             "font.size": 10.0,
             "axes.titlesize": 10.5,
