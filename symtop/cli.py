@@ -15,6 +15,21 @@ import click
 from symtop import __version__
 from symtop.checks import SymtopError
 
+
+def _completing(of: str) -> Any:
+    """Offer names of the package's scenes, integrators or studies to the shell."""
+
+    def complete(_: click.Context, __: click.Parameter, begun: str) -> list[str]:
+        from symtop.integrators.registry import integrators  # noqa: PLC0415
+        from symtop.scenes import scenes  # noqa: PLC0415
+        from symtop.study import scripts  # noqa: PLC0415
+
+        known = {"scenes": scenes, "integrators": integrators, "studies": scripts.names}[of]()
+        return [name for name in known if name.startswith(begun)]
+
+    return complete
+
+
 plugin_option = click.option(
     "--plugin",
     "plugin_files",
@@ -100,8 +115,8 @@ def _say(warning: str) -> None:
 
 
 @main.command()
-@click.argument("scene")
-@click.argument("integrator")
+@click.argument("scene", shell_complete=_completing("scenes"))
+@click.argument("integrator", shell_complete=_completing("integrators"))
 @click.option("--step-size", type=float, help="Step of a fixed-step method.")
 @click.option("--tolerance", type=float, help="Tolerance of an adaptive method.")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
@@ -166,8 +181,8 @@ def run(
 
 
 @main.command()
-@click.argument("scene")
-@click.argument("integrator")
+@click.argument("scene", shell_complete=_completing("scenes"))
+@click.argument("integrator", shell_complete=_completing("integrators"))
 @click.option("--steps", type=float, default=1e9, show_default=True, help="How many steps.")
 @click.option("--step-size", type=float, help="A thousandth of a nutation by default.")
 @click.option(
@@ -205,7 +220,7 @@ def long(
 
 
 @main.command()
-@click.argument("names", nargs=-1, metavar="[INTEGRATOR]...")
+@click.argument("names", nargs=-1, metavar="[INTEGRATOR]...", shell_complete=_completing("integrators"))
 @click.option("--scene", default="spheroid", show_default=True, help="The scene to judge on.")
 @click.option("--quick", is_flag=True, help="Shorter runs, one chart.")
 @plugin_option
@@ -243,7 +258,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, plugin_files: tuple[
 
 
 @main.command()
-@click.argument("names", nargs=-1)
+@click.argument("names", nargs=-1, shell_complete=_completing("studies"))
 @click.option("--all", "every", is_flag=True, help="Run every study.")
 @click.option("--quick", is_flag=True, help="Coarse grids, a few seconds a study; kept apart from the full results.")
 @click.option("--full", is_flag=True, help="The longest grid of a study that has one.")
@@ -319,7 +334,7 @@ def report(results: str, plugin_files: tuple[str, ...]) -> None:
 
 
 @main.command()
-@click.argument("scene")
+@click.argument("scene", shell_complete=_completing("scenes"))
 @click.option("--accuracy", type=float, required=True, help="The largest error you accept, for example 1e-6.")
 @click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")

@@ -108,3 +108,14 @@ def test_a_run_is_drawn_and_printed_as_json(tmp_path):
     assert 1e-3 < found["errors"]["axis"]["largest"] < 2e-2
     assert found["errors"]["p_psi"]["largest"] < 1e-14
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("begun", "offered"),
+    [("symtop run sph", "spheroid"), ("symtop run spheroid midp", "midpoint"), ("symtop study cl", "claims")],
+)
+def test_the_shell_completes_names(begun, offered):
+    words = begun.split()
+    told = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": begun, "COMP_CWORD": str(len(words) - 1)}
+    done = CliRunner().invoke(main, prog_name="symtop", env=told)
+    assert f"plain,{offered}" in done.output
