@@ -24,7 +24,7 @@ def _completing(of: str) -> Any:
         from symtop.scenes import scenes  # noqa: PLC0415
         from symtop.study import scripts  # noqa: PLC0415
 
-        known = {"scenes": scenes, "integrators": integrators, "studies": scripts.names}[of]()
+        known = {"scenes": list(scenes()), "integrators": list(integrators()), "studies": scripts.names()}[of]
         return [name for name in known if name.startswith(begun)]
 
     return complete
