@@ -59,7 +59,14 @@ def test_a_twin_that_leaves_the_chart_says_so():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "key",
-    [("stormer-verlet", "angles"), ("strang", "axis"), ("midpoint", "angles"), ("rk4", "axis"), ("gauss-6", "axis")],
+    [
+        ("stormer-verlet", "angles"),
+        ("strang", "axis"),
+        ("midpoint", "angles"),
+        ("rk4", "axis"),
+        ("gauss-6", "axis"),
+        ("gauss-2", "attitude"),  # nine components: the widest state that the loop adds up
+    ],
     ids="-".join,
 )
 def test_a_kernel_takes_at_most_a_quarter_more_than_its_twin(key):

@@ -8,10 +8,11 @@
 
 #define MOST 6
 #define SWEEPS 100
+#define STILL 5 /* L_z has no slope: its increments stay zero */
 #define ROUND_OFF 1e-14
 
 typedef struct { double stages, mu[MOST][MOST], b[MOST], predict[MOST][MOST]; } Rule;
-typedef struct { double L[MOST][DIM], next[MOST][DIM], weights[MOST], scale[DIM]; } Carry;
+typedef struct { double L[MOST][DIM], next[MOST][DIM], weights[MOST], scale; } Carry;
 
 static void begin(const Par *par, const Rule *rule, const double *state, double h, Carry *carry) {
     int stages = (int)rule->stages;
@@ -23,7 +24,7 @@ static void begin(const Par *par, const Rule *rule, const double *state, double 
     }
     double momentum = sqrt(state[3] * state[3] + state[4] * state[4] + state[5] * state[5]);
     momentum += sqrt(par->I1 * fabs(par->mgl));
-    for (int m = 0; m < DIM; m++) carry->scale[m] = m >= 3 && m < 6 && momentum > 0.0 ? 1.0 / momentum : 1.0;
+    carry->scale = momentum > 0.0 ? 1.0 / momentum : 1.0;
     field(par, state, slope);
     for (int i = 0; i < stages; i++)
         for (int m = 0; m < DIM; m++) carry->L[i][m] = carry->weights[i] * slope[m];
@@ -39,26 +40,31 @@ static inline int increment(
     for (int i = 0; i < stages; i++) {
         for (int m = 0; m < DIM; m++) carry->next[i][m] = 0.0;
         for (int j = 0; j < stages; j++)
-            for (int m = 0; m < DIM; m++) carry->next[i][m] += rule->predict[i][j] * carry->L[j][m];
+            for (int m = 0; m < DIM; m++)
+                if (m != STILL) carry->next[i][m] += rule->predict[i][j] * carry->L[j][m];
     }
     for (int i = 0; i < stages; i++)
         for (int m = 0; m < DIM; m++) carry->L[i][m] = carry->next[i][m];
     while (effort < SWEEPS) {
-        double correction = 0.0;
+        double gap = 0.0, gap_momentum = 0.0, correction;
         for (int i = 0; i < stages; i++) {
             double place[DIM] = {0.0}, slope[DIM];
             for (int j = 0; j < stages; j++)
-                for (int m = 0; m < DIM; m++) place[m] += rule->mu[i][j] * carry->L[j][m];
+                for (int m = 0; m < DIM; m++)
+                    if (m != STILL) place[m] += rule->mu[i][j] * carry->L[j][m];
             for (int m = 0; m < DIM; m++) place[m] = state[m] + place[m];
             field(par, place, slope);
             for (int m = 0; m < DIM; m++) {
+                if (m == STILL) continue;
                 double value = carry->weights[i] * slope[m];
-                double change = fabs(value - carry->L[i][m]) * carry->scale[m];
-                correction = change > correction ? change : correction;
+                double change = fabs(value - carry->L[i][m]), *largest = 3 <= m && m < 6 ? &gap_momentum : &gap;
+                *largest = change > *largest ? change : *largest;
                 carry->L[i][m] = value;
             }
         }
         effort++;
+        gap_momentum *= carry->scale;
+        correction = gap_momentum > gap ? gap_momentum : gap;
         if (correction == 0.0 || (correction >= last && correction < ROUND_OFF)) {
             outcome = 0;
             break;

@@ -59,15 +59,19 @@ class March(NamedTuple):
 
 
 def accumulate(state: Any, low: Any, dstate: Any) -> Any:
-    """(state + low) + dstate as a new pair of high and low parts; exact (Knuth's two-sum)."""
+    """(state + low) + dstate as a new pair of high and low parts; exact (Knuth's two-sum).
+
+    One loop for both tuples is too long for LLVM to unroll over the nine components of a frame; left as it is, it moves
+    both through memory at each of them, 34 ns a step.
+    """
+    total = state
+    for i in range(len(state)):
+        total = set_item(total, i, state[i] + (dstate[i] + low[i]))
     for i in range(len(state)):
         addend = dstate[i] + low[i]
-        total = state[i] + addend
-        virtual = total - state[i]
-        error = (state[i] - (total - virtual)) + (addend - virtual)
-        state = set_item(state, i, total)
-        low = set_item(low, i, error)
-    return state, low
+        virtual = total[i] - state[i]
+        low = set_item(low, i, (state[i] - (total[i] - virtual)) + (addend - virtual))
+    return total, low
 
 
 def accumulate_plainly(state: Any, low: Any, dstate: Any) -> Any:
