@@ -146,6 +146,9 @@ def run(
     from symtop.simulate import simulate  # noqa: PLC0415
 
     _load_plugins(plugin_files)
+    if figure is not None and Path(figure).suffix != ".png":
+        msg = f"figure must be a file that ends in .png, not {figure!r}"
+        raise SymtopError(msg)
     data = simulate(
         scene, integrator, step_size=step_size, tolerance=tolerance, horizon=horizon, samples=samples, observe=observe,
         guard=_say if guard else False, budget=budget,
@@ -200,12 +203,18 @@ def long(
     symtop long spheroid stormer-verlet --steps 1e9 --output long.nc
     """
     from symtop import datasets  # noqa: PLC0415
+    from symtop.checks import whole  # noqa: PLC0415
     from symtop.measure.longrun import PER_NUTATION, long_run  # noqa: PLC0415
     from symtop.scenes import scene as find_scene  # noqa: PLC0415
 
     _load_plugins(plugin_files)
     h = find_scene(scene).nutation_period / PER_NUTATION if step_size is None else step_size
-    data = long_run(scene, integrator, steps=int(steps), step_size=h, checkpoint=checkpoint or True)
+    count = whole("steps", steps, 1)
+    try:
+        data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True)
+    except KeyboardInterrupt:
+        click.echo("symtop: interrupted; what was run is kept: the same command goes on from there", err=True)
+        sys.exit(130)
     click.echo(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
     if data.sizes["window"]:
         for name in ("energy", "modified_energy", "p_phi", "p_psi"):

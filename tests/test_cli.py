@@ -119,3 +119,17 @@ def test_the_shell_completes_names(begun, offered):
     told = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": begun, "COMP_CWORD": str(len(words) - 1)}
     done = CliRunner().invoke(main, prog_name="symtop", env=told)
     assert f"plain,{offered}" in done.output
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("run spheroid midpoint --step-size 0.01 --figure run.txt", "figure must be"),
+        ("long spheroid midpoint --steps nan", "steps must be"),
+        ("long spheroid midpoint --steps 1.5", "steps must be"),
+    ],
+)
+def test_what_cannot_be_written_or_counted_is_refused(words, said):
+    done = CliRunner().invoke(main, words.split())
+    assert done.exit_code == 2
+    assert said in done.output

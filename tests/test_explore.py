@@ -171,6 +171,14 @@ def test_exports_over_http(site, tmp_path):
     assert body.decode() == answers.script(answers.question(asked))
 
 
+def test_an_adaptive_run_that_takes_too_long_ends_and_says_so():
+    asked = answers.question(fields(integrator="rk45-compiled", tolerance=1e-12, horizon=1e5))
+    began = time.monotonic()
+    assert "limit on the work" in answers.answer(asked)["sentence"]
+    assert time.monotonic() - began < 10.0
+    assert f"budget={asked.budget!r}" in answers.script(asked)
+
+
 def test_nothing_on_the_page_comes_from_elsewhere():
     for path in STATIC.iterdir():
         assert not re.search(r"https?://|//cdn|@import|eval\(", path.read_text()), path.name

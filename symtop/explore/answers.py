@@ -24,6 +24,7 @@ from symtop.top import Angles, SymmetricTop
 TOP = ("I1", "I3", "mgl")
 START = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
 MOST_STEPS = 2_000_000  # a quarter of a second of the common kernels
+MOST_WORK = {"compiled": 2e6, "python": 2e5}  # force evaluations of an adaptive run: two seconds at most
 A_NUTATION = 60  # samples, as far as they go
 SAMPLES = (601, 4001)
 
@@ -39,6 +40,11 @@ class Question:
     def knob(self, name: str) -> float | None:
         """The setting, if this is the method's knob."""
         return self.setting if self.method.knob == name else None
+
+    @property
+    def budget(self) -> float | None:
+        """The work an adaptive run may take; more, and it ends there and says so."""
+        return MOST_WORK[self.method.tier] if self.method.knob == "tolerance" else None
 
     @property
     def samples(self) -> int:
@@ -77,7 +83,7 @@ def dataset(asked: Question, tell: Callable[[str], object]) -> xr.Dataset:
     """The run as `simulate` returns it; what its guard has to say goes to `tell`."""
     return simulate(
         asked.scene, asked.method, step_size=asked.knob("step_size"), tolerance=asked.knob("tolerance"),
-        observe="attitude", samples=asked.samples, guard=tell,
+        observe="attitude", samples=asked.samples, guard=tell, budget=asked.budget,
     )  # fmt: skip
 
 
@@ -141,6 +147,7 @@ def script(asked: Question) -> str:
     shown_top = ", ".join(f"{name}={getattr(top, name)!r}" for name in TOP)
     shown_start = ", ".join(f"{name}={getattr(start, name)!r}" for name in START)
     knob = "" if asked.method.knob is None else f", {asked.method.knob}={asked.setting!r}"
+    knob += "" if asked.budget is None else f", budget={asked.budget!r}"
     return "\n".join(
         [
             f'"""A run that was found with symtop explore, symtop {__version__}."""',

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.ticker import LogLocator
 
 from symtop.report.style import GREY, VERMILLION, YELLOW, Look, legend_below, look, panels, slope_guide
 
@@ -39,6 +40,7 @@ def error_curves(
             else:
                 _curve(axis, xs, ys, judged.get((scene, name)), look(str(name)), str(name), _dashed(cell))
         axis.set(xscale="log", yscale="log", title=scene)
+        axis.xaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))  # labels of all nine would collide
         axis.grid(visible=True, which="major")
     for axis in axes.flat[len(scenes) :]:
         axis.set_visible(False)
