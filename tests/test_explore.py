@@ -174,7 +174,7 @@ def test_exports_over_http(site, tmp_path):
 def test_an_adaptive_run_that_takes_too_long_ends_and_says_so():
     asked = answers.question(fields(integrator="rk45-compiled", tolerance=1e-12, horizon=1e5))
     began = time.monotonic()
-    assert "limit on the work" in answers.answer(asked)["sentence"]
+    assert "limit on the work" in answers.answer(asked)["message"]
     assert time.monotonic() - began < 10.0
     assert f"budget={asked.budget!r}" in answers.script(asked)
 
