@@ -15,9 +15,11 @@ import symtop
 from symtop import charts
 from symtop.cli import main
 from symtop.integrators.registry import Integrator, Run
+from symtop.measure import claims
 from symtop.measure import claims_long as long
 from symtop.measure.claims import judge
 from symtop.measure.claims_order import limit
+from symtop.measure.growth import behaviour
 from symtop.measure.ledger import CLAIMS, VERDICTS, Finding, read
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.study import plugins
@@ -104,7 +106,8 @@ WAVE = 1e-5 * np.sin(37.1 * TIME)  # not commensurate with the samples
         (WAVE, "bounded"),
         (WAVE + 1e-9 * TIME, "drift"),  # most of it below the wave
         (1e-9 * TIME, "drift"),
-        (1e-7 * np.sqrt(TIME) * np.sin(37.1 * TIME), "random walk"),
+        (1e-12 * np.sqrt(TIME) * np.sin(37.1 * TIME), "random walk"),
+        (1e-7 * np.sqrt(TIME) * np.sin(37.1 * TIME), "growing"),  # too large for a walk of rounding
         (np.full(4001, np.nan), "unknown"),
         (np.where(TIME > 4.0, 1e-15 * 500.0 * TIME, 0.0), "drift"),  # 1e-15 a step, 2 ms each
     ],
@@ -113,10 +116,47 @@ def test_kinds_of_growth(residual, kind):
     assert long._judged(TIME, residual, residual[:100], 1_000_000).kind == kind
 
 
+@pytest.mark.parametrize(
+    ("size", "slope", "interval", "kind"),
+    [
+        (1e-12, 1.0, 0.01, "kept"),
+        (1e-5, 0.02, 0.1, "bounded"),
+        (1e-5, 0.1, 0.5, "growing"),  # 0 or 1/2
+        (2e-11, 0.5, 0.2, "random walk"),
+        (2e-5, 0.5, 0.2, "growing"),  # not by rounding
+        (2e-11, 0.74, 0.28, "growing"),  # 1/2 or 1
+        (2e-11, 0.4, 0.45, "growing"),  # 0 or 1/2
+        (1e-5, 1.0, 0.1, "drift"),
+        (1e-5, 2.0, 0.1, "drift"),
+        (1e-5, 0.9, 0.45, "growing"),  # 1/2 or 1
+        (1e-5, math.nan, math.nan, "growing"),
+    ],
+)
+def test_a_law_is_named_only_if_the_interval_excludes_its_neighbours(size, slope, interval, kind):
+    assert behaviour(size, slope, interval, rounding=1e-11) == kind
+
+
+def test_no_exponent_is_no_evidence_that_a_constant_is_bounded():
+    short = np.where(TIME < 4.0, WAVE + 1e-6, np.nan)  # ends before the last two decades begin
+    found = long._judged(TIME, short, short[:2], 2000)
+    assert math.isnan(found.exponent)
+    assert (found.kind, found.grows) == ("unknown", None)
+
+
 def test_a_wave_with_noise_is_never_a_drift():
     draw = np.random.default_rng(5)
     kinds = [long._judged(TIME, WAVE + 1e-6 * draw.standard_normal(TIME.size), WAVE, 1).kind for _ in range(200)]
     assert set(kinds) == {"bounded"}
+
+
+def test_the_worst_chart_decides():
+    """rk4 keeps p_phi on the axis, where it is linear in the state, and loses it to truncation in the angles."""
+    rk4 = symtop.integrator("rk4")
+    runs = {chart: long.long_run(rk4, SPHEROID, chart, quick=True) for chart in rk4.charts()}
+    assert {chart: run.constants["p_phi"].kind for chart, run in runs.items()} == {"angles": "drift", "axis": "kept"}
+    found = claims._over_steps(rk4, SPHEROID, quick=True, traces={})["p_phi"]
+    assert found.measured.startswith("drift")
+    assert found.why.endswith("in the angles chart")
 
 
 def test_the_cayley_energy_is_kept_by_nobody_else():
@@ -162,6 +202,23 @@ def test_memory_that_grows_with_the_steps_is_seen():
     assert 16.0 < long.memory_a_step(dataclasses.replace(good, solvers={"angles": hoard}), SPHEROID) < 48.0
 
 
+@pytest.mark.parametrize(
+    ("name", "declared", "verdict"),
+    [
+        ("radau", True, "undecided"),
+        ("lsoda", True, "undecided"),
+        ("dop853", True, "confirmed"),
+        ("dop853", None, "measured"),
+        ("dop853", False, "undecided"),  # a Rosenbrock method costs as evenly
+    ],
+)
+def test_an_adaptive_method_is_not_explicit_because_it_says_so(name, declared, verdict):
+    said = dataclasses.replace(symtop.integrator(name), explicit=declared)
+    found = claims._explicit(said, SPHEROID, long.long_run(said, SPHEROID, "angles", quick=True))
+    assert found.verdict == verdict
+    assert ("forces by the 12" in found.why) is (name == "dop853")
+
+
 def test_the_angles_end_at_a_pole_and_the_axis_does_not():
     angles, axis = long.passages(symtop.integrator("rk4"))
     assert (angles.chart, angles.outcome, angles.passes) == ("angles", "left_chart", False)
@@ -203,10 +260,15 @@ def test_what_cannot_be_judged_says_why():
     def broken(top, start, plan):
         raise RuntimeError("no luck " * 100)
 
-    ledger = judge(Integrator(name="broken", family="other", summary="", solvers={"axis": broken}, order=2), SPHEROID)
+    said = {"order": 2, "explicit": True, "symmetric": False, "conserves": frozenset({"energy", "p_phi", "charm"})}
+    ledger = judge(Integrator(name="broken", family="other", summary="", solvers={"axis": broken}, **said), SPHEROID)
     judged = [found for found in ledger.findings if found.verdict != "inapplicable"]
     assert {found.verdict for found in judged} == {"undecided"}
     assert all("no luck" in found.why and len(found.why) < 260 for found in judged)
+    assert {found.claim: found.declared for found in judged if found.declared} == {
+        "order": "2", "symmetric": "no", "energy": "kept", "p_phi": "kept", "invariant": "charm", "explicit": "yes",
+        "pole": "no pole",
+    }  # fmt: skip
     odd = dataclasses.replace(symtop.integrator("strang"), conserves=frozenset({"charm"}))
     assert "no formula for charm" in judge(odd, SPHEROID, quick=True)["invariant"].why
 
@@ -228,6 +290,8 @@ CAUGHT = {
     "coefficient_off": ("order", r"goes to zero it goes to a motion that is wrong by \d\.\de-09"),
     "verlet_swapped": ("order", r"goes to zero it goes to a motion that is wrong by \d\.\de-01"),
     "leaking_momentum": ("p_phi", r"growth exponent 1\.00 .* drifting by 8\.\de-12 a step"),
+    "leaking_chart": ("p_phi", r"growth exponent 1\.00 .* a step, in the attitude chart"),
+    "adaptive_implicit": ("explicit", r"reports \d\.\d\d iterations a step, in the angles chart"),
 }
 # what follows from the lie, and what a liar that looks at its start leaves open
 FOLLOWS = {
