@@ -144,7 +144,7 @@ def horizon(time: ArrayLike, error: ArrayLike, tolerance: float) -> Horizon:
 
 
 def lost_at(time: ArrayLike, error: ArrayLike, tolerance: float) -> float:
-    """When |error| did reach `tolerance` for good, between means over short stretches; NaN if it did not."""
+    """When |error| first reached `tolerance`, between means over short stretches; NaN if it never did, or at once."""
     t, e = _means(time, error)
     over = np.abs(e) >= tolerance
     if not over.any() or over[0]:
