@@ -18,6 +18,7 @@ from symtop.integrators.registry import Integrator, Run
 from symtop.measure import claims_long as long
 from symtop.measure.claims import judge
 from symtop.measure.claims_order import limit
+from symtop.measure.growth import behaviour
 from symtop.measure.ledger import CLAIMS, VERDICTS, Finding, read
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.study import plugins
@@ -104,13 +105,41 @@ WAVE = 1e-5 * np.sin(37.1 * TIME)  # not commensurate with the samples
         (WAVE, "bounded"),
         (WAVE + 1e-9 * TIME, "drift"),  # most of it below the wave
         (1e-9 * TIME, "drift"),
-        (1e-7 * np.sqrt(TIME) * np.sin(37.1 * TIME), "random walk"),
+        (1e-12 * np.sqrt(TIME) * np.sin(37.1 * TIME), "random walk"),
+        (1e-7 * np.sqrt(TIME) * np.sin(37.1 * TIME), "growing"),  # too large for a walk of rounding
         (np.full(4001, np.nan), "unknown"),
         (np.where(TIME > 4.0, 1e-15 * 500.0 * TIME, 0.0), "drift"),  # 1e-15 a step, 2 ms each
     ],
 )
 def test_kinds_of_growth(residual, kind):
     assert long._judged(TIME, residual, residual[:100], 1_000_000).kind == kind
+
+
+@pytest.mark.parametrize(
+    ("size", "slope", "interval", "kind"),
+    [
+        (1e-12, 1.0, 0.01, "kept"),
+        (1e-5, 0.02, 0.1, "bounded"),
+        (1e-5, 0.1, 0.5, "growing"),  # 0 or 1/2
+        (2e-11, 0.5, 0.2, "random walk"),
+        (2e-5, 0.5, 0.2, "growing"),  # not by rounding
+        (2e-11, 0.74, 0.28, "growing"),  # 1/2 or 1
+        (2e-11, 0.4, 0.45, "growing"),  # 0 or 1/2
+        (1e-5, 1.0, 0.1, "drift"),
+        (1e-5, 2.0, 0.1, "drift"),
+        (1e-5, 0.9, 0.45, "growing"),  # 1/2 or 1
+        (1e-5, math.nan, math.nan, "growing"),
+    ],
+)
+def test_a_law_is_named_only_if_the_interval_excludes_its_neighbours(size, slope, interval, kind):
+    assert behaviour(size, slope, interval, rounding=1e-11) == kind
+
+
+def test_no_exponent_is_no_evidence_that_a_constant_is_bounded():
+    short = np.where(TIME < 4.0, WAVE + 1e-6, np.nan)  # ends before the last two decades begin
+    found = long._judged(TIME, short, short[:2], 2000)
+    assert math.isnan(found.exponent)
+    assert (found.kind, found.grows) == ("unknown", None)
 
 
 def test_a_wave_with_noise_is_never_a_drift():

@@ -235,8 +235,12 @@ def _constant(claim: str, declared: str, run: long.LongRun, found: long.Constant
         why += f"; but the run {run.message}"
         return Finding(claim, declared, measured, "undecided", why, found.largest, found.floor)
     if kind == "unknown":
-        return Finding(claim, declared, measured, "undecided", f"the run {run.message}", found.largest, found.floor)
-    true = {"kept": kind == "kept", "bounded": kind in ("kept", "bounded")}.get(declared)
+        why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"
+        return Finding(claim, declared, measured, "undecided", why, found.largest, found.floor)
+    if declared == "bounded" and found.grows is None:
+        why += ", which leaves open whether it grows"
+        return Finding(claim, declared, measured, "undecided", why, found.largest, found.floor)
+    true = {"kept": kind == "kept", "bounded": not found.grows}.get(declared)
     verdict = "measured" if true is None else "confirmed" if true else "refuted"
     return Finding(claim, declared, measured, verdict, why, found.largest, found.floor)
 

@@ -2,8 +2,8 @@
 
 A constant is kept if after n steps it is off by no more than `KEPT`, relative, or by the random walk that the rounding
 seen in one step makes, n^1/2 times as much: a bias beyond a thousandth of that rounding is seen in a million steps.
-An energy that is not kept is bounded, a random walk or a drift by the exponent of its growth (0, 1/2, 1) with its 95 %
-interval; a drift that hides below a bounded oscillation shows in the means of 24 equal stretches, and counts if the
+An energy that is not kept is bounded, a random walk or a drift by the exponent of its growth (0, 1/2, 1) if its 95 %
+interval excludes the other two (`symtop.measure.growth.behaviour`), and else just growing; a drift that hides below a bounded oscillation shows in the means of 24 equal stretches, and counts if the
 line through them exceeds `SURE` of its own intervals. Random walks pass a plain test of the slope in one case in three;
 this one they do not pass, and at the size of rounding nothing but the size is judged.
 
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from symtop.integrators.registry import Integrator
 from symtop.measure.conservation import residuals, trend
 from symtop.measure.errors import errors
-from symtop.measure.growth import growth
+from symtop.measure.growth import behaviour, growth
 from symtop.reference import reference
 from symtop.scenes import Scene
 from symtop.simulate import simulate
@@ -43,8 +43,7 @@ TOLERANCE = 1e-6  # of an adaptive method without a default of its own
 SLOW = {"taylor-quad": 0.002}  # quadruple precision is software
 KEPT = 1e-11
 ROUNDING = 2e-13  # a change in one step that may be rounding, where |p| is small beside what makes it up
-BOUNDED, LINEAR = 0.25, 0.75  # exponents between which growth is a random walk
-NEAR = 0.1  # to the exponent of a random walk
+BOUNDED = 0.25  # an exponent that exceeds it with its whole interval is growth
 SURE = 8.0
 VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
 
@@ -62,17 +61,21 @@ class Constant(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """kept, bounded, random walk, drift, or just growing; unknown if it was never finite."""
-        if not math.isfinite(self.largest):
+        """kept, bounded, random walk, drift, or just growing; unknown without a size or an exponent to judge it by."""
+        found = behaviour(self.largest, self.exponent, self.interval, self.floor)
+        if found == "kept":
+            return found
+        if not (math.isfinite(self.largest) and math.isfinite(self.exponent)):
             return "unknown"
-        if self.largest <= self.floor:
-            return "kept"
         drifts = abs(self.certain) > SURE and abs(self.rise) > VISIBLE * self.largest
-        if self.exponent - self.interval > BOUNDED:
-            if drifts or self.exponent - self.interval > LINEAR:
-                return "drift"
-            return "random walk" if abs(self.exponent - 0.5) <= max(self.interval, NEAR) else "growing"
-        return "drift" if drifts else "bounded"
+        return "drift" if drifts else found
+
+    @property
+    def grows(self) -> bool | None:
+        """Is it beyond doubt that it grows? None if the exponent leaves that open."""
+        if self.kind in ("kept", "bounded", "unknown"):
+            return None if self.kind == "unknown" else False
+        return True if self.kind == "drift" or self.exponent - self.interval > BOUNDED else None
 
 
 class LongRun(NamedTuple):

@@ -25,6 +25,7 @@ from symtop.measure.order import Fit, power_law
 LAWS = {0.0: "bounded", 0.5: "random walk", 1.0: "linear", 1.5: "t^3/2", 2.0: "quadratic"}
 DRAWS = 2000
 BLOCKS = 50
+WALK = 100.0  # times what rounding explains: a larger growth as t^1/2 is no walk of rounding
 
 
 def growth(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Fit:
@@ -50,6 +51,29 @@ def law(fit: Fit, slack: float = 0.1) -> str:
     nearest = min(LAWS, key=lambda exponent: abs(exponent - fit.slope))
     agrees = abs(nearest - fit.slope) <= max(fit.interval, slack)
     return LAWS[nearest] if agrees else f"t^{fit.slope:.2f}"
+
+
+def behaviour(size: float, slope: float, interval: float, rounding: float) -> str:
+    """What became of a constant whose largest change is `size` and grows as t^slope (95 %: +- interval).
+
+    `rounding` is the largest change by the end of the run that rounding alone explains, in the unit of `size`.
+
+        kept          size <= rounding, whatever the exponent
+        bounded       the exponent is nearest to 0, and its interval excludes 1/2
+        random walk   nearest to 1/2, the interval excludes 0 and 1, and size <= `WALK` times rounding
+        drift         nearest to 1 or larger, and the interval excludes 1/2
+        growing       anything else: the interval does not tell two laws apart, a growth as t^1/2 that is too large for
+                      rounding, or no exponent (NaN)
+    """
+    if size <= rounding:
+        return "kept"
+    low, high = slope - interval, slope + interval
+    if slope < 0.25 and high < 0.5:
+        return "bounded"
+    if slope >= 0.75 and low > 0.5:
+        return "drift"
+    walks = 0.25 <= slope < 0.75 and low > 0.0 and high < 1.0
+    return "random walk" if walks and size <= WALK * rounding else "growing"
 
 
 class Ensemble(NamedTuple):
