@@ -192,7 +192,7 @@ def _summary(values: dict[str, Array]) -> list[float]:
 
 
 def _identity(where: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
-    """A hash of all that decides the bits of a run: a name may stand for other coefficients, or other code, next time."""
+    """A hash of all that decides the bits of a run; one name may stand for other coefficients or code next time."""
     top, start = where.top, where.start
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (top, start)]
     made = Ingredients()
