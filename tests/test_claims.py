@@ -15,6 +15,7 @@ import symtop
 from symtop import charts
 from symtop.cli import main
 from symtop.integrators.registry import Integrator, Run
+from symtop.measure import claims
 from symtop.measure import claims_long as long
 from symtop.measure.claims import judge
 from symtop.measure.claims_order import limit
@@ -148,6 +149,16 @@ def test_a_wave_with_noise_is_never_a_drift():
     assert set(kinds) == {"bounded"}
 
 
+def test_the_worst_chart_decides():
+    """rk4 keeps p_phi on the axis, where it is linear in the state, and loses it to truncation in the angles."""
+    rk4 = symtop.integrator("rk4")
+    runs = {chart: long.long_run(rk4, SPHEROID, chart, quick=True) for chart in rk4.charts()}
+    assert {chart: run.constants["p_phi"].kind for chart, run in runs.items()} == {"angles": "drift", "axis": "kept"}
+    found = claims._over_steps(rk4, SPHEROID, quick=True, traces={})["p_phi"]
+    assert found.measured.startswith("drift")
+    assert found.why.endswith("in the angles chart")
+
+
 def test_the_cayley_energy_is_kept_by_nobody_else():
     for name, kept in (("cayley", True), ("cayley-tuned", True), ("strang", False)):
         run = symtop.simulate("spheroid", name, step_size=0.01, horizon=20.0, observe="axis", guard=False)
@@ -191,6 +202,23 @@ def test_memory_that_grows_with_the_steps_is_seen():
     assert 16.0 < long.memory_a_step(dataclasses.replace(good, solvers={"angles": hoard}), SPHEROID) < 48.0
 
 
+@pytest.mark.parametrize(
+    ("name", "declared", "verdict"),
+    [
+        ("radau", True, "undecided"),
+        ("lsoda", True, "undecided"),
+        ("dop853", True, "confirmed"),
+        ("dop853", None, "measured"),
+        ("dop853", False, "undecided"),  # a Rosenbrock method costs as evenly
+    ],
+)
+def test_an_adaptive_method_is_not_explicit_because_it_says_so(name, declared, verdict):
+    said = dataclasses.replace(symtop.integrator(name), explicit=declared)
+    found = claims._explicit(said, SPHEROID, long.long_run(said, SPHEROID, "angles", quick=True))
+    assert found.verdict == verdict
+    assert ("forces by the 12" in found.why) is (name == "dop853")
+
+
 def test_the_angles_end_at_a_pole_and_the_axis_does_not():
     angles, axis = long.passages(symtop.integrator("rk4"))
     assert (angles.chart, angles.outcome, angles.passes) == ("angles", "left_chart", False)
@@ -232,10 +260,15 @@ def test_what_cannot_be_judged_says_why():
     def broken(top, start, plan):
         raise RuntimeError("no luck " * 100)
 
-    ledger = judge(Integrator(name="broken", family="other", summary="", solvers={"axis": broken}, order=2), SPHEROID)
+    said = {"order": 2, "explicit": True, "symmetric": False, "conserves": frozenset({"energy", "p_phi", "charm"})}
+    ledger = judge(Integrator(name="broken", family="other", summary="", solvers={"axis": broken}, **said), SPHEROID)
     judged = [found for found in ledger.findings if found.verdict != "inapplicable"]
     assert {found.verdict for found in judged} == {"undecided"}
     assert all("no luck" in found.why and len(found.why) < 260 for found in judged)
+    assert {found.claim: found.declared for found in judged if found.declared} == {
+        "order": "2", "symmetric": "no", "energy": "kept", "p_phi": "kept", "invariant": "charm", "explicit": "yes",
+        "pole": "no pole",
+    }  # fmt: skip
     odd = dataclasses.replace(symtop.integrator("strang"), conserves=frozenset({"charm"}))
     assert "no formula for charm" in judge(odd, SPHEROID, quick=True)["invariant"].why
 
@@ -257,6 +290,8 @@ CAUGHT = {
     "coefficient_off": ("order", r"goes to zero it goes to a motion that is wrong by \d\.\de-09"),
     "verlet_swapped": ("order", r"goes to zero it goes to a motion that is wrong by \d\.\de-01"),
     "leaking_momentum": ("p_phi", r"growth exponent 1\.00 .* drifting by 8\.\de-12 a step"),
+    "leaking_chart": ("p_phi", r"growth exponent 1\.00 .* a step, in the attitude chart"),
+    "adaptive_implicit": ("explicit", r"reports \d\.\d\d iterations a step, in the angles chart"),
 }
 # what follows from the lie, and what a liar that looks at its start leaves open
 FOLLOWS = {

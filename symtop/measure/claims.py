@@ -5,7 +5,7 @@ One battery judges every integrator alike, ours and a plug-in's, through nothing
     order          slopes of the errors of attitude, theta and energy, and the limit of small steps (`claims_order`)
     symplectic     the bracket after one step, in every chart                                          (`step_map`)
     symmetric      one step forth and back, in every chart                                             (`step_map`)
-    energy, p_phi, p_psi, axis_length, invariant      a million steps                                  (`claims_long`)
+    energy, p_phi, p_psi, axis_length, invariant      a million steps, in every chart                  (`claims_long`)
     explicit, work, memory                            what a step costs                                (`claims_long`)
     pole           the axis passes a pole exactly                                                      (`claims_long`)
 
@@ -30,6 +30,7 @@ from symtop.measure.ledger import CLAIMS, Finding, Ledger, undecided
 from symtop.scenes import Scene
 
 SCENE = "spheroid"
+CONSTANTS = ("energy", "p_phi", "p_psi", "axis_length")
 
 BAND = 0.4  # by how much a slope may differ from an order, beside its own interval: orders are whole numbers
 BESIDE = 0.7  # likewise for theta and energy, whose errors may vanish by chance within the window
@@ -198,17 +199,62 @@ def _over_charts(claim: str, declared: bool | None, found: list[_Chart]) -> Find
 # ---- a million steps -------------------------------------------------------------------------------------------------
 
 
+KINDS = ("kept", "bounded", "random walk", "growing", "drift")  # from best to worst
+BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")
+
+
 def _over_steps(method: Integrator, where: Scene, quick: bool, traces: dict[str, np.ndarray]) -> dict[str, Finding]:
-    """Everything that one long run shows."""
-    try:
-        run = long.long_run(method, where, quick=quick)
-    except SymtopError as error:
-        claims = ("energy", "p_phi", "p_psi", "axis_length", "invariant", "explicit", "work")
-        return {claim: undecided(claim, "", str(error)) for claim in claims}
-    traces["steps_run"], traces["nutations_run"] = np.array(run.steps), np.array(run.nutations)
-    found = {claim: _kept(method, run, claim) for claim in ("energy", "p_phi", "p_psi", "axis_length")}
-    rest = (_invariant(method, run), _explicit(method, run), _work(method, run))
-    return found | {one.claim: one for one in rest}
+    """Everything that one long run in each chart shows; the worst chart decides, and the finding names it."""
+    runs, found = [], []
+    for chart in method.charts():
+        try:
+            run = long.long_run(method, where, chart, quick=quick)
+        except SymtopError as error:
+            found.append(_unseen(method, str(error)))
+            continue
+        runs.append(run)
+        rest = [_invariant(method, run), _explicit(method, where, run), _work(method, run)]
+        found.append({one.claim: one for one in [*(_kept(method, run, claim) for claim in CONSTANTS), *rest]})
+    if runs:
+        least = min(runs, key=lambda run: run.steps)
+        traces["steps_run"], traces["nutations_run"] = np.array(least.steps), np.array(least.nutations)
+    return {
+        claim: _worst([_named(one[claim], chart) for one, chart in zip(found, method.charts(), strict=True)])
+        for claim in found[0]
+    }
+
+
+def _declared(method: Integrator, claim: str) -> str:
+    """What a method says of a claim that a long run judges."""
+    if claim == "energy":
+        return declared_energy(method)
+    if claim in CONSTANTS:
+        return "kept" if claim in (method.conserves or ()) else ""
+    own = sorted((method.conserves or frozenset()) - set(CONSTANTS))
+    return {"invariant": ", ".join(own), "explicit": _yes_no_number(method.explicit)}.get(claim, "")
+
+
+def _unseen(method: Integrator, error: str) -> dict[str, Finding]:
+    """What is left to say of a chart whose long run breaks."""
+    claims = (*CONSTANTS, "invariant", "explicit", "work")
+    return {claim: undecided(claim, _declared(method, claim), error) for claim in claims}
+
+
+def _named(found: Finding, chart: str) -> Finding:
+    """The finding with its chart, where the reason does not speak of it already."""
+    plain = found.verdict == "inapplicable" or found.why.endswith(" chart")
+    return found if plain else found._replace(why=f"{found.why}, in the {chart} chart")
+
+
+def _worst(found: list[Finding]) -> Finding:
+    """The finding that decides: by its verdict, then by the kind of growth, then by its number."""
+
+    def badness(one: Finding) -> tuple[int, int, float]:
+        kind = one.measured.split(",")[0]
+        growth = KINDS.index(kind) if kind in KINDS else -1
+        return BADNESS.index(one.verdict), growth, one.value if math.isfinite(one.value) else -1.0
+
+    return max(found, key=badness)
 
 
 def _span(run: long.LongRun) -> str:
@@ -217,7 +263,7 @@ def _span(run: long.LongRun) -> str:
 
 
 def _kept(method: Integrator, run: long.LongRun, claim: str) -> Finding:
-    declared = declared_energy(method) if claim == "energy" else "kept" if claim in (method.conserves or ()) else ""
+    declared = _declared(method, claim)
     if claim not in run.constants:
         return Finding(claim, declared, "", "inapplicable", f"the {run.chart} chart has no such constant")
     return _constant(claim, declared, run, run.constants[claim])
@@ -247,31 +293,42 @@ def _constant(claim: str, declared: str, run: long.LongRun, found: long.Constant
 
 def _invariant(method: Integrator, run: long.LongRun) -> Finding:
     """What a method claims to conserve that is not a constant of the true motion."""
-    own = sorted((method.conserves or frozenset()) - {"energy", "p_phi", "p_psi", "axis_length"})
-    if not own:
+    declared = _declared(method, "invariant")
+    if not declared:
         return Finding("invariant", "", "", "inapplicable", "it claims no invariant of its own")
+    own = declared.split(", ")
     known = [name for name in own if name in run.constants]
     if known != own:
         unknown = ", ".join(name for name in own if name not in run.constants)
-        return undecided("invariant", ", ".join(own), f"the battery has no formula for {unknown}")
+        return undecided("invariant", declared, f"the battery has no formula for {unknown}")
     worst = max(known, key=lambda name: run.constants[name].largest)
-    return _constant("invariant", "kept", run, run.constants[worst])._replace(declared=", ".join(own))
+    return _constant("invariant", "kept", run, run.constants[worst])._replace(declared=declared)
 
 
 # ---- cost and chart --------------------------------------------------------------------------------------------------
 
 
-def _explicit(method: Integrator, run: long.LongRun) -> Finding:
-    declared = _yes_no_number(method.explicit)
+def _explicit(method: Integrator, where: Scene, run: long.LongRun) -> Finding:
+    declared = _declared(method, "explicit")
     if method.knob is None:
         return Finding("explicit", declared, "", "inapplicable", "it makes no steps")
     if run.iterations > 0.0:
         verdict = _agrees(declared=method.explicit, found=False)
         why = f"it reports {run.iterations:.2f} iterations a step"
         return Finding("explicit", declared, "no", verdict, why, run.iterations, 0.0)
-    adaptive = method.knob == "tolerance"
-    if run.steady_cost or (adaptive and method.explicit):
-        cost = f"{run.evaluations:.2f} forces a step" + (", rejected steps included" if adaptive else ", always")
+    stages = 0
+    if method.knob == "tolerance" and not run.steady_cost:
+        try:
+            stages = long.cost_of_an_attempt(method, where, run.chart)
+        except SymtopError as error:
+            return undecided("explicit", declared, str(error))
+    if run.steady_cost or stages > 1:
+        cost = f"{run.evaluations:.2f} forces a step, always"
+        if stages > 1:
+            cost = f"forces by the {stages}: so many for each step, accepted or rejected"
+        if method.explicit is False:
+            why = f"it reports no iterations and {cost}; so does a method that solves linear equations"
+            return Finding("explicit", declared, "", "undecided", why, 0.0, 0.0)
         verdict = _agrees(declared=method.explicit, found=True)
         return Finding("explicit", declared, "yes", verdict, f"it reports no iterations and {cost}", 0.0, 0.0)
     return undecided("explicit", declared, "it reports no iterations, but its steps do not all cost the same")

@@ -3,9 +3,10 @@
 A constant is kept if after n steps it is off by no more than `KEPT`, relative, or by the random walk that the rounding
 seen in one step makes, n^1/2 times as much: a bias beyond a thousandth of that rounding is seen in a million steps.
 An energy that is not kept is bounded, a random walk or a drift by the exponent of its growth (0, 1/2, 1) if its 95 %
-interval excludes the other two (`symtop.measure.growth.behaviour`), and else just growing; a drift that hides below a bounded oscillation shows in the means of 24 equal stretches, and counts if the
-line through them exceeds `SURE` of its own intervals. Random walks pass a plain test of the slope in one case in three;
-this one they do not pass, and at the size of rounding nothing but the size is judged.
+interval excludes the others (`symtop.measure.growth.behaviour`), and else just growing. A drift that hides below a
+bounded oscillation shows in the means of 24 equal stretches, and counts if the line through them exceeds `SURE` of its
+own intervals. Random walks pass a plain test of the slope in one case in three; this one they do not pass, and at the
+size of rounding nothing but the size is judged. Every chart of a method makes its own run.
 
 A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau, whatever its tau: c is fitted, and it
 is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
@@ -45,6 +46,7 @@ KEPT = 1e-11
 ROUNDING = 2e-13  # a change in one step that may be rounding, where |p| is small beside what makes it up
 BOUNDED = 0.25  # an exponent that exceeds it with its whole interval is growth
 SURE = 8.0
+ATTEMPTS = 12  # runs that show what an attempt at a step costs
 VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
 
 
@@ -106,8 +108,14 @@ def _run(method: Integrator, where: Scene, steps: float, step: float, samples: i
     return simulate(where, method, tolerance=given, horizon=steps * step, samples=samples, observe="axis", guard=False)
 
 
-def long_run(method: Integrator, where: Scene, *, quick: bool = False) -> LongRun:
-    """A million steps of a compiled method, fewer where that would take minutes."""
+def in_chart(method: Integrator, chart: str) -> Integrator:
+    """The method with nothing but its solver of one chart."""
+    return dataclasses.replace(method, solvers={chart: method.solvers[chart]})
+
+
+def long_run(method: Integrator, where: Scene, chart: str, *, quick: bool = False) -> LongRun:
+    """A million steps of a compiled method in one of its charts, fewer where that would take minutes."""
+    method = in_chart(method, chart)
     for finer in FINER:  # a motion that passes close to a pole needs shorter steps
         step = _period(where) / (STEPS_A_NUTATION * finer)
         pilot = _run(method, where, PILOT, step, PILOT + 1)
@@ -175,6 +183,24 @@ def _judged(time: Array, values: Array, every_step: Array, steps: int) -> Consta
     return Constant(largest, a_step, power.slope, power.interval, floor, line.rise, sure)
 
 
+def cost_of_an_attempt(method: Integrator, where: Scene, chart: str) -> int:
+    """The number of forces that every step of an adaptive method comes in, rejected ones too; 1 if they vary.
+
+    A run costs the same number for its start and s forces for each attempt of a method with s stages: the costs of
+    `ATTEMPTS` runs to different times at different tolerances differ by multiples of s. Where a solver iterates until
+    it converges, they have no common divisor; by chance they had 2 in one case in 2000.
+    """
+    only, costs = in_chart(method, chart), []
+    for k in range(ATTEMPTS):
+        tolerance = max(10.0 ** (-4.0 - 0.4 * k), method.least_tolerance)
+        horizon = (1.37 + 0.23 * k) * _period(where)
+        run = simulate(where, only, tolerance=tolerance, horizon=horizon, samples=2, guard=False)
+        if run.attrs["outcome"] != "ok":
+            return 1
+        costs.append(int(run.attrs["force_evaluations"]))
+    return max(math.gcd(*(cost - costs[0] for cost in costs)), 1) if len(set(costs)) > ATTEMPTS // 2 else 1
+
+
 def memory_a_step(method: Integrator, where: Scene) -> float:
     """Bytes that a run keeps for each further step, by Python's own count of what NumPy and Python allocate."""
     few = max(100, round((4_000 if method.tier == "compiled" else 200) * min(1.0, 20.0 * SLOW.get(method.name, 1.0))))
@@ -221,7 +247,7 @@ def passages(method: Integrator) -> list[Passage]:
     """What happens at a pole, in every chart of the method."""
     found = []
     for chart in method.charts():
-        only = dataclasses.replace(method, solvers={chart: method.solvers[chart]})
+        only = in_chart(method, chart)
         ends, errors_there = [], []
         for finer in (1.0, 2.0):
             step = POLE.horizon / (POLE_STEPS * finer)
