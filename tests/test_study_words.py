@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import symtop
+from symtop.measure import conservation
 from symtop.measure.notebook import NOTEBOOK_FIGURES, SCAN, SOLVER, SOLVER_TOLERANCE, solver_scan
 from symtop.report import mechanism_words
 from symtop.study import run as runner
@@ -52,6 +53,41 @@ def test_runs_over_a_part_of_the_horizon_are_named(drift):
     assert "rk45 20 %" in drift._shortened(data)
     assert "rk4 " not in drift._shortened(data)
     assert drift._shortened(data.sel(integrator=["rk4"])) == ""
+
+
+@pytest.mark.parametrize(("slope", "says"), [(0.54, "(agrees with"), (0.39, "(does not agree with")])
+def test_a_walk_of_rounding_is_held_against_one_half(drift, slope, says):
+    known = {"exponent": slope, "exponent_interval": 0.06, "end": 1e-15, "plain_end": 1e-13}
+    cell = xr.Dataset({f"rounding_{name}": value for name, value in known.items()}, coords={"integrator": "strang"})
+    assert says in drift._walk(cell)
+    assert "100 times less" in drift._walk(cell)
+
+
+def test_a_mean_energy_that_moves_is_said_to(drift):
+    means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("integrator", "window"))
+    cells = xr.Dataset({"window_energy_mean": means, "window_modified_energy_mean": means * 1e-10,
+                        "window_energy_largest": means + 5e-5, "window_energy_least": means - 5e-5})  # fmt: skip
+    assert drift._moved(cells) == pytest.approx((0.3, 3e-15))
+
+
+def test_a_change_of_law_is_found_in_a_run_and_an_oscillation_that_switches_on_is_none(monkeypatch):
+    where = symtop.scene("spheroid")
+    time = np.linspace(0.0, 5000.0 * where.nutation_period, 4001)
+    planted = {"energy": 1e-9 + 1e-9 * (time / time[-1] / 0.1) ** 2, "p_phi": np.tanh(time), "p_psi": 1e-9 * time}
+    run = xr.Dataset(
+        {name: ("time", values) for name, values in {**planted, "theta": time, "p_theta": time}.items()},
+        coords={"time": time},
+        attrs={"outcome": "ok", "steps": 1},
+    )
+    monkeypatch.setattr(conservation, "simulate", lambda *_, **__: run)
+    monkeypatch.setattr(conservation, "residuals", lambda *_: planted)
+    found = conservation.history(where, symtop.integrator("rk4"))
+    assert float(found["energy_change"]) == pytest.approx(0.1 * time[-1], rel=0.5)
+    assert float(found["energy_after"]) == pytest.approx(2.0, abs=0.3)
+    assert str(found["p_psi_law"].item()) == "linear"
+    assert str(found["p_phi_law"].item()) == "bounded"
+    assert np.isnan(float(found["p_phi_change"]))
+    assert np.isnan(float(found["p_psi_change"]))
 
 
 def test_a_loss_that_is_off_by_a_fifth_was_not_foretold(drift):
