@@ -203,7 +203,9 @@ def _law(cell: xr.Dataset, quantity: str) -> str:
     )
     if not np.isfinite(slope):
         return ""
-    turn = f"; t^{before:.2f} to t^{after:.2f} at t = {change:.3g}" if np.isfinite(change) else ""
+    size = float(cell[f"{'energy' if quantity == 'phase' else quantity}_largest"])
+    turns = np.isfinite(change) and size > ROUNDING  # a single walk of rounding bends anywhere
+    turn = f"; t^{before:.2f} to t^{after:.2f} at t = {change:.3g}" if turns else ""
     return f"{slope:.2f} +- {doubt:.2f}, {cell[f'{quantity}_law'].item()}{turn}"
 
 

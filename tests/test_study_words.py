@@ -55,6 +55,13 @@ def test_runs_over_a_part_of_the_horizon_are_named(drift):
     assert drift._shortened(data.sel(integrator=["rk4"])) == ""
 
 
+def test_a_change_of_law_is_told_above_rounding_only(drift):
+    known = {"exponent": 1.1, "exponent_interval": 0.1, "change": 42.0, "before": 0.1, "after": 2.0, "law": "linear"}
+    cell = xr.Dataset({f"energy_{name}": value for name, value in known.items()})
+    assert drift._law(cell.assign(energy_largest=1e-6), "energy") == "1.10 +- 0.10, linear; t^0.10 to t^2.00 at t = 42"
+    assert drift._law(cell.assign(energy_largest=1e-14), "energy") == "1.10 +- 0.10, linear"
+
+
 @pytest.mark.parametrize(("slope", "says"), [(0.54, "(agrees with"), (0.39, "(does not agree with")])
 def test_a_walk_of_rounding_is_held_against_one_half(drift, slope, says):
     known = {"exponent": slope, "exponent_interval": 0.06, "end": 1e-15, "plain_end": 1e-13}
