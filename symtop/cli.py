@@ -141,6 +141,7 @@ def run(
     """
     from symtop import datasets  # noqa: PLC0415
     from symtop.measure.errors import QUANTITIES, errors  # noqa: PLC0415
+    from symtop.measure.verdicts import judgement  # noqa: PLC0415
     from symtop.reference import reference  # noqa: PLC0415
     from symtop.scenes import scene as find_scene  # noqa: PLC0415
     from symtop.simulate import simulate  # noqa: PLC0415
@@ -158,6 +159,7 @@ def run(
     where = find_scene(scene)
     truth = reference(where, data["time"].values, precision="closed-form")
     found = errors(where, data, truth)
+    judged = judgement(where, data, found["axis"].values)
     if figure is not None:
         from symtop.report import single  # noqa: PLC0415
 
@@ -170,10 +172,12 @@ def run(
             for name in ("outcome", "outcome_message", "reached_time", "steps", "force_evaluations")
         }
         largest = {name: {"largest": float(values.max()), "last": float(values[-1])} for name, values in shown.items()}
-        click.echo(json.dumps({**facts, "errors": largest}, indent=1))
+        click.echo(json.dumps({**facts, "judgement": judged._asdict(), "errors": largest}, indent=1))
     else:
         click.echo(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
         click.echo(f"{data.attrs['steps']} steps, {data.attrs['force_evaluations']} force evaluations")
+        if data.attrs["outcome"] == "ok":
+            click.echo(f"judged against the truth: {judged.verdict}, {judged.sentence}")
         for name, values in shown.items():
             click.echo(f"  {QUANTITIES[name]:<30} largest {float(values.max()):.3e}   last {float(values[-1]):.3e}")
         for file in (output, figure):

@@ -189,17 +189,6 @@ def discrete_path(
     return Path(marks.astype(np.float64) * h, states[:, 0], states[:, 1], h)
 
 
-def step_matrix(oscillator: Oscillator, rule: "str | Sums", h: float) -> Array:
-    """The linear map (q, p) -> (q, p) of one step, shape (2, 2)."""
-    sums = rule_sums(rule) if isinstance(rule, str) else rule
-    par = _Numbers(oscillator.mass, oscillator.damping, oscillator.stiffness)
-    columns = []
-    for state in ((1.0, 0.0), (0.0, 1.0)):
-        (d, kick), *_ = _increment(par, sums, state, (0.0,), h)
-        columns.append((state[0] + d, state[1] + kick))
-    return np.array(columns).T
-
-
 def discrete_exponents(oscillator: Oscillator, rule: "str | Sums", h: float) -> tuple[complex, complex]:
     """log(z)/h of the step map's two eigenvalues, the slower decay first: what the discrete motion does instead.
 

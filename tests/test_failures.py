@@ -31,11 +31,10 @@ from symtop.measure.linear_stability import (
     sleeping_threshold,
     sleeping_threshold_in_theory,
     trace,
-    trapezoidal_limit,
     with_momenta,
 )
 from symtop.scenes import Scene, closed_form, grazing, scene, sleeping
-from symtop.top import SymmetricTop, effective_force
+from symtop.top import Angles, SymmetricTop, effective_force
 
 STEADY = scene("steady-fast")  # I1, I3, mgl, theta, w3 = 2, 1, 2, 60 degrees, 20
 OMEGA = STEADY.top.nutation_frequency(STEADY.top.momenta(STEADY.start))
@@ -67,9 +66,25 @@ def test_F1_verlet_is_stable_up_to_h_omega_2():
     assert limit * OMEGA == pytest.approx(2.0, abs=1e-8)
     for phase, stays in ((1.9995, True), (2.0005, False)):
         momenta = STEADY.top.momenta(STEADY.start)
-        start = with_momenta(STEADY.top, STEADY.start.theta + 1e-9, momenta.p_phi, momenta.p_psi)
+        start = with_momenta(STEADY.top, STEADY.start.theta + 1e-9, momenta)
         _, done = run("stormer-verlet", STEADY, phase / OMEGA, 400, start=start)
         assert bool(np.max(np.abs(done.states[:, 0] - STEADY.start.theta)) < 1e-7) is stays
+
+
+def trapezoidal_limit(top, precession, theta):
+    """The step beyond which `trapezoidal` is unstable at a steady precession; infinite for I3 >= I1."""
+    if top.I3 >= top.I1:
+        return math.inf
+    return 2.0 / (abs(precession) * math.sin(theta) * math.sqrt(1.0 - top.I3 / top.I1))
+
+
+@pytest.mark.parametrize("theta", [1e-6, 1e-4, 0.7, math.pi - 1e-4])
+def test_a_start_next_to_a_pole_has_the_momenta_that_were_asked_for(theta):
+    top, rate = SymmetricTop(2.0, 1.0, 1.0), 0.37
+    momenta = top.momenta(Angles(theta, phi_dot=rate, psi_dot=3.0))
+    assert with_momenta(top, theta, momenta).phi_dot == pytest.approx(rate, rel=1e-13)
+    naive = (momenta.p_phi - momenta.p_psi * math.cos(theta)) / (top.I1 * math.sin(theta) ** 2)
+    assert theta == 0.7 or abs(naive / rate - 1.0) > 1e-10  # the control
 
 
 def test_F1_the_trapezoidal_rule_has_its_own_limit_and_the_midpoint_rule_none():

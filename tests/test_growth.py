@@ -26,6 +26,18 @@ def test_an_oscillation_is_bounded_and_an_odd_exponent_keeps_its_number():
     assert law(growth(TIME, np.abs(TIME) ** 0.75)) == "t^0.75"
 
 
+def test_a_law_is_not_named_where_the_interval_holds_two():
+    fit = growth(TIME, np.abs(TIME))
+    assert law(fit) == "linear"
+    assert law(fit._replace(slope=0.8, interval=0.4)) == "undecided"
+
+
+def test_a_loss_that_heals_counts_from_its_first_crossing():
+    t = np.linspace(0.0, 100.0, 5001)
+    bump = 1e-3 * t + np.exp(-(((t - 30.0) / 3.0) ** 2))
+    assert 25.0 < lost_at(t, bump, 0.5) < 30.0
+
+
 def test_an_ensemble_tells_a_walk_from_a_drift():
     draw = np.random.default_rng(3)
     steps = np.unique(np.rint(np.geomspace(10, 100_000, 40)).astype(int))

@@ -1,5 +1,6 @@
 """Long runs: the same bits in stretches, after kill -9 and in one piece; flat memory; rounding at its best."""
 
+import dataclasses
 import os
 import signal
 import subprocess
@@ -112,6 +113,23 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
     assert reached in seen  # it did go on from there
     assert not file.exists()
     assert resumed.identical(long_run(WHERE, "midpoint", steps=steps, step_size=H, quiet=True))
+
+
+def test_a_checkpoint_knows_a_method_by_what_it_holds_and_not_by_its_name():
+    h = WHERE.nutation_period / 100.37
+
+    def triple(x):
+        return symtop.composition("triple", (x, 1.0 - 2.0 * x, x), (x / 2, (1 - x) / 2, (1 - x) / 2, x / 2), order=2)
+
+    def identity(method):
+        return longrun._identity(WHERE, method, h, 500, True)
+
+    assert identity(triple(0.3)) == identity(triple(0.3))  # the control: made twice, it is the same
+    assert identity(triple(0.3)) != identity(triple(0.3000001))
+    plain = symtop.integrator("stormer-verlet")
+    renamed = dataclasses.replace(symtop.integrator("strang"), name=plain.name)
+    assert identity(renamed) != identity(plain)  # another kernel
+    assert identity(dataclasses.replace(plain, summary="said otherwise")) == identity(plain)
 
 
 def _root() -> str:

@@ -19,8 +19,14 @@ from symtop.oscillator import (
     relative_energy_error,
     rule_sums,
     seed_update,
-    step_matrix,
 )
+
+
+def step_matrix(oscillator, rule, h):
+    """The linear map (q, p) -> (q, p) of one step, from the two paths of one step that span it; shape (2, 2)."""
+    ends = [discrete_path(oscillator, rule, *start, h, 1) for start in ((1.0, 0.0), (0.0, 1.0 / oscillator.mass))]
+    return np.array([[end.position[-1], end.momentum[-1]] for end in ends]).T
+
 
 DAMPINGS = (0.0, 0.1, 1.0, 2.0, 3.0, 4.0)
 STEPS = [10.0 ** (-k / 4.0) for k in range(4, 13)]

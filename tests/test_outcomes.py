@@ -1,14 +1,17 @@
 """How runs end: every outcome produced, said and timed; no run hangs; runs judged afterwards; scenes built to fail."""
 
+import json
 import math
 import re
 import time
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import symtop
 from symtop import charts
+from symtop.cli import main
 from symtop.integrators.outcomes import OUTCOMES
 from symtop.measure.verdicts import VERDICTS, barriers, judge, judgement, verdict
 from symtop.scenes import closed_form, grazing, sleeping, spinning, steady
@@ -151,6 +154,14 @@ def test_a_pole_passed_on_the_wrong_side_is_a_wrong_regime():
     beyond = good.assign(p_phi=good["p_phi"] - np.where(good["time"] > 2.0, 2e-3, 0.0))
     assert verdict(where, beyond, error) == "wrong_regime"
     assert "passed a pole" in judgement(where, beyond, error).sentence
+
+
+def test_the_command_line_judges_a_run():
+    for name, says in (("0.01", "accurate, accurate to"), ("0.3", "bounded_but_wrong, the axis error passed")):
+        done = CliRunner().invoke(main, ["run", "goldstein", "strang", "--step-size", name, "--no-guard"])
+        assert f"judged against the truth: {says}" in done.output
+    few = CliRunner().invoke(main, ["run", "goldstein", "strang", "--step-size", "0.3", "--samples", "2", "--json"])
+    assert json.loads(few.stdout)["judgement"]["verdict"] == "bounded_but_wrong"
 
 
 def test_a_million_runs_are_judged_as_one_is():

@@ -17,6 +17,7 @@ import symtop
 from symtop import datasets
 from symtop.cli import main
 from symtop.integrators import registry
+from symtop.integrators.fixed_step import inside
 from symtop.integrators.registry import Integrator, is_built_in
 from symtop.measure import commutation
 from symtop.study import check, depends
@@ -146,6 +147,17 @@ def test_editing_a_kernel_makes_the_cases_that_use_it_stale_and_no_others(edited
     assert {name for name in found if is_built_in(name)} == stale  # other tests add methods of their own
 
 
+@pytest.mark.parametrize(
+    ("edited", "again"),
+    [("measure/ranking.py", True), ("report/figures.py", True), ("measure/notebook.py", False), ("cli.py", False)],
+)
+def test_findings_are_made_again_when_what_judges_them_is_edited(edited, again, monkeypatch):
+    study, real, path = runner.load("work_precision"), depends.file_hash, depends.PACKAGE / edited
+    before = runner._stamp(study, ["case"])
+    monkeypatch.setattr(depends, "file_hash", lambda file: real(file) + ("edited" if file == path else ""))
+    assert (runner._stamp(study, ["case"]) != before) is again
+
+
 def test_what_all_cases_depend_on_makes_all_stale():
     convergence = runner.load("convergence")
     for edited in ("top.py", "scenes.py", "simulate.py", "integrators/registry.py"):
@@ -179,6 +191,7 @@ def test_no_case_runs_an_integrator_that_it_is_not_said_to_depend_on(name, monke
                 ran.add(method.name)
                 return method.solvers[chart](top, start, plan)
 
+            solve.solve = inside(method.solvers[chart])  # a long run steps the loop itself
             return solve
 
         return dataclasses.replace(method, solvers={chart: solver(chart) for chart in method.solvers})

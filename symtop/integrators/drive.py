@@ -17,7 +17,7 @@ the rounding error to the next step, which costs nothing (the loop is bound by t
 kernel) and lowers the growth of round-off about 60-fold. Time is k h with h = T/N exactly, never accumulated.
 
 A loop can stop after any step and go on from there, now or in another process, to the same bits: a `Position` is all
-that the next step depends on. Runs too long to wait for are made of such stretches (`symtop.longrun`).
+that the next step depends on. Runs too long to wait for are made of such stretches (`symtop.measure.longrun`).
 Reference: Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge-Kutta methods,
 BIT 48 (2008) 231.
 """

@@ -17,12 +17,14 @@ from numpy.typing import ArrayLike
 from symtop.integrators.registry import Integrator
 from symtop.measure.clock import Clock, has_phase
 from symtop.measure.errors import energy_scale, momentum_scale
-from symtop.measure.growth import growth
+from symtop.measure.growth import change_point, growth, law, tops
 from symtop.scenes import Scene
 from symtop.simulate import simulate
 
 CONSTANTS = ("energy", "p_phi", "p_psi")
 BLOCKS = 24
+WINDOWS = 24  # for a change of law: each side of it needs at least five
+SETTLED = 30.0  # nutations: before, an oscillation switches on, which is no change of law
 
 
 class Trend(NamedTuple):
@@ -44,25 +46,37 @@ def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
     Dimension ``sample``: ``sample_time`` and, for energy, p_phi and p_psi, ``NAME_residual``. For each of them the
     ``largest``, the linear ``slope`` with its ``interval`` and ``rise``, and the ``exponent`` of growth over the last
     two decades; for the phase of the nutation (rad; NaN where there is none) ``largest`` and ``exponent``, over the
-    last decade, because a wrong frequency gives way to a drifting one only late. ``exponent_interval`` goes with each.
+    last decade, because a wrong frequency gives way to a drifting one only late. ``exponent_interval`` goes with each,
+    and ``law``, its name; where one law gives way to another, ``change`` is the time, ``before`` and ``after`` are the
+    exponents (NaN where none does).
     """
     run = simulate(scene, method, observe="nutation", guard=False, **settings)
     time = run["time"].values
     found: dict[str, Any] = {"sample_time": ("sample", time), "outcome": run.attrs["outcome"]}
     found["steps"] = run.attrs["steps"]
+    period = scene.nutation_period
+    late = time > (SETTLED * period if math.isfinite(period) else 0.0)
     for name, values in residuals(scene, run).items():
         line, power = trend(time, values), growth(time, values)
         found[f"{name}_residual"] = ("sample", values)
         found[f"{name}_largest"] = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else np.nan
         found[f"{name}_slope"], found[f"{name}_interval"], found[f"{name}_rise"] = line
         found[f"{name}_exponent"], found[f"{name}_exponent_interval"] = power.slope, power.interval
+        found |= _laws(name, law(power), time[late], values[late])
     phase = np.full(time.size, np.nan)
     if has_phase(scene):
         phase = Clock(scene).error(time, run["theta"].values, run["p_theta"].values / scene.top.I1)
     power = growth(time, phase, 1.0)
     found["phase_largest"] = float(np.nanmax(np.abs(phase))) if np.isfinite(phase).any() else np.nan
     found["phase_exponent"], found["phase_exponent_interval"] = power.slope, power.interval
-    return xr.Dataset(found)
+    return xr.Dataset(found | _laws("phase", law(power), time[late], phase[late]))
+
+
+def _laws(name: str, named: str, time: np.ndarray, values: np.ndarray) -> dict[str, Any]:
+    """The law of the end of a run, and where within the last two decades another one ended."""
+    change = change_point(*tops(time, values, count=WINDOWS)) if time.size else None
+    when, before, after = (math.nan,) * 3 if change is None else change
+    return {f"{name}_law": named, f"{name}_change": when, f"{name}_before": before, f"{name}_after": after}
 
 
 def residuals(scene: Scene, run: xr.Dataset) -> dict[str, np.ndarray]:

@@ -48,7 +48,7 @@ def _run(method: Integrator, where: Scene, start: Any, h: float, marks: NDArray[
 def survives(method: Integrator, where: Scene, centre: float, displacement: float, h: float, steps: int) -> bool:
     """Does a steady precession at theta = `centre` that is displaced by so many radians stay near itself?"""
     momenta = where.top.momenta(where.start)
-    start = with_momenta(where.top, centre + displacement, momenta.p_phi, momenta.p_psi)
+    start = with_momenta(where.top, centre + displacement, momenta)
     marks = np.unique(np.linspace(0, steps, 400).astype(np.int64))
     chart, run = _run(method, where, start, h, marks)
     away = np.abs(inclination(chart, run.states) - centre)

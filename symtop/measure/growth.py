@@ -33,22 +33,34 @@ def growth(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Fit:
 
     What happens within the first nutations is an oscillation that switches on, not growth.
     """
+    return power_law(*tops(time, residual, decades))
+
+
+def tops(
+    time: ArrayLike, residual: ArrayLike, decades: float = 2.0, count: int = 12
+) -> tuple[list[float], list[float]]:
+    """Middles of `count` logarithmic windows that fill the last `decades`, and the largest |residual| in each."""
     t, r = np.asarray(time, float), np.abs(np.asarray(residual, float))
-    edges = np.geomspace(t[-1] / 10.0**decades, t[-1], 13)
-    middles, tops = [], []
+    edges = np.geomspace(t[-1] / 10.0**decades, t[-1], count + 1)
+    middles, largest = [], []
     for low, high in pairwise(edges):
         inside = (t > low) & (t <= high) & np.isfinite(r)
         if inside.any():
             middles.append(math.sqrt(low * high))
-            tops.append(float(r[inside].max()))
-    return power_law(middles, tops)
+            largest.append(float(r[inside].max()))
+    return middles, largest
 
 
 def law(fit: Fit, slack: float = 0.1) -> str:
-    """The name of the exponent that a fit agrees with, within its interval or `slack`; otherwise the exponent."""
+    """The name of the exponent that a fit agrees with, within its interval or `slack`; otherwise the exponent.
+
+    "undecided" if another law lies within the interval as well.
+    """
     if not math.isfinite(fit.slope):
         return "not judged"
     nearest = min(LAWS, key=lambda exponent: abs(exponent - fit.slope))
+    if any(abs(exponent - fit.slope) <= fit.interval for exponent in LAWS if exponent != nearest):
+        return "undecided"
     agrees = abs(nearest - fit.slope) <= max(fit.interval, slack)
     return LAWS[nearest] if agrees else f"t^{fit.slope:.2f}"
 
@@ -168,7 +180,7 @@ def horizon(time: ArrayLike, error: ArrayLike, tolerance: float) -> Horizon:
 
 
 def lost_at(time: ArrayLike, error: ArrayLike, tolerance: float) -> float:
-    """When |error| did reach `tolerance` for good, between means over short stretches; NaN if it did not."""
+    """When |error| first reached `tolerance`, between means over short stretches; NaN if it never did, or at once."""
     t, e = _means(time, error)
     over = np.abs(e) >= tolerance
     if not over.any() or over[0]:

@@ -25,7 +25,7 @@ import numpy as np
 from symtop import charts
 from symtop.integrators.registry import Integrator, Plan, Run
 from symtop.scenes import Scene
-from symtop.top import Angles, SymmetricTop
+from symtop.top import Angles, Momenta, SymmetricTop
 
 NUDGE = 1e-6  # rad: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
 TILT = 1e-5  # rad, of the sleeping top
@@ -55,10 +55,11 @@ def inclination(chart: str, states: np.ndarray) -> np.ndarray:
         return charts.theta_from_axis(axis)
 
 
-def with_momenta(top: SymmetricTop, theta: float, p_phi: float, p_psi: float) -> Angles:
-    """The state at rest in theta with these momenta."""
-    rate = (p_phi - p_psi * math.cos(theta)) / (top.I1 * math.sin(theta) ** 2)
-    return Angles(theta=theta, phi_dot=rate, psi_dot=p_psi / top.I3 - rate * math.cos(theta))
+def with_momenta(top: SymmetricTop, theta: float, momenta: Momenta) -> Angles:
+    """The state at rest in theta with these momenta; exact next to a pole, where p_phi - p_psi cos(theta) cancels."""
+    x = 0.5 * theta
+    rate = (momenta.north / math.sin(x) ** 2 + momenta.south / math.cos(x) ** 2) / (4.0 * top.I1)
+    return Angles(theta=theta, phi_dot=rate, psi_dot=momenta.p_psi / top.I3 - rate * math.cos(theta))
 
 
 class Trace(NamedTuple):
@@ -87,7 +88,7 @@ def trace(method: Integrator, scene: Scene, h: float, rounds: int = 6) -> Trace:
     for _ in range(rounds):
         if not 1e-3 < theta < math.pi - 1e-3:
             return NO_TRACE
-        start = with_momenta(top, theta + NUDGE, momenta.p_phi, momenta.p_psi)
+        start = with_momenta(top, theta + NUDGE, momenta)
         run = few_steps(method, chart, top, start, h)
         y = inclination(chart, run.states) - theta
         if run.outcome != "ok" or not np.isfinite(y).all():
@@ -206,13 +207,6 @@ def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[f
         ends.append(0.5 * (a + b))
     limit, third = ends
     return limit, third if method.symmetric and not third > limit else math.nan
-
-
-def trapezoidal_limit(top: SymmetricTop, precession: float, theta: float) -> float:
-    """The step beyond which `trapezoidal` is unstable at a steady precession; infinite for I3 >= I1."""
-    if top.I3 >= top.I1:
-        return math.inf
-    return 2.0 / (abs(precession) * math.sin(theta) * math.sqrt(1.0 - top.I3 / top.I1))
 
 
 def sleeping_threshold_in_theory(name: str, h: float) -> float:

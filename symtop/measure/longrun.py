@@ -28,6 +28,7 @@ from tqdm import tqdm
 
 from symtop import charts, datasets
 from symtop.checks import SymtopError, positive, whole
+from symtop.ingredients import Ingredients
 from symtop.integrators.compiled import cache_root, source_digest
 from symtop.integrators.drive import Loop, Position
 from symtop.integrators.fixed_step import FixedStep, inside
@@ -191,10 +192,12 @@ def _summary(values: dict[str, Array]) -> list[float]:
 
 
 def _identity(where: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
-    """A hash of all that decides the bits of a run."""
+    """A hash of all that decides the bits of a run; one name may stand for other coefficients or code next time."""
     top, start = where.top, where.start
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (top, start)]
-    content = json.dumps([method.name, numbers, h, steps, compensated, source_digest()])
+    made = Ingredients()
+    made.add(method)
+    content = json.dumps([made.values, numbers, h, steps, compensated, source_digest()])
     return hashlib.sha256(content.encode()).hexdigest()[:20]
 
 

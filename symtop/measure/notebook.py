@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from symtop import charts
 from symtop.checks import SymtopError
 from symtop.integrators.registry import integrators
-from symtop.measure.conservation import residuals
+from symtop.measure.conservation import CONSTANTS, residuals, trend
 from symtop.measure.errors import energy_scale
 from symtop.measure.shadow import modified_energy
 from symtop.scenes import Scene, closed_form
@@ -41,7 +41,9 @@ from symtop.top import SymmetricTop
 Array = NDArray[np.float64]
 
 SOLVER = "lsoda"  # the default solver of the notebook's system is of this family
-SOLVER_TOLERANCE = 2.6e-7  # with it LSODA keeps as many figures as the notebook reports: five and six
+NOTEBOOK_FIGURES = {"energy": 5, "p_phi": 6, "p_psi": 6}  # that the notebook reports as constant
+SOLVER_TOLERANCE = 2.6e-7  # chosen so that LSODA keeps that many; `solver_scan` shows what others do
+SCAN = tuple(SOLVER_TOLERANCE * 1.5**k for k in range(-3, 4))
 TIGHT = 1e-13
 SAMPLES = 301
 
@@ -69,6 +71,24 @@ def residual_history(scene: Scene, method: str, setting: float, samples: int = S
         found[f"{name}_residual"] = ("sample", values)
         found[f"{name}_largest"] = float(np.nanmax(np.abs(values)))
     return xr.Dataset(found)
+
+
+def solver_scan(scene: Scene, tolerances: Sequence[float] = SCAN) -> xr.Dataset:
+    """What the notebook's solver keeps at other tolerances, in figures, and where its trends go.
+
+    Dimension ``tolerance_setting``: ``scan_tolerance``, ``scan_NAME_figures``, and ``scan_NAME_rise`` over the run with
+    its 95 % interval ``scan_NAME_doubt``.
+    """
+    found: dict[str, list[float]] = {"scan_tolerance": [float(value) for value in tolerances]}
+    for tolerance in tolerances:
+        run = residual_history(scene, SOLVER, float(tolerance))
+        for name in CONSTANTS:
+            line = trend(run["sample_time"], run[name])
+            doubt = line.interval * float(run["sample_time"][-1])
+            row = {"figures": float(figures_kept(run[name].values)), "rise": line.rise, "doubt": doubt}
+            for part, value in row.items():
+                found.setdefault(f"scan_{name}_{part}", []).append(value)
+    return xr.Dataset({name: ("tolerance_setting", values) for name, values in found.items()})
 
 
 def notebook_path(scene: Scene, samples: int = 1201) -> xr.Dataset:

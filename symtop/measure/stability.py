@@ -59,7 +59,7 @@ def family_limits(name: str, method: Integrator, parameter: float, most: float) 
     theta = where.top.steady_theta(momenta)
     if not 0.0 < theta < math.pi or not math.isfinite(period):
         return math.nan, math.nan
-    standing = Scene(where.name, where.top, with_momenta(where.top, theta, momenta.p_phi, momenta.p_psi), where.horizon)
+    standing = Scene(where.name, where.top, with_momenta(where.top, theta, momenta), where.horizon)
     limit, third = linear_limits(method, standing, np.geomspace(0.05, most, 48) * period)
     return limit / period, third / period
 

@@ -60,7 +60,6 @@ OUTCOME_COLORS = {
     "step_too_small": GREY,
     "out_of_budget": SKY,
 }
-OUTCOME_HATCHES = {"wrong_regime": "\\\\\\", "left_chart": "///", "not_converged": "xxx", "step_too_small": "..."}
 
 
 def look(name: str) -> Look:

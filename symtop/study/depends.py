@@ -17,30 +17,22 @@ A file counts as a whole: two kernels in one file go stale together. `PLUMBING` 
 import ast
 import functools
 import hashlib
-import inspect
 import json
-import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from symtop import datasets
-from symtop.integrators.registry import Integrator, integrators
+from symtop.ingredients import PACKAGE, Ingredients
+from symtop.integrators.registry import integrators
 from symtop.scenes import scenes
 from symtop.study import plugins
 
 if TYPE_CHECKING:
     from symtop.study.study import Case, Study
 
-PACKAGE = Path(__file__).resolve().parents[1]
 PLUMBING = {PACKAGE / name for name in ("checks.py", "datasets.py")} | set(PACKAGE.rglob("__init__.py"))
 RESOLVERS = {PACKAGE / name for name in ("simulate.py", "integrators/registry.py")}  # they look up what they are given
-WORDS = ("summary", "reference")  # of an Integrator: said, not computed
-SCRIPTS = ("symtop_study_", "symtop_plugin_")  # what modules of scripts and plug-ins are called
 EVERY = "*"  # in place of an integrator's name: all of them
 
 
@@ -60,7 +52,8 @@ def _module_file(name: str) -> Path | None:
 
 def _imported(file: Path) -> Iterator[tuple[str, list[str]]]:
     """(module, names) of every import statement of a file, wherever it stands."""
-    package = [PACKAGE.name, *file.relative_to(PACKAGE).parent.parts]
+    inner = PACKAGE in file.parents  # a script outside has no package that a relative import could mean
+    package = [PACKAGE.name, *file.relative_to(PACKAGE).parent.parts] if inner else []
     for node in ast.walk(_tree(file)):
         if isinstance(node, ast.Import):
             yield from ((alias.name, []) for alias in node.names)
@@ -71,7 +64,7 @@ def _imported(file: Path) -> Iterator[tuple[str, list[str]]]:
 
 @functools.cache
 def imports_of(file: Path) -> frozenset[Path]:
-    """The files of this package that a file of it imports."""
+    """The files of this package that a file, of it or a script, imports."""
     found = set()
     for module, names in _imported(file):
         inner = [_module_file(f"{module}.{name}") for name in names]
@@ -88,108 +81,6 @@ def all_imports(files: frozenset[Path]) -> frozenset[Path]:
         found |= ahead
         ahead = {path for file in ahead for path in imports_of(file)} - found
     return frozenset(found)
-
-
-_CONTAINERS: tuple[tuple[Any, Callable[[Any], Iterable[Any]]], ...] = (
-    (functools.partial, lambda thing: (thing.func, thing.args, thing.keywords)),
-    (MethodType, lambda thing: (thing.__func__, thing.__self__)),
-    (Mapping, lambda thing: [part for key in sorted(thing, key=repr) for part in (key, thing[key])]),
-    ((set, frozenset), lambda thing: sorted(thing, key=repr)),
-    ((tuple, list), lambda thing: (type(thing), *thing)),
-)
-
-
-@dataclass
-class Ingredients:
-    """Files of the package and values that something was made of."""
-
-    files: set[Path] = field(default_factory=set)
-    values: list[str] = field(default_factory=list)
-    constants: set[str] = field(default_factory=set)  # strings in the functions of scripts
-    lists: bool = False  # such a function asks for all integrators
-    _seen: dict[int, object] = field(default_factory=dict, repr=False)
-
-    def add(self, thing: Any) -> None:
-        """Walk anything that a solver or a measure may hold."""
-        if isinstance(thing, (type(None), bool, int, float, complex, str, bytes, np.generic)):
-            self.values.append(repr(thing))
-        elif id(thing) not in self._seen:
-            self._seen[id(thing)] = thing
-            if not isinstance(thing, (FunctionType, type)):  # compiled by numba, or cached
-                thing = getattr(thing, "py_func", getattr(thing, "__wrapped__", thing))
-            parts = next((parts(thing) for kind, parts in _CONTAINERS if isinstance(thing, kind)), None)
-            if parts is None:
-                self._add_one(thing)
-            else:
-                self._add_all(parts)
-
-    def _add_one(self, thing: Any) -> None:
-        if isinstance(thing, FunctionType):
-            self._add_function(thing)
-        elif isinstance(thing, ModuleType):
-            self._is_ours(thing)
-        elif isinstance(thing, type):
-            self.values.append(f"{thing.__module__}.{thing.__qualname__}")
-            if not self._is_ours(sys.modules.get(thing.__module__)) and thing.__module__.startswith(SCRIPTS):
-                self._add_all(part for _, part in sorted(vars(thing).items()) if isinstance(part, FunctionType))
-        elif isinstance(thing, np.ndarray):
-            self.values.append(f"{thing.dtype}{thing.shape}{hashlib.sha256(thing.tobytes()).hexdigest()}")
-        elif is_dataclass(thing):
-            spoken = WORDS if isinstance(thing, Integrator) else ()
-            self._add_all((type(thing), *(getattr(thing, f.name) for f in fields(thing) if f.name not in spoken)))
-        else:
-            self.add(type(thing))
-            if self._is_ours(sys.modules.get(type(thing).__module__)):
-                self.add(getattr(thing, "__dict__", None))
-
-    def _add_all(self, things: Iterable[Any]) -> None:
-        for thing in things:
-            self.add(thing)
-
-    def _is_ours(self, module: ModuleType | None) -> bool:
-        return self._add_file(getattr(module, "__file__", None))
-
-    def _add_file(self, name: str | None) -> bool:
-        path = Path(name).resolve() if name else None
-        ours = path is not None and PACKAGE in path.parents
-        if ours and path is not None:
-            self.files.add(path)
-        return ours
-
-    def _add_function(self, function: FunctionType) -> None:
-        self.values.append(function.__qualname__)
-        self._add_all(function.__defaults__ or ())
-        self.add(function.__kwdefaults__)
-        for cell in function.__closure__ or ():
-            try:
-                self.add(cell.cell_contents)
-            except ValueError:  # not filled yet
-                continue
-        if not self._add_file(function.__code__.co_filename):  # a script or a plug-in: its text, and what it names
-            self.values.append(_text(function))
-            self.constants |= {c for part in _codes(function.__code__) for c in part.co_consts if isinstance(c, str)}
-            named = [name for name in _names(function.__code__) if name in function.__globals__]
-            self.lists = self.lists or any(function.__globals__[name] is integrators for name in named)
-            self._add_all(function.__globals__[name] for name in named)
-
-
-def _text(function: FunctionType) -> str:
-    try:
-        return inspect.getsource(function)
-    except (OSError, TypeError):
-        return function.__code__.co_code.hex()
-
-
-def _codes(code: CodeType) -> Iterator[CodeType]:
-    yield code
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _codes(constant)
-
-
-def _names(code: CodeType) -> list[str]:
-    """Names in a function's code, sorted, so that equal sources give equal digests."""
-    return sorted({name for part in _codes(code) for name in part.co_names})
 
 
 def _strings(tree: Iterable[ast.Module]) -> set[str]:
@@ -296,6 +187,14 @@ def digest(study: "Study", case: "Case") -> str:
         datasets.provenance()["processor"] if study.is_timed(case) else "",
     ]
     return hashlib.sha256("\n".join(content).encode()).hexdigest()[:20]
+
+
+def script_digest(script: Path) -> str:
+    """Hash of what a study's pictures, tables and verdict are made by: its script and all that it imports from here."""
+    drawn = all_imports(imports_of(script)).union((PACKAGE / "report").glob("*.py"), [PACKAGE / "study" / "store.py"])
+    lines = [script.read_text(encoding="utf-8")]
+    lines += [f"{path.relative_to(PACKAGE)} {file_hash(path)}" for path in sorted(drawn)]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
 @functools.cache

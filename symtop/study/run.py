@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from symtop import datasets
 from symtop.checks import SymtopError, positive
-from symtop.study import plugins, store
+from symtop.study import depends, plugins, store
 from symtop.study.execute import execute
 from symtop.study.pools import Workers
 from symtop.study.scripts import file_of, folder, load, names
@@ -89,17 +89,11 @@ def _bar(name: str, total: int, *, quiet: bool) -> Any:
 
 
 def _stamp(study: Study, digests: Iterable[str]) -> str:
-    """Hash of what the drawings depend on: the cases, the script and the drawing code."""
+    """Hash of what the findings depend on: the cases, the script and the code that it draws and judges with."""
     digest = hashlib.sha256("".join(digests).encode())
     if study.follow_up is not None:  # its cases are timed
         digest.update(datasets.provenance()["processor"].encode())
-    package = Path(__file__).resolve().parents[1]
-    for path in [
-        file_of(study.name),
-        package / "study" / "store.py",
-        *sorted((package / "report").glob("*.py")),
-    ]:
-        digest.update(path.read_bytes())
+    digest.update(depends.script_digest(file_of(study.name)).encode())
     return digest.hexdigest()[:20]
 
 
