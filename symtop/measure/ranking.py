@@ -73,13 +73,11 @@ def cheapest(
     for name in cell["integrator"].values:
         own = cell.sel(integrator=name)
         good = meeting(own, target, quantity) & (own["outcome"].values == "ok") & np.isfinite(own[cost].values)
-        if not good.any():
-            continue
         entered = least_work(own, target, quantity)
-        raced = (
-            cost == "seconds" and entered is not None and good[entered] and own["seconds_race"].values[entered] > 0.0
-        )
-        k = entered if raced and entered is not None else _least(good, own[cost])
+        if entered is None or not good.any():
+            continue
+        raced = cost == "seconds" and bool(good[entered] and own["seconds_race"].values[entered] > 0.0)
+        k = entered if raced else _least(good, own[cost])
         kind = str(own["tier"].values.flat[0])
         if tier in (None, kind):
             found.append(Place(float(own[cost].values[k]), str(name), kind, k, float(own[quantity].values[k])))

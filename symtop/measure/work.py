@@ -200,7 +200,7 @@ def meeting(data: xr.Dataset, target: float, quantity: str = "axis") -> np.ndarr
 
 
 def least_work(data: xr.Dataset, target: float, quantity: str = "axis") -> int | None:
-    """Place of the run of least work that ended well and meets a target, of one method and horizon; None if none does."""
+    """Place of a method's run of least work that ended well and meets a target, over one horizon; None if none does."""
     good = meeting(data, target, quantity) & (data["outcome"].values == "ok")
     good &= np.isfinite(data["force_evaluations"].values)
     return int(np.argmin(np.where(good, data["force_evaluations"].values, np.inf))) if good.any() else None
