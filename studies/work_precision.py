@@ -196,7 +196,7 @@ def verdict(data: xr.Dataset) -> list[str]:
             f"Only compiled methods are ranked. Those in plain Python ({', '.join(slow)}) are ranked "
             "among themselves in the table; compare them with the rest by force evaluations."
         )
-    sure = [won for won in ranking.winners(data).values() if won and won.reliable and won.lead]
+    sure = [won for won in wins if won.reliable and won.lead]
     timed, known = data["seconds_timed"].values == 1.0, np.isfinite(data["seconds"].values)
     miss = data["foreseen_miss"].values
     doubtful = int(np.sum(data["reliable"].values == 0.0))
