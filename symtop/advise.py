@@ -8,8 +8,10 @@
     3. The cheapest are run to the whole horizon, as far as a budget of evaluations allows, and their settings
        corrected.
 
-Advice that was run to the end and met the accuracy with a margin is ``checked``; what was not run to the end is
-``extrapolated``; when nothing meets the accuracy there is no integrator and the confidence is ``none``.
+Advice that was run to the end and met the accuracy with a margin is ``checked``; if its error and the reference's own
+bound together exceed the accuracy, it is ``at the reference's limit``; what was not run to the end is ``extrapolated``.
+When nothing meets the accuracy there is no integrator and the confidence is ``none``. An accuracy below the reference's
+own bound is refused in the same way, before anything is tried: no run could show it.
 """
 
 import math
@@ -34,6 +36,11 @@ STORED = Path("results") / "work_precision.nc"
 CANDIDATES = 8  # of the stored study that are tried
 FINALISTS = 3  # that are run to the whole horizon
 TOO_DEAR = 40.0  # times the evaluations of the cheapest candidate so far: not tried
+HOW = {
+    "checked": "measured to the end",
+    "at the reference's limit": "measured to the end, as far as the reference can tell",
+    "extrapolated": "extrapolated from a short run",
+}
 MARGIN = 0.8  # of the accuracy that a checked run must meet at its samples; between them the error may be larger
 
 
@@ -71,7 +78,7 @@ class _Trial:
     met: meet.Met
     error: float
     seconds: float
-    checked: bool
+    confidence: str  # one of HOW
 
     @property
     def name(self) -> str:
@@ -114,6 +121,10 @@ def recommend(
     one_of("quantity", quantity, ASKED)
     end = chosen.horizon if horizon is None else positive("horizon", horizon)
     data = _stored(results)
+    limit = meet.judgeable(chosen, quantity, end)
+    if wanted < limit:
+        source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
+        return _advice(chosen, wanted, quantity, end, [], (), source)
     names, source = _candidates(chosen, wanted, quantity, end, data)
     trials: list[_Trial] = []
     fails: dict[str, list[str]] = {}
@@ -126,9 +137,16 @@ def recommend(
         else:
             fails.setdefault(found, []).append(name)
     trials.sort(key=lambda trial: trial.seconds)
-    finalists = [_confirm(chosen, trial, wanted, quantity, end) for trial in trials[:FINALISTS]]
-    best = sorted((trial for trial in finalists if trial is not None), key=lambda trial: trial.seconds)
-    ranked = best or trials[FINALISTS:]
+    ranked: list[_Trial] = []
+    for number, trial in enumerate(trials):
+        if number >= FINALISTS and ranked:
+            break
+        confirmed = _confirm(chosen, trial, wanted, quantity, end)
+        if isinstance(confirmed, _Trial):
+            ranked.append(confirmed)
+        else:
+            fails.setdefault(confirmed, []).append(trial.name)
+    ranked.sort(key=lambda trial: trial.seconds)
     why = tuple(f"{reason}: {', '.join(which)}." for reason, which in fails.items())
     return _advice(chosen, wanted, quantity, end, ranked, why, source)
 
@@ -212,23 +230,24 @@ def _try(
     short = min(horizon, meet.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** meet.growth(method, quantity)
     found = meet.search(where, method, accuracy * law, quantity, short, guess, patience)
-    if found is None:
-        return f"Not within {TOO_DEAR:g} times the work of the best"
+    if isinstance(found, meet.Missed):
+        dear = found.why == meet.BUDGET and patience < meet.MOST_EVALUATIONS[method.tier]
+        return f"Not within {TOO_DEAR:g} times the work of the best" if dear else found.why
     if method.knob == "step_size" and horizon / found.setting > MOST_STEPS:
         return f"Would need more than {MOST_STEPS:.0e} steps"
-    return _Trial(found, found.error / law, meet.seconds(where, found, quantity, horizon), checked=False)
+    return _Trial(found, found.error / law, meet.seconds(where, found, quantity, horizon), "extrapolated")
 
 
-def _confirm(where: Scene, trial: _Trial, accuracy: float, quantity: str, horizon: float) -> _Trial | None:
-    """The trial run to the whole horizon, its setting corrected; as it was if that is too long, None if it fails."""
+def _confirm(where: Scene, trial: _Trial, accuracy: float, quantity: str, horizon: float) -> "_Trial | str":
+    """The trial run to the whole horizon, its setting corrected; as it was if that is too long, or why it fails."""
     met = trial.met
     if met.evaluations * horizon / met.horizon > meet.MOST_EVALUATIONS[met.integrator.tier]:
         return trial
     found = meet.search(where, met.integrator, MARGIN * accuracy, quantity, horizon, met.setting)
-    if found is None:
-        return None
-    sure = found.error + found.bound <= accuracy
-    return _Trial(found, found.error, meet.seconds(where, found, quantity, horizon), checked=sure)
+    if isinstance(found, meet.Missed):
+        return f"Good enough over a short run but not to the end ({found.why[0].lower()}{found.why[1:]})"
+    confidence = "checked" if found.error + found.bound <= accuracy else "at the reference's limit"
+    return _Trial(found, found.error, meet.seconds(where, found, quantity, horizon), confidence)
 
 
 def _advice(
@@ -247,8 +266,8 @@ def _advice(
         nothing: dict[str, Any] = {"integrator": None, "step_size": None, "tolerance": None, "confidence": "none"}
         return Advice(**asked, **nothing, expected_error=math.nan, seconds=math.nan, reason=reason, fails=fails)
     best = ranked[0]
-    how = "measured to the end" if best.checked else "extrapolated from a short run"
-    reason = f"{best.words()} meets {goal}: error {best.error:.2g} ({how}) in {best.seconds:.2g} s; {source}."
+    reason = f"{best.words()} meets {goal}: error {best.error:.2g} ({HOW[best.confidence]}) in {best.seconds:.2g} s"
+    reason += f"; {source}."
     runner = ""
     if len(ranked) > 1:
         runner = f"{ranked[1].words()}, {ranked[1].seconds / best.seconds:.2g} times the time."
@@ -260,7 +279,7 @@ def _advice(
         tolerance=None if step else best.met.setting,
         expected_error=best.error,
         seconds=best.seconds,
-        confidence="checked" if best.checked else "extrapolated",
+        confidence=best.confidence,
         reason=reason,
         runner_up=runner,
         fails=fails,

@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 import symtop
+from symtop import advise
 from symtop.advise import regime
 from symtop.cli import main
 from symtop.measure import meet
@@ -45,7 +46,75 @@ def test_what_nobody_reaches_is_said():
     advice = symtop.recommend("spheroid", accuracy=1e-17, horizon=8.0)
     assert advice.integrator is None
     assert advice.confidence == "none"
-    assert "Nothing that was tried" in advice.reason
+    assert "least error that the reference can judge" in advice.reason
+    assert not advice.fails  # nobody was run
+
+
+@pytest.mark.parametrize("quantity", ["precession_rate", "energy", "axis"])
+def test_an_error_grows_over_horizons_as_the_traits_promise(quantity):
+    scene, method = symtop.scene("spheroid"), symtop.integrator("rk45-compiled")
+    far = [horizon * scene.nutation_period for horizon in (12.37, 123.7)]
+    near, later = (meet.attempt(scene, method, 1e-6, horizon, quantity).error for horizon in far)
+    grown = math.log10(later / near)
+    assert grown == pytest.approx(meet.growth(method, quantity), abs=0.35)
+
+
+def test_mean_frequencies_of_a_structured_method_do_not_drift():
+    scene, method = symtop.scene("spheroid"), symtop.integrator("stormer-verlet")
+    step = scene.nutation_period / 100.37
+    far = [horizon * scene.nutation_period for horizon in (12.37, 123.7)]
+    near, later = (meet.attempt(scene, method, step, horizon, "precession_rate").error for horizon in far)
+    assert meet.growth(method, "precession_rate") == 0
+    assert 0.5 < later / near < 2.0
+
+
+@pytest.mark.parametrize(
+    ("name", "accuracy", "patience", "why"),
+    [
+        ("rk45-compiled", 1e-15, math.inf, meet.ROUNDING),  # its least tolerance
+        ("gauss-10", 1e-15, math.inf, meet.ROUNDING),  # a finer step that gains nothing
+        ("stormer-verlet", 1e-6, 1e3, meet.BUDGET),
+    ],
+)
+def test_a_search_says_why_it_found_nothing(name, accuracy, patience, why):
+    scene, method = symtop.scene("spheroid"), symtop.integrator(name)
+    found = meet.search(scene, method, accuracy, "axis", 5.0, None, patience)
+    assert isinstance(found, meet.Missed)
+    assert found.why == why
+
+
+def few(monkeypatch, count):
+    """Only the first of some cheap methods are candidates."""
+    names = ("strang", "takahashi-imada", "srkn-6-4", "kahan-li-6", "gauss-6")[:count]
+    monkeypatch.setattr(advise, "_candidates", lambda *_: (dict.fromkeys(names), "of a few"))
+
+
+def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch):
+    few(monkeypatch, 5)
+    real, ended = meet.search, []
+
+    def search(scene, method, accuracy, quantity, horizon, *rest):
+        if horizon < 60.0 or len(ended) >= 3:
+            return real(scene, method, accuracy, quantity, horizon, *rest)
+        ended.append(method.name)
+        return meet.Missed(meet.ROUNDING, 1.0)
+
+    monkeypatch.setattr(meet, "search", search)
+    advice = symtop.recommend("spheroid", accuracy=1e-4, horizon=60.0)
+    assert len(ended) == 3
+    assert advice.confidence == "checked"  # the fourth was run, not just believed
+    assert advice.integrator not in ended
+    assert all(name in " ".join(advice.fails) for name in ended)
+    assert "not to the end (stopped by rounding" in " ".join(advice.fails)
+
+
+def test_a_run_to_the_end_at_the_references_limit_is_not_called_extrapolated(monkeypatch):
+    few(monkeypatch, 1)
+    real = meet.attempt
+    monkeypatch.setattr(meet, "attempt", lambda *asked: real(*asked)._replace(bound=0.99e-4))
+    advice = symtop.recommend("spheroid", accuracy=1e-4, horizon=20.0)
+    assert advice.confidence == "at the reference's limit"
+    assert "measured to the end" in advice.reason
 
 
 @pytest.mark.parametrize(
@@ -121,7 +190,9 @@ def test_sixty_random_tops():
                     for method in symtop.integrators().values()
                     if method.tier == "compiled" and method.knob is not None and method.name != "taylor-quad"
                 ]
-                best = min(meet.seconds(scene, one, "axis", scene.horizon) for one in found if one is not None)
+                best = min(
+                    meet.seconds(scene, one, "axis", scene.horizon) for one in found if isinstance(one, meet.Met)
+                )
                 ratios.append(advice.seconds / best)
     assert np.mean(met) >= 0.97
     assert np.median(ratios) <= 2.0

@@ -1,6 +1,7 @@
 """Work and precision: parts of an error, settings that meet targets, races, rankings, a second round of cases."""
 
 import dataclasses
+import importlib
 import math
 
 import numpy as np
@@ -11,10 +12,11 @@ import symtop
 from symtop import charts
 from symtop.measure import ranking
 from symtop.measure.phase import phase, split
-from symtop.measure.race import Entry, anchors, entries, field, line, race
-from symtop.measure.timing import timings
+from symtop.measure.race import Entry, anchors, clock, entries, field, line, race
+from symtop.measure.timing import Timing, timings
 from symtop.measure.work import TARGETS, Walk, spans, work_table
 from symtop.reference import reference
+from symtop.report import work_words
 from symtop.scenes import closed_form
 from symtop.study import run as runner
 from symtop.study import store
@@ -125,6 +127,15 @@ def test_settings_come_close_to_every_target_from_below():
         assert charts.axis_distance(coarser["axis"].values, truth["axis"].values).max() > target
 
 
+def test_no_fixed_step_is_longer_than_a_quarter_of_a_nutation():
+    where = symtop.scene("steady")  # a fixed point of the midpoint rule, which is right there at any step
+    for name in ("midpoint", "srkn-14-6"):
+        table = work_table(where, symtop.integrator(name), [10.0 * where.nutation_period], 5e3, [1e-6]).isel(horizon=0)
+        ran = table["outcome"].values == "ok"
+        assert table["axis"].values[ran].min() < 1e-6
+        assert 40.0 <= table["steps"].values[ran].min() < 60.0
+
+
 def test_a_walk_ends_at_its_budget_and_says_so():
     where, method = symtop.scene("goldstein"), symtop.integrator("stormer-verlet")
     table = work_table(where, method, [10.0 * where.nutation_period, 1000.0 * where.nutation_period], 3e4)
@@ -138,9 +149,9 @@ def test_a_walk_ends_at_its_budget_and_says_so():
 def test_a_coarse_setting_that_is_good_enough_is_made_coarser():
     where, method = symtop.scene("fast"), symtop.integrator("strang")
     walk = Walk(where, method, 10.0 * where.nutation_period, 1e4)
-    walk.run(where.nutation_period / 7.37)
+    walk.run(where.nutation_period / 20.37)
     walk.coarsen(1e-3)
-    assert max(walk.rows) > 2.0 * where.nutation_period / 7.37
+    assert max(walk.rows) > 2.0 * where.nutation_period / 20.37
 
 
 def test_attitude_errors_come_from_a_chart_that_shows_them():
@@ -179,9 +190,40 @@ def test_anchors_are_a_short_and_a_longer_run_near_a_target():
 
 def test_the_field_of_a_race_is_whoever_may_win():
     runs = [entry(name, targets=[0]) for name in "abc"] + [entry("p", targets=[0])]
-    cost = dict(zip(runs, (1.0, 1.5, 9.0, 50.0), strict=True))
-    tier = {"a": "compiled", "b": "compiled", "c": "compiled", "p": "python"}
-    assert [[run.name for run in heat] for heat in field(runs, cost, tier)] == [["a", "b"], ["p"]]
+    runs += [entry("d", targets=[0]), entry("q", targets=[0])]
+    cost = dict(zip(runs, (1.0, 1.5, 9.0, 50.0, 10.0, 500.0), strict=True))
+    tier = dict.fromkeys("abcd", "compiled") | dict.fromkeys("pq", "python")
+    heats = [[run.name for run in heat] for heat in field(runs, cost, tier)]
+    assert heats == [["a", "b", "c"], ["p"]]  # c is the first behind: a lead must be over one that was timed
+
+
+def test_a_pace_is_read_from_the_longest_run_that_a_batch_can_hold():
+    runs = [entry("a", place=k, work=10.0**k) for k in range(3)]
+    taken = {run: Timing((10.0 ** (k - 3),), 1.0) for k, run in enumerate(runs)}
+    assert clock(runs, taken, 0.02).place == 1
+    assert clock(runs, taken, 1e-6).place == 0
+
+
+def test_a_machine_that_turns_slow_before_the_race_slows_the_forecasts_too(monkeypatch):
+    where = symtop.scene("goldstein")
+    runs = [entry(name, place=k, work=w) for name in ("strang", "midpoint") for k, w in enumerate((10.0, 1e3, 1e5))]
+    runs[1] = entry("strang", place=1, work=1e3, targets=[0])
+    races = []
+
+    def slower(calls, batches, batch, seed=0):
+        races.append(len(calls))
+        return [Timing((1e-8 * work * (3.0 if seed else 1.0),) * batches, 1.0) for work in calls]
+
+    module = importlib.import_module("symtop.measure.race")
+    monkeypatch.setattr(module, "timings", slower)
+    monkeypatch.setattr(module, "_call", lambda _where, _methods, run, *_: run.work)
+    found = race(where, [1.0], runs, rounds=3, size=3).isel(horizon=0)
+    assert len(races) == 2  # the second is three times slower
+    true = 3e-8 * np.array([10.0, 1e3, 1e5])
+    np.testing.assert_allclose(found["seconds"].sel(integrator="strang"), true)  # one of them timed, two foreseen
+    np.testing.assert_allclose(found["seconds"].sel(integrator="midpoint"), true)  # in no race: the others' pace
+    assert found["seconds_timed"].values.tolist() == [[0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]
+    assert found["pace"].values[0] == pytest.approx(3.0)
 
 
 def test_batches_of_a_round_are_neighbours_in_time():
@@ -248,6 +290,42 @@ def test_a_lead_is_sure_only_if_every_round_agrees_and_it_is_more_than_a_hair():
     assert mixed.level == ("b",)
     hair = ranking.win(cell([[1.0, 1.0, 1.0], [1.05, 1.05, 1.05]]), 1e-6)
     assert not hair.reliable
+
+
+def settings_of_one(seconds, errors, races):
+    """One method on one scene and horizon: settings coarse to fine."""
+    data = {
+        "seconds": seconds, "axis": errors, "seconds_race": races, "outcome": ["ok"] * len(seconds),
+        "tier": ["compiled"] * len(seconds), "force_evaluations": [10.0**k for k in range(len(seconds))],
+    }  # fmt: skip
+    return xr.Dataset({k: (("integrator", "setting"), [v]) for k, v in data.items()}, {"integrator": ["a"]})
+
+
+def test_a_run_raced_for_a_finer_target_is_not_the_cost_of_a_coarse_one():
+    data = settings_of_one([2.0, 1.0, 7.0], [1e-4, 1e-5, 1e-12], [0.0, 0.0, 1.0])
+    assert ranking.cheapest(data, 1e-3)[0].cost == 1.0  # nothing was raced for it: the least seconds
+    assert ranking.cheapest(data, 1e-11)[0].cost == 7.0
+    data = settings_of_one([2.0, 1.0, 7.0], [1e-4, 1e-5, 1e-12], [1.0, 0.0, 1.0])
+    assert ranking.cheapest(data, 1e-3)[0].cost == 2.0  # raced for it: more sure than a forecast
+
+
+def test_a_scene_without_nutation_is_shown_but_not_counted():
+    data = xr.Dataset(
+        {"nutation_lag": (("scene", "setting"), [[np.nan, 1.0], [np.nan, np.nan]])}, {"scene": ["x", "y"]}
+    )
+    kept, uncounted = ranking.counted(data)
+    assert (list(kept["scene"].values), uncounted) == (["x"], ["y"])
+    assert "Not counted: y" in work_words.left_out(uncounted)
+    assert work_words.left_out(ranking.counted(kept)[1]) == ""
+    assert ranking.counted(data.isel(scene=[1]))[1] == []  # nothing else to count
+
+
+def test_a_lead_over_a_rival_that_was_not_timed_is_called_foreseen():
+    both, one = (cell([[1.0] * 3, [2.0] * 3], races=races) for races in ([1.0, 1.0], [1.0, 0.0]))
+    assert ranking.win(both, 1e-6).rival_timed
+    assert not ranking.win(one, 1e-6).rival_timed
+    assert "2.0 times ahead of b)" in work_words.lead(1e-6, both)
+    assert "2.0 times ahead of b, foreseen)" in work_words.lead(1e-6, one)
 
 
 def test_a_slow_spell_that_hits_a_whole_round_does_not_blur_a_lead():

@@ -1,26 +1,40 @@
 """The coarsest setting at which a method meets an accuracy on a scene: found by running it, on a short horizon first.
 
-The error of a quantity over a horizon T follows C T^a h^p: p the order, a the law of growth (energy and momenta 0 and
-angles 1 for maps that are symplectic or symmetric, 1 and 2 for the others). So a setting is sought in a few secant
+The error of a quantity over a horizon T follows C T^a h^p: p the order, a the law of growth (energy, momenta and
+mean frequencies 0 and angles 1 for maps that are symplectic or symmetric, 1 and 2 for the others, whose frequencies
+drift with the energy). So a setting is sought in a few secant
 steps on log error against log setting; over a short horizon first, with the target scaled by that law, then over all.
 """
 
 import math
 from typing import NamedTuple
 
-from symtop.integrators.registry import Integrator
+from symtop.integrators.registry import Integrator, integrators
 from symtop.measure.accuracy import error_row
 from symtop.measure.timing import bare_run, timings
+from symtop.measure.work import coarsest_step
 from symtop.scenes import Scene
 from symtop.simulate import choose_chart
 
 SHORT = 12.37  # nutations of a trial run
 AIM = 0.5  # of the target: what the secant steers for
 LEAST, TRIES = 0.3, 9  # an error between LEAST times the target and the target ends the search
-COARSEST = 0.25  # of the horizon: the longest step that is tried
 LOOSEST = 0.4
 MOST_EVALUATIONS = {"compiled": 3e8, "python": 3e5}  # of one run
 FLAT = 1.3  # a halved setting that gains less has met rounding
+
+
+class Missed(NamedTuple):
+    """Why no setting was found, a sentence's beginning, and the smallest error seen (infinite if no run ended well)."""
+
+    why: str
+    error: float = math.inf
+
+
+ROUNDING = "Stopped by rounding or by what the method's settings allow"
+BUDGET = "Not within the work that a run may take"
+FAILED = "No run ended well"
+TRIED = f"Not within {TRIES} runs"
 
 
 class Met(NamedTuple):
@@ -43,9 +57,8 @@ def observed(quantity: str) -> str:
 def growth(method: Integrator, quantity: str) -> int:
     """The exponent a of the error's growth with the horizon that the method's traits promise."""
     angles = quantity in ("axis", "attitude", "theta")
-    rates = quantity in ("nutation_period", "precession_rate")
     structured = bool(method.symplectic) or bool(method.symmetric)
-    return (1 if angles else 0) + (0 if structured else 1) - (1 if rates and not structured else 0)
+    return (1 if angles else 0) + (0 if structured else 1)
 
 
 def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Met:
@@ -59,12 +72,17 @@ def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, qu
     )
 
 
+def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
+    """The least error of a quantity that the reference can judge over a horizon; NaN if the motion does not show it."""
+    return attempt(scene, integrators()["exact"], math.nan, horizon, quantity).bound
+
+
 def first_guess(scene: Scene, method: Integrator, horizon: float, accuracy: float) -> float:
     """A setting to begin with when nothing is known: error about (h/period)^p, or about the tolerance."""
     if method.knob == "tolerance":
         return min(max(0.1 * accuracy, method.least_tolerance * 1.01), LOOSEST)
     period = scene.nutation_period if math.isfinite(scene.nutation_period) else horizon / 8.0
-    return float(min(0.2 * period * accuracy ** (1.0 / (method.order or 2)), COARSEST * horizon))
+    return float(min(0.2 * period * accuracy ** (1.0 / (method.order or 2)), coarsest_step(scene, horizon)))
 
 
 def search(
@@ -75,21 +93,23 @@ def search(
     horizon: float,
     guess: float | None = None,
     patience: float = math.inf,
-) -> Met | None:
-    """The coarsest setting found that meets the accuracy over the horizon; None if rounding or the budget forbid it.
+) -> Met | Missed:
+    """The coarsest setting found that meets the accuracy over the horizon, or the reason why there is none.
 
     No run is begun that would take more than `patience` force evaluations.
     """
     patience = min(patience, MOST_EVALUATIONS[method.tier])
     step = method.knob == "step_size"
     power = float(method.order or 2) if step else 1.0
-    least, most = (0.0, COARSEST * horizon) if step else (method.least_tolerance * 1.001, LOOSEST)
+    least, most = (0.0, coarsest_step(scene, horizon)) if step else (method.least_tolerance * 1.001, LOOSEST)
     setting = min(max(guess or first_guess(scene, method, horizon, accuracy), least), most)
     if step and horizon / setting > patience:
-        return None
+        return Missed(BUDGET)
     best, last, failing = None, None, math.inf  # failing: the finest setting known to miss the target
+    why, smallest = TRIED, math.inf
     for _ in range(TRIES):
         found = attempt(scene, method, setting, horizon, quantity)
+        smallest = min(smallest, found.error)
         if found.error <= accuracy:
             best = found if best is None or setting > best.setting else best
             if found.error >= LEAST * accuracy or setting >= most:
@@ -97,7 +117,8 @@ def search(
         else:
             failing = min(failing, setting)
             if last is not None and last.setting > setting and last.error < FLAT * found.error:
-                break  # a finer setting that gains nothing has met rounding
+                why = ROUNDING  # a finer setting gains nothing
+                break
         power = _slope(last, found, power, float(method.order or 12))
         last, setting = found, min(max(setting * _factor(found.error, accuracy, power, step=step), least), most)
         if best is not None and setting >= failing:
@@ -106,8 +127,9 @@ def search(
                 break
         work = found.evaluations * (last.setting / setting if step else 1.0)
         if setting == last.setting or work > patience:
+            why = BUDGET if work > patience else ROUNDING
             break
-    return best
+    return best or Missed(FAILED if math.isinf(smallest) and why != BUDGET else why, smallest)
 
 
 def _slope(last: Met | None, found: Met, power: float, order: float) -> float:

@@ -5,13 +5,17 @@ There are too many settings to time them all, and most cannot win. So:
     1  every method is timed at its coarsest setting over the short horizon and at the finest that met a target there;
        with W force evaluations a run takes  o + c W  seconds, and these two runs give the overhead o and the slope c
     2  the cost of every other setting is foreseen with that line: `seconds_foreseen`
-    3  for every horizon and target the methods foreseen within `WITHIN` of the fastest, at most `FIELD` of them, are
-       timed again in rounds, each method once a round in random order, so that samples of a round are pairs; if one
-       that was not among them now seems to lead somewhere, it is timed with its rivals, until every leader was
+    3  for every horizon and target the methods foreseen within `WITHIN` of the fastest, at most `FIELD` of them, and
+       of compiled methods the next one behind them, are timed again in rounds, each method once a round in random
+       order, so that samples of a round are pairs; if one that was not among them now seems to lead somewhere, it is
+       timed with its rivals, until every leader was
+    4  the machine may be faster or slower by then, so one run of step 1 of every method in a race is timed in it again:
+       the ratio is the method's `pace`, by which its forecasts are scaled; those of a method that was in no race are
+       scaled by the median of the others
 
-`seconds` is the smallest sample where there is one (`seconds_timed` 1) and foreseen elsewhere (0). The line was drawn
-before step 3, so the runs of step 3 are a test of it that it has not seen: `foreseen_miss`. Everything runs on one
-thread; compilation and first use are in `first_call`.
+`seconds` is the smallest sample of step 3 where there is one (`seconds_timed` 1) and foreseen elsewhere (0). The shape
+of the line was fixed before step 3, so the runs of step 3 are a test of it that it has not seen: `foreseen_miss`.
+Everything runs on one thread; compilation and first use are in `first_call`.
 """
 
 import math
@@ -23,12 +27,12 @@ import xarray as xr
 
 from symtop.integrators.registry import Integrator, integrator
 from symtop.measure.timing import BATCH, Timing, bare_run, timings
-from symtop.measure.work import TARGETS, meeting
+from symtop.measure.work import TARGETS, least_work
 from symtop.scenes import Scene
 from symtop.simulate import choose_chart
 
 WITHIN = 1.6
-FIELD = 4
+FIELD = 3
 MOST_RACES = 4
 CELLS = ("seconds", "seconds_timed", "seconds_foreseen", "seconds_race", "spread", "reliable")
 LARGEST = {"compiled": 1e5, "python": 1e4}  # force evaluations of the longer run of step 1
@@ -55,9 +59,8 @@ def entries(data: xr.Dataset, targets: Sequence[float] = TARGETS) -> list[Entry]
             work = np.where(cell["outcome"].values == "ok", cell["force_evaluations"].values, np.nan)
             serves: dict[int, list[int]] = {}
             for number, target in enumerate(targets):
-                good = np.where(meeting(cell, target), work, np.nan)
-                if np.isfinite(good).any():
-                    serves.setdefault(int(np.nanargmin(good)), []).append(number)
+                if (least := least_work(cell, target)) is not None:
+                    serves.setdefault(least, []).append(number)
             found += [
                 Entry(
                     str(name),
@@ -106,12 +109,25 @@ def line(points: Sequence[tuple[float, float]]) -> Line:
 
 
 def field(runs: Sequence[Entry], cost: Mapping[Entry, float], tier: Mapping[str, str]) -> list[list[Entry]]:
-    """Who takes part in step 3: for each tier, horizon and target those that are near the front, cheapest first."""
+    """Who takes part in step 3: for each tier, horizon and target those that are near the front, cheapest first.
+
+    Of compiled methods also the next one behind those, so that a lead is over a method that was timed. Methods in plain
+    Python are too slow for that.
+    """
     heats: dict[tuple[str, int, int], list[Entry]] = {}
     for entry in sorted(runs, key=lambda run: cost[run]):
         for number in entry.targets:
             heats.setdefault((tier[entry.name], entry.far, number), []).append(entry)
-    return [[entry for entry in heat[:FIELD] if cost[entry] <= WITHIN * cost[heat[0]]] for heat in heats.values()]
+    taking_part = []
+    for (kind, *_), heat in heats.items():
+        near = sum(cost[entry] <= WITHIN * cost[heat[0]] for entry in heat[:FIELD])
+        taking_part.append(heat[: near + (kind == "compiled")])
+    return taking_part
+
+
+def clock(own: Sequence[Entry], taken: Mapping[Entry, Timing], batch: float) -> Entry:
+    """Which of a method's runs of step 1 shows its pace later: the longest that a batch can hold."""
+    return max((entry for entry in own if taken[entry].best <= batch), key=lambda entry: entry.work, default=own[0])
 
 
 def race(
@@ -124,8 +140,8 @@ def race(
     ``seconds_foreseen``, ``seconds_samples`` (all batches; NaN beyond those made), ``seconds_race`` (which race of
     step 3 they are from, 0 for none: samples pair up within one race), ``spread`` and ``reliable`` of the samples, and
     for each integrator ``first_call``, ``seconds_overhead``, ``seconds_per_evaluation``, ``foreseen_miss`` (largest
-    relative miss of a forecast in step 3) and ``attitude_cost`` (seconds of the chart that shows the attitude over
-    seconds of the one that shows the axis; 1 where they are the same).
+    relative miss of a forecast in step 3), ``pace`` (see step 4) and ``attitude_cost`` (seconds of the
+    chart that shows the attitude over seconds of the one that shows the axis; 1 where they are the same).
     """
     names = list(dict.fromkeys(entry.name for entry in runs))
     methods = {name: integrator(name) for name in names}
@@ -135,21 +151,32 @@ def race(
     wide = [entry for entry in (first[name][-1] for name in names) if _both(methods[entry.name])]
     calls = [_call(scene, methods, entry, horizons) for entry in opening]
     calls += [_call(scene, methods, entry, horizons, "attitude") for entry in wide]
-    found = timings(calls, 2, batch)
+    found = timings(calls, 2, 0.5 * batch)  # the line only: no time that is shown
     taken: dict[Entry, Timing] = dict(zip(opening, found, strict=False))
+    ratio = dict.fromkeys(names, 1.0)
+    for entry, timing in zip(wide, found[len(opening) :], strict=True):
+        ratio[entry.name] = timing.best / taken[entry].best
     lines = {name: line([(entry.work, taken[entry].best) for entry in first[name]]) for name in names}
-    foreseen = {entry: lines[entry.name](entry.work) for entry in runs}
-    expected = {entry: taken[entry].best if entry in taken else foreseen[entry] for entry in runs}
+    first_calls = [taken[first[name][0]].first_call for name in names]
+    clocks = {name: clock(first[name], taken, batch) for name in names}
+    before = {name: taken[clocks[name]].best for name in names}
+    pace: dict[str, float] = {}
+    expected = foreseen = {entry: lines[entry.name](entry.work) for entry in runs}
     heat: dict[Entry, int] = {}
     for number in range(1, MOST_RACES + 1):
         last = [entry for group in field(runs, expected, tier) if not set(group) <= set(heat) for entry in group]
         last = list(dict.fromkeys(last))
         if not last:
             break
-        again = timings([_call(scene, methods, entry, horizons) for entry in last], rounds, batch, seed=number)
-        taken |= dict(zip(last, again, strict=True))
+        paced = list(dict.fromkeys([*last, *(clocks[entry.name] for entry in last)]))
+        found = timings([_call(scene, methods, entry, horizons) for entry in paced], rounds, batch, seed=number)
+        again = dict(zip(paced, found, strict=True))
+        taken |= {entry: again[entry] for entry in last}
         heat |= dict.fromkeys(last, number)
-        expected |= {entry: taken[entry].best for entry in last}
+        pace |= {entry.name: again[clocks[entry.name]].best / before[entry.name] for entry in last}
+        usual = float(np.median(list(pace.values())))
+        foreseen = {entry: lines[entry.name](entry.work) * pace.get(entry.name, usual) for entry in runs}
+        expected = foreseen | {entry: taken[entry].best for entry in heat}
 
     place = {name: k for k, name in enumerate(names)}
     shape = (len(names), len(horizons), size or 1 + max(entry.place for entry in runs))
@@ -157,12 +184,12 @@ def race(
     samples = np.full((*shape, rounds), np.nan)
     for entry in runs:
         cell = place[entry.name], entry.far, entry.place
-        timing = taken.get(entry)
         table["seconds_foreseen"][cell] = foreseen[entry]
-        table["seconds"][cell] = timing.best if timing else foreseen[entry]
-        table["seconds_timed"][cell] = float(timing is not None)
+        table["seconds"][cell] = expected[entry]
+        table["seconds_timed"][cell] = float(entry in heat)
         table["seconds_race"][cell] = heat.get(entry, 0)
-        if timing:
+        if entry in heat:
+            timing = taken[entry]
             samples[cell][: len(timing.samples)] = timing.samples
             table["spread"][cell], table["reliable"][cell] = timing.spread, float(timing.reliable)
     misses = dict.fromkeys(names, math.nan)
@@ -170,11 +197,9 @@ def race(
         if entry not in opening:
             miss = abs(foreseen[entry] / taken[entry].best - 1.0)
             misses[entry.name] = miss if math.isnan(misses[entry.name]) else max(misses[entry.name], miss)
-    ratio = dict.fromkeys(names, 1.0)
-    for entry, timing in zip(wide, found[len(opening) :], strict=True):
-        ratio[entry.name] = timing.best / found[opening.index(entry)].best
     single = {
-        "first_call": [taken[first[name][0]].first_call for name in names],
+        "first_call": first_calls,
+        "pace": [pace.get(name, math.nan) for name in names],
         "seconds_overhead": [lines[name].overhead for name in names],
         "seconds_per_evaluation": [lines[name].slope for name in names],
         "foreseen_miss": [misses[name] for name in names],

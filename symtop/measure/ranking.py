@@ -1,6 +1,7 @@
 """Who is fastest at an accuracy, and whether the lead is more than noise.
 
-The cost of a target is that of a method's fastest raced run that met it, or of its run of least work if none was raced.
+The cost of a target is that of a method's run of least work that meets it, if it was raced, which is whom the race was
+for; otherwise of the run of least seconds that meets it, measured or foreseen.
 Two methods are compared by the ratios of their samples round by round, which were taken within a second or two of each
 other: a slow spell of the machine hits both.
 A lead is sure if both methods' samples are steady (see `timing`), every round agrees on it, and both its median and the
@@ -16,7 +17,7 @@ import xarray as xr
 
 from symtop.measure.race import WITHIN
 from symtop.measure.timing import NOISY
-from symtop.measure.work import TARGETS, meeting
+from symtop.measure.work import TARGETS, least_work, meeting
 
 MARGIN = 1.1
 FAR = 0.9 * WITHIN
@@ -55,26 +56,28 @@ class Win(NamedTuple):
         """Is it alone in front, beyond the noise?"""
         return not self.level
 
+    @property
+    def rival_timed(self) -> bool:
+        """Was the first that is behind timed in the same race? Otherwise its time is foreseen."""
+        return self.lead is not None and bool(np.isfinite(self.lead.low))
+
 
 def cheapest(
     cell: xr.Dataset, target: float, quantity: str = "axis", cost: str = "seconds", tier: str | None = None
 ) -> list[Place]:
     """Methods that meet a target, cheapest first; `cell` is one scene and one horizon of the study's dataset.
 
-    Each takes part with the fastest of its runs that were raced, or, if none was, with that of the least work.
+    Each takes part with its run of least work if that was raced, else with that of least cost.
     """
     found = []
     for name in cell["integrator"].values:
         own = cell.sel(integrator=name)
         good = meeting(own, target, quantity) & (own["outcome"].values == "ok") & np.isfinite(own[cost].values)
-        if not good.any():
+        entered = least_work(own, target, quantity)
+        if entered is None or not good.any():
             continue
-        raced = good & (own["seconds_race"].values > 0.0)
-        k = (
-            _least(raced, own["seconds"])
-            if raced.any() and cost == "seconds"
-            else _least(good, own["force_evaluations"])
-        )
+        raced = cost == "seconds" and bool(good[entered] and own["seconds_race"].values[entered] > 0.0)
+        k = entered if raced else _least(good, own[cost])
         kind = str(own["tier"].values.flat[0])
         if tier in (None, kind):
             found.append(Place(float(own[cost].values[k]), str(name), kind, k, float(own[quantity].values[k])))
@@ -129,6 +132,19 @@ def winners(data: xr.Dataset, targets: tuple[float, ...] = TARGETS) -> dict[tupl
         for far in range(data.sizes["horizon"])
         for target in targets
     }
+
+
+def counted(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
+    """The scenes that may be counted, and the names of those left out: those without a nutation.
+
+    A steady precession starts in a fixed point of several maps, which then have no error at any step: their wins there
+    say nothing about any other motion. If there are no other scenes, nothing is left out.
+    """
+    if "nutation_lag" not in data:
+        return data, []
+    nutating = {str(name): bool(data["nutation_lag"].sel(scene=name).notnull().any()) for name in data["scene"].values}
+    kept = [name for name, moves in nutating.items() if moves]
+    return (data.sel(scene=kept), [name for name in nutating if name not in kept]) if kept else (data, [])
 
 
 def agreement(first: xr.Dataset, second: xr.Dataset) -> tuple[int, list[str]]:

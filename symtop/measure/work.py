@@ -6,6 +6,9 @@ finest target is met, rounding stops it, or the next run would exceed a budget o
 approached from the two runs around it: log error is close to a straight line in log step, so that one or two more runs
 come within a `CLOSE` part of the target. Every run is kept. What was not tried is said: `stopped` names the reason.
 
+No fixed step is longer than a quarter of a nutation: such a run is judged at its own steps, and half a step a nutation
+may be right there and nowhere else. Adaptive methods are judged between their steps too and need no such limit.
+
 A method that shows the axis in one chart and the attitude only in a larger one is run in both, for what each is for.
 """
 
@@ -31,7 +34,9 @@ NOTCHES = 2.5  # decades of tolerance likewise
 CLOSE = 0.6  # an error between CLOSE times the target and the target is near enough
 AIM = 0.85
 REFINEMENTS = 2
+LEAST_STEPS = 4.37  # a nutation; not commensurate with it
 COARSER = 4  # doublings of the first setting, while it meets the loosest target
+NEARBY = 1.2  # a setting less coarser than that is not worth a run
 MOST = 24  # runs of one walk
 FLAT = 1.5  # two steps in a row that gain less than this, below `ROUNDED`, have met rounding
 ROUNDED = 1e-8
@@ -44,13 +49,18 @@ def spans(scene: Scene, periods: Sequence[float]) -> list[float]:
     return [count * period for count in periods]
 
 
+def coarsest_step(scene: Scene, horizon: float) -> float:
+    """The longest fixed step that is tried: a quarter of the horizon and about a quarter of a nutation."""
+    return min(0.25 * horizon, scene.nutation_period / LEAST_STEPS)
+
+
 def first_setting(method: Integrator, scene: Scene, horizon: float) -> float:
     """The coarsest setting that is tried at first; incommensurate with the nutation."""
     if method.knob == "tolerance":
         return 1e-2
     period = scene.nutation_period if math.isfinite(scene.nutation_period) else horizon / 8.0
     power = method.order or 2
-    return period / (7.37 if power <= 2 else 5.37 if power <= 4 else 2.37)
+    return period / (7.37 if power <= 2 else 5.37 if power <= 4 else LEAST_STEPS)
 
 
 def least_setting(method: Integrator) -> float:
@@ -88,7 +98,7 @@ class Walk:
         """Walk from coarse to fine; `expected` is the work of the first run, if known."""
         setting, finest = first_setting(self.method, self.scene, self.horizon), least_setting(self.method)
         stepping = self.method.knob == "step_size"
-        setting = min(setting, 0.25 * self.horizon) if stepping else setting
+        setting = min(setting, coarsest_step(self.scene, self.horizon)) if stepping else setting
         ratio = min(max(10.0 ** (DECADES / self.power), 1.35), 3.5) if stepping else 10.0**NOTCHES
         flat, last, work = 0, math.inf, expected
         while True:
@@ -113,9 +123,10 @@ class Walk:
     def coarsen(self, target: float) -> None:
         """Coarser settings, as long as they meet the loosest target."""
         for _ in range(COARSER):
-            setting = 2.0 * max(self.rows)
-            most = 0.25 * self.horizon if self.method.knob == "step_size" else 0.4
-            if setting > most or self.error(max(self.rows)) > target:
+            last = max(self.rows)
+            most = coarsest_step(self.scene, self.horizon) if self.method.knob == "step_size" else 0.4
+            setting = min(2.0 * last, most)
+            if setting < NEARBY * last or self.error(last) > target:
                 return
             self.run(setting)
 
@@ -186,3 +197,10 @@ def meeting(data: xr.Dataset, target: float, quantity: str = "axis") -> np.ndarr
     """Which runs reach a target."""
     with np.errstate(invalid="ignore"):
         return np.asarray(data[quantity].values <= target)
+
+
+def least_work(data: xr.Dataset, target: float, quantity: str = "axis") -> int | None:
+    """Place of a method's run of least work that ended well and meets a target, over one horizon; None if none does."""
+    good = meeting(data, target, quantity) & (data["outcome"].values == "ok")
+    good &= np.isfinite(data["force_evaluations"].values)
+    return int(np.argmin(np.where(good, data["force_evaluations"].values, np.inf))) if good.any() else None

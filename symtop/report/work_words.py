@@ -51,10 +51,21 @@ def lead(target: float, cell: xr.Dataset) -> str:
     if won.level:
         said += f" (inside the noise of {few(won.level)})"
     elif won.behind and won.lead:
-        said += f" ({won.lead.ratio:.1f} times ahead of {won.behind.integrator})"
+        foreseen = "" if won.rival_timed else ", foreseen"
+        said += f" ({won.lead.ratio:.1f} times ahead of {won.behind.integrator}{foreseen})"
     if won.best.integrator == "exact" and (other := ranking.win(cell, target, without=("exact",))):
         said += f", the fastest that steps {other.best.integrator} in {seconds(other.best.cost)}"
     return said
+
+
+def left_out(names: Sequence[str]) -> str:
+    """Which scenes are shown but not counted, and why; nothing if there are none."""
+    if not names:
+        return ""
+    return (
+        f" Not counted: {', '.join(names)}, without a nutation; a start that is a fixed point of a map "
+        "gives it no error at any step."
+    )
 
 
 def growth(data: xr.Dataset, names: list[str], part: str) -> str:
@@ -67,7 +78,7 @@ def growth(data: xr.Dataset, names: list[str], part: str) -> str:
 
 def crossings(data: xr.Dataset) -> list[str]:
     """For each classical method, who keeps energy better at equal cost, where, and up to what cost."""
-    cells = [data.sel(scene=name).isel(horizon=-1) for name in data["scene"].values]
+    cells = _long(data)
     sentences = []
     for classic in CLASSIC:
         parts = []
@@ -92,9 +103,15 @@ def crossings(data: xr.Dataset) -> list[str]:
     return sentences
 
 
+def _long(data: xr.Dataset) -> list[xr.Dataset]:
+    """The scenes that count, over the long horizon."""
+    kept = ranking.counted(data)[0]
+    return [kept.sel(scene=name).isel(horizon=-1) for name in kept["scene"].values]
+
+
 def crossed(data: xr.Dataset) -> str:
     """The same in one sentence."""
-    cells = [data.sel(scene=name).isel(horizon=-1) for name in data["scene"].values]
+    cells = _long(data)
     known = [one for cell in cells for a in STRUCTURE for b in CLASSIC if (one := ranking.crossing(cell, a, b))]
     coarse = sum(one.at_least and not one.at_most for one in known)
     fine = sum(one.at_most and not one.at_least for one in known)
@@ -108,6 +125,7 @@ def crossed(data: xr.Dataset) -> str:
 def opening(data: xr.Dataset) -> Opening:
     """Which method to begin with: for each horizon and target the one closest to the fastest over all scenes."""
     rows, sentences = [], []
+    data, uncounted = ranking.counted(data)
     names = [name for name in map(str, data["integrator"].values) if _steps(data.sel(integrator=name))]
     ahead: Counter[str] = Counter()
     for far, span in enumerate(spans(data)):
@@ -130,7 +148,9 @@ def opening(data: xr.Dataset) -> Opening:
         others = ", ".join(f"{name} for {count}" for name, count in ahead.most_common()[1:])
         sentences.append(
             f"For the direction of the axis, begin with {best}: over all scenes it is closest to the fastest method "
-            f"for {times} of {len(rows)} pairs of horizon and accuracy" + (f"; {others}." if others else ".")
+            f"for {times} of {len(rows)} pairs of horizon and accuracy"
+            + (f"; {others}." if others else ".")
+            + left_out(uncounted)
         )
     sentences.append(f"For energy {spans(data)[-1]}: {crossed(data)}")
     sentences.append(
