@@ -5,6 +5,7 @@ cluster's workers need this version of symtop, the scripts of the studies, and t
 """
 
 import contextlib
+import gc
 import multiprocessing
 import os
 import warnings
@@ -50,16 +51,20 @@ class Workers:
         except ImportError:
             msg = "scheduler needs the package distributed: pip install 'symtop[distributed]'"
             raise SymtopError(msg) from None
+        failure = None
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # other versions there; the digest of every case is compared anyway
                 self._client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
                 self._client.wait_for_workers(1, timeout=PATIENCE)
         except (OSError, ValueError, RuntimeError) as error:
+            failure = _short(error)
+        if failure is not None:  # out of the handler, so that nothing holds on to what was half made
             self._leave()
+            gc.collect()  # a client that never connected closes itself here, and not under a lock of the next one
             must = "the address of a dask scheduler that answers and has workers"
-            msg = f"scheduler must be {must}, not {address!r} ({_short(error)})"
-            raise SymtopError(msg) from error
+            msg = f"scheduler must be {must}, not {address!r} ({failure})"
+            raise SymtopError(msg)
         self._pools[CLUSTER] = self._client.get_executor(pure=False)
 
     def pool(self, size: int) -> Executor:
