@@ -203,7 +203,7 @@ def verdict(data: xr.Dataset) -> list[str]:
     sentences.append(
         f"{int(timed.sum())} of {int(known.sum())} run times were measured; the others are foreseen from two measured "
         f"runs of the same method on the same scene. {sum(won.rival_timed for won in sure)} of {len(sure)} leads "
-        f"beyond the noise are over a rival timed in the same race, the others over one that was foreseen. Where "
+        f"beyond the noise are over a rival timed in the same race, any others over one that was foreseen. Where "
         f"such a forecast was then measured it was off by {np.nanmedian(miss):.0%} (median), {np.nanmax(miss):.0%} at "
         f"worst. {doubtful} of the measured times were too noisy to trust."
         if np.isfinite(miss).any()
