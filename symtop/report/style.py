@@ -82,8 +82,8 @@ def use() -> None:
     mpl.use("Agg")
     plt.rcParams.update(
         {
-            "figure.dpi": 100,
-            "savefig.dpi": 100,
+            "figure.dpi": 96,
+            "savefig.dpi": 96,
             "figure.constrained_layout.use": True,
             "font.size": 10.0,
             "axes.titlesize": 10.5,
