@@ -82,6 +82,16 @@ def test_the_second_time_nothing_is_computed_and_damaged_cases_are(results):
     assert datasets.read(results / "convergence.nc").equals(before)
 
 
+def test_every_sentence_and_table_of_the_report_follows_from_a_stored_dataset(results):
+    """Nothing is said that the dataset on disk does not say again; `seconds` aside, nothing else is asked."""
+    for name in runner.names():
+        study, stored = runner.load(name), datasets.read(results / f"{name}.nc")
+        said = json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
+        assert study.verdict(stored) == said["verdict"], name
+        assert json.loads(json.dumps([table._asdict() for table in study.tables(stored)])) == said["tables"], name
+        assert any(digit in " ".join(said["verdict"]) for digit in "123456789"), name  # and there are numbers in it
+
+
 def test_the_report_is_one_page_without_outside_references(results):
     done = CliRunner().invoke(main, ["report", "--results", str(results)])
     assert done.exit_code == 0, done.output
