@@ -9,7 +9,8 @@ from symtop.measure.clock import Clock
 from symtop.measure.conservation import history
 from symtop.measure.growth import change_point, ensemble_growth, growth, horizon, law, lost_at
 from symtop.measure.horizons import lost_phase
-from symtop.measure.longrun import chart_of, scattered
+from symtop.measure.longrun import chart_of, scattered, watch
+from symtop.measure.rounding import elapsed, members
 
 TIME = np.linspace(0.0, 1000.0, 4001) + 0.3 * np.sin(np.arange(4001))
 
@@ -45,6 +46,30 @@ def test_an_ensemble_tells_a_walk_from_a_drift():
     walk, drift = ensemble_growth(steps, walks, 20.0), ensemble_growth(steps, walks + 0.2 * steps, 20.0)
     assert abs(walk.fit.slope - 0.5) < walk.fit.interval < 0.3
     assert drift.fit.slope - drift.fit.interval > 0.65
+
+
+def test_steps_between_means_make_a_walk_a_walk_from_the_first_window_on():
+    ends = np.array([100, 130, 200, 400, 1000])
+    walks = np.cumsum(np.random.default_rng(4).standard_normal((20_000, 1000)), axis=1)
+    means = np.stack([part.mean(axis=1) for part in np.split(walks, ends[:-1], axis=1)])
+    variance = np.mean((means[1:] - means[0]) ** 2, axis=1)
+    assert np.isnan(elapsed(ends)[0])
+    assert variance == pytest.approx(elapsed(ends)[1:], rel=0.05)
+    assert abs(variance[0] / ends[1] - 1.0) > 0.5  # the control: counted from the start
+
+
+@pytest.mark.parametrize("name", ["stormer-verlet", "midpoint", "strang", "cayley"])
+def test_the_mean_of_a_window_is_known_far_better_than_the_energy_has_digits(name):
+    """Rounded to one double, the level of the modified energy would put 3.5e-17 into every window."""
+    where, method = symtop.scene("spheroid"), symtop.integrator(name)
+    found = []
+    for one in members(where, 6):
+        h = one.nutation_period / 1000.37
+        solver = chart_of(method)[1]
+        par, rule, state = solver.setup(one.top, one.start, h)
+        done = solver.loop(par, rule, state, h, scattered(0, 5000))
+        found.append(watch(one, method, h)(done.states, done.momenta)["modified_energy"].mean())
+    assert np.sqrt(np.mean(np.square(found))) < 1.2e-17
 
 
 def test_a_change_of_law_is_found_where_it_is_and_not_where_it_is_not():
@@ -127,10 +152,10 @@ def test_a_modified_energy_oscillates_with_the_fourth_power_of_the_step(name):
         par, rule, state = solver.setup(where.top, where.start, h)
         states = solver.loop(par, rule, state, h, scattered(0, 4000, 2000)).states
         values = shadow.modified_energy(where, name, chart, states, h)
-        series, mean = shadow.oscillation(*shadow.section(chart, states), values)
+        on = shadow.section(chart, states)
         plain.append(np.ptp(shadow.energy(where, chart, states)))
         modified.append(np.ptp(values))
-        rest.append(np.ptp(values - mean - series(*shadow.section(chart, states))))
+        rest.append(np.ptp(shadow.oscillation(*on, values).rest(*on, values)))
     assert plain[0] / plain[1] == pytest.approx(4.0, rel=0.1)  # the control: H itself, of second order
     if name == "cayley":
         assert max(modified) < 1e-12

@@ -62,21 +62,13 @@ def test_a_change_of_law_is_told_above_rounding_only(drift):
     assert drift._law(cell.assign(energy_largest=1e-14), "energy") == "1.10 +- 0.10, linear"
 
 
-@pytest.mark.parametrize(("power", "says"), [(0.5, "(agrees with"), (0.8, "(does not agree with")])
-def test_a_walk_of_rounding_is_held_against_one_half_above_the_floor(drift, power, says):
-    steps = np.geomspace(1e4, 1e7, 37)
-    sizes = np.random.default_rng(7).standard_normal((24, 1)) * np.ones(37)
-    known = {"exponent": 0.39, "exponent_interval": 0.06, "end": 1e-15, "plain_end": 1e-13}
+@pytest.mark.parametrize(("power", "says"), [(0.45, "(agrees with"), (0.8, "(does not agree with")])
+def test_a_walk_of_rounding_is_held_against_one_half(drift, power, says):
+    known = {"exponent": power, "exponent_interval": 0.06, "end": 1e-15, "plain_end": 1e-13}
     cell = xr.Dataset({f"rounding_{name}": value for name, value in known.items()}, coords={"integrator": "strang"})
-    cell["rounding_steps"] = "rounding_window", steps
-    drifts = 1e-19 * sizes * (1e5 / np.minimum(steps, 1e5)) ** power * steps**power  # flat before 1e5 steps
-    cell["rounding"] = ("member", "rounding_window"), drifts * (1.0 + 1e-3 * np.random.default_rng(8).random((24, 37)))
     said = drift._walk(cell)
-    assert "n^0.39 +- 0.06 over all windows" in said
-    assert f"as n^{power:.2f} +- 0.00 from 1e+05 steps on {says}" in said
+    assert f"strang grows as n^{power:.2f} +- 0.06 {says}" in said
     assert "100 times less" in said
-    early = cell.isel(rounding_window=slice(0, 10))
-    assert "steps on" not in drift._walk(early)
 
 
 def test_a_mean_energy_that_moves_is_said_to(drift):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from symtop.integrators.registry import Integrator
 
-ADAPTERS = ("scipy", "diffrax", "sundae", "mujoco", "rebound", "drake")
+ADAPTERS = ("scipy", "odeint", "diffrax", "sundae", "mujoco", "rebound", "drake")
 
 
 class Peer(NamedTuple):
@@ -13,6 +13,7 @@ class Peer(NamedTuple):
 
     package: str
     method: Integrator
+    distribution: str = ""  # that installs it, where its name is another
 
 
 def load(adapters: tuple[str, ...] = ADAPTERS) -> tuple[list[Peer], list[str]]:
@@ -20,8 +21,9 @@ def load(adapters: tuple[str, ...] = ADAPTERS) -> tuple[list[Peer], list[str]]:
     found, missing = [], []
     for name in adapters:
         module = importlib.import_module(f"benchmarks.peers.adapters.{name}")
+        distribution = getattr(module, "DISTRIBUTION", module.PACKAGE)
         try:
-            found += [Peer(module.PACKAGE, method) for method in module.peers()]
+            found += [Peer(module.PACKAGE, method, distribution) for method in module.peers()]
         except (ImportError, OSError) as error:  # OSError: a shared library that does not load
             missing.append(f"{module.PACKAGE} is not installed here and was skipped: {error}.")
     return found, missing

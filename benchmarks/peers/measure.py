@@ -191,15 +191,15 @@ def _combined(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, 
             values[scenes.index(scene), names.index(name), : len(row)] = row.reshape(len(row), *values.shape[3:])
         variables[key] = (("scene", "integrator", "setting", *(["batch"] if deep else [])), values)
     variables["package"] = ("integrator", [about[name].package for name in names])
-    variables["version"] = ("integrator", [_version(about[name].package) for name in names])
+    variables["version"] = ("integrator", [_version(about[name].distribution or about[name].package) for name in names])
     variables["formulation"] = ("integrator", [about[name].method.summary for name in names])
     variables["tier"] = ("integrator", [about[name].method.tier for name in names])
     return xr.Dataset(variables, coords={"scene": scenes, "integrator": names})
 
 
-def _version(package: str) -> str:
+def _version(distribution: str) -> str:
     try:
-        return importlib.metadata.version(package)
+        return importlib.metadata.version(distribution)
     except importlib.metadata.PackageNotFoundError:
         return "unknown"
 

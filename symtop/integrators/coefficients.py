@@ -36,10 +36,14 @@ def palindrome(outer: Sequence[float], *, odd: bool) -> tuple[float, ...]:
 
 def exact_sum(values: Sequence[float], total: float = 1.0) -> tuple[float, ...]:
     """The same coefficients with what is missing from `total` given to the middle one, or to the middle two equally."""
-    n = len(values)
-    middle = range((n - 1) // 2, n // 2 + 1)
-    share = math.fsum([total, *(-value for value in values)]) / len(middle)
-    return tuple(value + share if i in middle else value for i, value in enumerate(values))
+    found, n = list(values), len(values)
+    surplus = math.fsum((*found, -total))
+    if n % 2:
+        found[n // 2] -= surplus
+    else:
+        found[n // 2 - 1] -= 0.5 * surplus
+        found[n // 2] -= 0.5 * surplus
+    return tuple(found)
 
 
 def strang_steps(order: int, outer: Sequence[float]) -> Table:

@@ -116,8 +116,9 @@ class Loop:
         state, low, carry, k = at
         if isinstance(carry, np.ndarray):  # a kernel's working space: `at` stays what it is
             carry = carry.copy()
-        states = np.full((len(marks), len(state)), np.nan)
-        momenta = np.full((len(marks), 2), np.nan)
+        states, momenta = np.empty((len(marks), len(state))), np.empty((len(marks), 2))
+        states.fill(np.nan)
+        momenta.fill(np.nan)
         j = work = outcome = 0
         while j < len(marks) and outcome == OK:
             stop = min(k + BLOCK, int(marks[-1]))

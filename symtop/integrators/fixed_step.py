@@ -33,7 +33,8 @@ class FixedStep:
     def run(self, top: SymmetricTop, start: Angles, plan: Plan, par: Any, done: March) -> Run:
         """What the loop returned, in the states of the chart."""
         momenta = done.momenta
-        momenta[plan.marks == 0] = top.momenta(start)[:2]
+        if plan.marks[0] == 0:
+            momenta[0] = top.momenta(start)[:2]
         return Run(
             states=done.states if self.present is None else self.present(par, plan.times, done.states),
             p_phi=momenta[:, 0],

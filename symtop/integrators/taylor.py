@@ -137,7 +137,7 @@ def propagate(
     grid = times if times[0] == 0.0 else np.concatenate([[0.0], times])
     numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
     outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=most)
-    return Flight(states[grid.size - times.size :], int(steps), int(integrator.order), str(outcome))
+    return Flight(states[grid.size - times.size :], int(steps), int(integrator.order), outcome.name)
 
 
 def solver(chart: str, precision: str) -> Solver:
@@ -146,20 +146,26 @@ def solver(chart: str, precision: str) -> Solver:
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         most = max(1, int(plan.most(MOST_STEPS[precision])))
         flight = propagate(chart, precision, plan.tolerance, top, start, plan.times, most)
-        missing = ((0, plan.times.size - len(flight.states)), (0, 0))
-        states = np.pad(flight.states.astype(float), missing, constant_values=np.nan)
-        p_phi, p_psi = (
-            np.pad(values.astype(float), missing[:1], constant_values=np.nan)
-            for values in space_momenta(chart, flight.states)
-        )
-        good = np.isfinite(states).all(axis=1)
+        count, size = len(flight.states), plan.times.size
+        states = _padded(flight.states, size)
+        p_phi, p_psi = (_padded(values, size) for values in space_momenta(chart, flight.states))
+        good: Any = np.isfinite(states).all(axis=1)
         word = "ok" if good.all() and "time_limit" in flight.outcome else "not_finite"
-        if "step_limit" in flight.outcome and good[: len(flight.states)].all():
+        if "step_limit" in flight.outcome and good[:count].all():
             word = "out_of_budget"
         reached = plan.horizon if word == "ok" else float(plan.times[good][-1]) if good.any() else 0.0
         return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, word, reached)
 
     return solve
+
+
+def _padded(values: Any, size: int) -> Array:
+    """Values as doubles, and NaN for the times that were not reached."""
+    shown: Array = values.astype(float, copy=False)
+    if len(shown) == size:
+        return shown
+    missing: Array = np.full((size - len(shown), *shown.shape[1:]), np.nan)
+    return np.concatenate([shown, missing])
 
 
 def space_momenta(chart: str, states: Any) -> tuple[Any, Any]:
@@ -168,7 +174,7 @@ def space_momenta(chart: str, states: Any) -> tuple[Any, Any]:
         axis, momentum = states[:, :3], states[:, 3:]
     else:
         axis, momentum = charts.axis_from_quaternion(states[:, :4]), states[:, 4:]
-    return momentum[:, 2].copy(), np.sum(momentum * axis, axis=-1)
+    return momentum[:, 2].copy(), (momentum * axis).sum(axis=-1)
 
 
 # beyond double there are no vector units, and quadruple precision is software: a step costs 12 and 500 times as much

@@ -97,16 +97,16 @@ def watch(where: Scene, method: Integrator, h: float) -> Gauge:
     seen = shown(solver.loop(par, rule, state, h, np.array([0])).states)
     first = first if len(first) else seen
     energy_start = float(shadow.energy(where, chart, seen)[0])
-    series, modified_start = shadow.oscillation(
+    curve = shadow.oscillation(
         *shadow.section(chart, first), shadow.modified_energy(where, method.name, chart, first, h)
     )
 
     def gauge(states: Array, momenta: Array) -> dict[str, Array]:
         states = shown(states)
-        modified = shadow.modified_energy(where, method.name, chart, states, h) - modified_start
+        modified = shadow.modified_energy(where, method.name, chart, states, h)
         return {
             "energy": (shadow.energy(where, chart, states) - energy_start) / scale,
-            "modified_energy": (modified - series(*shadow.section(chart, states))) / scale,
+            "modified_energy": curve.rest(*shadow.section(chart, states), modified) / scale,
             "p_phi": (momenta[:, 0] - start.p_phi) / unit,
             "p_psi": (momenta[:, 1] - start.p_psi) / unit,
             "theta": states[:, 0] if chart == "angles" else charts.theta_from_axis(states[:, :3]),

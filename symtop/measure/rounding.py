@@ -1,8 +1,11 @@
 """Round-off over many steps: how the modified energy of an ensemble wanders off, and what plain sums would do.
 
 Every member starts a hundredth of a radian from the one before; its step is the same fraction of its own nutation.
-Drift is the change of the mean modified energy of a window (see `shadow`, `longrun`), relative to the energy. The best
-that can be had is Brouwer's law, a root mean square that grows as n^1/2.
+Drift is the mean modified energy of a window less that of the first one (see `shadow`, `longrun`), relative to the
+energy. The best that can be had is Brouwer's law, a root mean square that grows as n^1/2, where n is counted so that it
+does exactly that for a walk of independent steps: between its means over (0, c] and over (a, b], a >= c, such a walk
+has the variance of n = a + (b - a)/3 - 2c/3 steps.
+
 Reference: Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231.
 """
 
@@ -18,7 +21,7 @@ from symtop.measure.longrun import long_run
 from symtop.scenes import Scene
 
 SPACING = 0.01  # rad
-SETTLED = 2.0  # the first windows compare a mean with itself: growth is fitted from this many of them on
+PLAIN = 8  # members with plain sums, for comparison
 
 
 def members(where: Scene, count: int) -> list[Scene]:
@@ -28,15 +31,23 @@ def members(where: Scene, count: int) -> list[Scene]:
     return [Scene(f"{where.name}-{k}", where.top, start, where.horizon) for k, start in enumerate(starts)]
 
 
-def round_off(where: Scene, method: Integrator, steps: int, per_nutation: float, count: int) -> xr.Dataset:
-    """Drift of the modified energy of `count` starts over `steps` steps, with compensated and with plain sums.
+def elapsed(ends: np.ndarray) -> np.ndarray:
+    """Steps of a walk that lie between the mean over the first window and those over the others; NaN for the first."""
+    n, begins = np.asarray(ends, float), np.concatenate([[np.nan], np.asarray(ends, float)[:-1]])
+    steps: np.ndarray = begins + (n - begins) / 3.0 - 2.0 * n[0] / 3.0
+    return steps
 
-    Dimensions ``member`` and ``rounding_window``. ``rounding`` and ``rounding_plain`` hold drifts, ``..._rms`` their
-    root mean square, ``..._exponent`` its growth with ``..._exponent_interval`` (95 %), ``..._end`` its last value;
+
+def round_off(where: Scene, method: Integrator, steps: int, per_nutation: float, count: int) -> xr.Dataset:
+    """Drift of the modified energy of `count` starts over `steps` steps, and of at most `PLAIN` with plain sums.
+
+    Dimensions ``member``, ``plain_member`` and ``rounding_window``, with ``rounding_elapsed`` steps (see `elapsed`).
+    ``rounding`` and ``rounding_plain`` hold drifts, ``..._rms`` their root mean square, ``..._exponent`` its growth
+    with ``..._exponent_interval`` (95 %) from as many steps on as the first window has, ``..._end`` its last value;
     ``rounding_p_phi`` and ``rounding_p_psi`` the largest change of a momentum with compensated sums.
     """
     found: dict[str, object] = {}
-    for name, compensated in (("rounding", True), ("rounding_plain", False)):
+    for name, compensated, many in (("rounding", True, count), ("rounding_plain", False, min(PLAIN, count))):
         runs = [
             long_run(
                 one,
@@ -46,13 +57,13 @@ def round_off(where: Scene, method: Integrator, steps: int, per_nutation: float,
                 compensated=compensated,
                 quiet=True,
             )
-            for one in members(where, count)
+            for one in members(where, many)
         ]
         ends = runs[0]["steps"].values
         drifts = np.stack([run["modified_energy_mean"].values for run in runs])
-        grown = ensemble_growth(ends, drifts, SETTLED * ends[0])
-        found["rounding_steps"] = ("rounding_window", ends)
-        found[name] = (("member", "rounding_window"), drifts)
+        grown = ensemble_growth(elapsed(ends), drifts, ends[0])
+        found["rounding_elapsed"] = ("rounding_window", elapsed(ends))
+        found[name] = (("member" if compensated else "plain_member", "rounding_window"), drifts)
         found[f"{name}_rms"] = ("rounding_window", grown.rms)
         found[f"{name}_exponent"], found[f"{name}_exponent_interval"] = grown.fit.slope, grown.fit.interval
         found[f"{name}_end"] = float(grown.rms[-1])

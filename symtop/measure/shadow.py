@@ -12,8 +12,8 @@ it come off. The first is known in closed form, for kick-drift-kick splittings H
 and leaves C h^4 (nothing for cayley). The second is whatever remains: the motion has one degree of freedom, a
 symplectic map stays on a closed curve of its (theta, p_theta), or of (u, u') with u = cos(theta), and any function of
 the state is on that curve a periodic function of the angle about its middle. A Fourier series in that angle, fitted to
-the first nutations of a run, takes it off to a few 1e-17; only what moves the curve remains, and the mean of some
-hundred samples shows 1e-17 of it.
+the first nutations of a run, takes it off to 5e-17, which is the rounding of one sample; only what moves the curve
+remains, and the mean of 512 samples shows 2e-18 of it.
 Source of the first layer: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
 """
 
@@ -92,20 +92,30 @@ def section(chart: str, states: Array) -> tuple[Array, Array]:
 
 
 class Oscillation(NamedTuple):
-    """A periodic function of the angle about the middle of a closed curve, as a Fourier series without its mean."""
+    """A periodic function of the angle about the middle of a closed curve: a level and a Fourier series.
+
+    The level comes in two parts, a large number and what is missing from it. Rounded to one double it would be wrong
+    by half a unit in the last place of the energy, 3.5e-17 of it, in every window of a run.
+    """
 
     centre: float
     width: float
     height: float
     coefficients: Array
+    level: float = 0.0
+    missing: float = 0.0
 
     def angle(self, x: Array, y: Array) -> Array:
         """The angle about the middle of the curve."""
         return np.asarray(np.arctan2(y / self.height, (x - self.centre) / self.width))
 
     def __call__(self, x: Array, y: Array) -> Array:
-        """The series at points of the curve."""
+        """The series, without the level, at points of the curve."""
         return np.asarray(_harmonics(self.angle(x, y), self.coefficients.size // 2) @ self.coefficients)
+
+    def rest(self, x: Array, y: Array, values: Array) -> Array:
+        """What the function leaves of values at points of the curve."""
+        return (values - self.level) - (self.missing + self(x, y))
 
 
 def _harmonics(angle: Array, count: int) -> Array:
@@ -113,15 +123,13 @@ def _harmonics(angle: Array, count: int) -> Array:
     return np.concatenate([np.cos(turned), np.sin(turned)], axis=1)
 
 
-def oscillation(x: Array, y: Array, values: Array, harmonics: int = HARMONICS) -> tuple[Oscillation, float]:
-    """Fit the series to values on the points of a closed curve, and their mean; too few points give no series."""
+def oscillation(x: Array, y: Array, values: Array, harmonics: int = HARMONICS) -> Oscillation:
+    """Fit the function to values on the points of a closed curve; too few points give a level and no series."""
+    level = float(values[0])
     if x.size < 4 * harmonics or np.ptp(x) == 0.0 or not np.any(y):
-        return Oscillation(0.0, 1.0, 1.0, np.zeros(0)), float(values.mean())
+        return Oscillation(0.0, 1.0, 1.0, np.zeros(0), level, float((values - level).mean()))
     least, largest = float(x.min()), float(x.max())
     curve = Oscillation(0.5 * (least + largest), 0.5 * (largest - least), float(np.abs(y).max()), np.zeros(0))
     columns = np.concatenate([np.ones((x.size, 1)), _harmonics(curve.angle(x, y), harmonics)], axis=1)
-    offset = float(
-        values.mean()
-    )  # what is fitted is small, so that rounding is of the oscillation and not of the energy
-    found = np.linalg.lstsq(columns, values - offset, rcond=None)[0]
-    return curve._replace(coefficients=found[1:]), offset + float(found[0])
+    found = np.linalg.lstsq(columns, values - level, rcond=None)[0]
+    return curve._replace(coefficients=found[1:], level=level, missing=float(found[0]))

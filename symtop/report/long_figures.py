@@ -46,16 +46,15 @@ def walks(data: xr.Dataset, names: Sequence[str]) -> Any:
     figure, axes = panels(1, len(names), height=3.6, sharex=True, sharey=True)
     for axis, name in zip(axes[0], names, strict=True):
         cell, style = data.sel(integrator=name), look(name)
-        steps = cell["rounding_steps"].values
+        steps = cell["rounding_elapsed"].values
         good = np.isfinite(steps)
-        good[:2] = False
         for member in cell["rounding"].values:
             axis.plot(steps[good], np.abs(member[good]), color=style.color, lw=0.5, alpha=0.45)
         axis.plot(steps[good], cell["rounding_rms"].values[good], style.marker + "-", color=style.color, ms=4,
                   label=f"{name}, compensated")  # fmt: skip
         axis.plot(steps[good], cell["rounding_plain_rms"].values[good], "x--", color=BLACK, ms=4, lw=1.0,
                   label="plain sums")  # fmt: skip
-        axis.set(xscale="log", yscale="log", title=name, xlabel="steps")
+        axis.set(xscale="log", yscale="log", title=name, xlabel="steps between the means")
         axis.xaxis.set_minor_formatter(NullFormatter())
         first, last = float(steps[good][0]), float(steps[good][-1])
         slope_guide(axis, 0.5, (first * 3.0, last), 2e-18, r"$n^{1/2}$")
