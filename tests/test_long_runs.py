@@ -7,19 +7,22 @@ import subprocess
 import sys
 import time
 import tracemalloc
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from numba import njit
 
 import symtop
 from symtop.checks import SymtopError
 from symtop.cli import main
 from symtop.integrators import drive
+from symtop.integrators.fused import fused
 from symtop.measure import longrun
 from symtop.measure.longrun import chart_of, leaves, long_run, regrown, scattered, windows
-from symtop.measure.rounding import round_off
+from symtop.measure.rounding import members, round_off
 
 WHERE = symtop.scene("spheroid")
 H = WHERE.nutation_period / 400.37
@@ -201,6 +204,25 @@ def test_compensated_sums_drift_less_than_plain_ones(name):
     assert float(found["rounding_end"]) < 2e-15
     assert float(found["rounding_plain_end"]) > 8.0 * float(found["rounding_end"])
     assert max(float(found["rounding_p_phi"]), float(found["rounding_p_psi"])) < 2e-14
+
+
+def test_a_small_correction_is_not_rounded_to_one_side():
+    """This start lost 1.5e-14 of its energy in 5e7 steps while midpoint rounded its last correction by itself."""
+    start = members(WHERE, 15)[14]
+    run = long_run(start, "midpoint", steps=50_000_000, step_size=start.nutation_period / 1000.37, quiet=True)
+    assert abs(float(run["modified_energy_mean"][-1])) < 5e-15
+
+
+def test_a_fused_sum_is_rounded_once_and_a_plain_one_twice():
+    tiny = 2.0**-30
+
+    @njit
+    def compiled(a, b, c):
+        return fused(a, b, c)
+
+    assert compiled(1.0 + tiny, 1.0 - tiny, -1.0) == -(tiny**2)
+    assert (1.0 + tiny) * (1.0 - tiny) - 1.0 == 0.0
+    assert fused(Fraction(1, 3), Fraction(3), Fraction(1)) == 2
 
 
 def test_the_command_runs_and_says_what_changed(tmp_path):

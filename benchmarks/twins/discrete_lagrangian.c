@@ -108,17 +108,17 @@ static inline int increment(
         force = forces(par, &sums);
         effort++;
     }
-    double W0 = force.W0 + force.W0_slope * correction, W1 = force.W1 + force.W1_slope * correction;
-    d = lever * (state[1] - h * W0);
-    double v = force.v + force.v_slope * correction, C = sums.C - sums.P1 * correction;
-    step[0] = d;
-    step[1] = -h * (W0 + W1);
-    step[2] = h * v;
-    step[3] = h * (par->p_psi / par->I3 - v * C);
+    double kick0 = fma(h, force.W0, h * (force.W0_slope * correction));
+    double kick1 = fma(h, force.W1, h * (force.W1_slope * correction));
+    double turn = fma(h, force.v, h * (force.v_slope * correction)), C = sums.C - sums.P1 * correction;
+    step[0] = lever * (state[1] - kick0);
+    step[1] = -(kick0 + kick1);
+    step[2] = turn;
+    step[3] = h * (par->p_psi / par->I3) - turn * C;
     past[3] = past[2];
     past[2] = past[1];
     past[1] = past[0];
-    past[0] = W0;
+    past[0] = force.W0 + force.W0_slope * correction;
     *work = effort;
     return outcome;
 }
