@@ -1,0 +1,86 @@
+"""kill -9 at random moments of `symtop study`, and the same command again until it is through.
+
+    python -m tests.kills --all [--quick]        the studies of `make studies`; about three times as long as they take
+"""
+
+import contextlib
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+from symtop import datasets
+from symtop.study.check import differences
+from tests.commands import ended, leftovers, symtop
+
+PATIENCE = 2400.0  # seconds for an undisturbed run
+
+
+class Survived(NamedTuple):
+    """What so many kills have cost."""
+
+    kills: int
+    lost: int  # cases that were begun when a kill came
+    most: int  # by one kill
+    rounds: int  # times that the command was through
+
+
+def survive(words: list[object], folder: Path, longest: float, kills: int = 30, seed: int = 9) -> Survived:
+    """Kill a study's command `kills` times, each at most `longest` seconds after it has begun a case.
+
+    Half of the time the parent alone is killed and half of the time its workers with it. Nothing that was done may be
+    done again, a kill may cost each of two workers one case, and whenever the command is through its datasets must be
+    those of an undisturbed run, measured times aside. A command that is through early is begun anew.
+    """
+    draw, results, calm = random.Random(seed), folder / "r", folder / "calm"
+    command = ["study", *words, "--jobs", 2, "--results"]
+    assert ended(symtop(*command, calm), PATIENCE)[0] == 0
+    count = lost = most = rounds = 0
+    done: dict[Path, int] = {}  # finished cases, by the identity of their file
+    while count < kills:
+        before = set(results.rglob(".*.lock"))
+        process = symtop(*command, results, PROBE_PAUSE=0.2)
+        if draw.random() < 0.9:  # the others come while it is still starting
+            while process.poll() is None and not set(results.rglob(".*.lock")) - before:
+                time.sleep(0.02)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(draw.uniform(0.0, longest))
+        if process.returncode is None:
+            alone = draw.random() < 0.5
+            (os.kill if alone else os.killpg)(process.pid, signal.SIGKILL)
+            count += 1
+        process.communicate()
+        time.sleep(1.5)  # workers whose parent was killed have ended by then
+        now = {path: path.stat().st_ino for path in results.rglob("cases/*/*.nc")}
+        assert done.items() <= now.items()  # not one was written a second time
+        begun = len(list(results.rglob(".*.lock")))
+        assert begun <= 2  # what a kill costs: one case a worker
+        lost, most, done = lost + begun, max(most, begun), now
+        if process.returncode == 0:
+            assert_same(results, calm)
+            rounds += 1
+            shutil.rmtree(results)
+            done = {}
+    assert ended(symtop(*command, results), PATIENCE)[0] == 0
+    assert_same(results, calm)
+    assert not leftovers(results)
+    return Survived(count, lost, most, rounds + 1)
+
+
+def assert_same(results: Path, calm: Path) -> None:
+    """All cases and datasets of both folders are the same but for measured times."""
+    names = [sorted(str(path.relative_to(folder)) for path in folder.rglob("*.nc")) for folder in (results, calm)]
+    assert names[0] == names[1]
+    found = {name: differences(datasets.read(results / name), datasets.read(calm / name)) for name in names[0]}
+    assert not any(found.values()), {name: said for name, said in found.items() if said}
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as place:
+        print(survive(list(sys.argv[1:]), Path(place), 25.0))
