@@ -16,6 +16,7 @@ import functools
 import hashlib
 import math
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +27,7 @@ from numpy.typing import ArrayLike
 from symtop import charts, datasets
 from symtop.checks import SymtopError, SymtopWarning, one_of
 from symtop.integrators import taylor
-from symtop.scenes import Scene, closed_form
+from symtop.scenes import Scene, closed_form, scenes
 from symtop.scenes import scene as find_scene
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
@@ -159,7 +160,23 @@ def _closed_values(scene: Scene, times: charts.Array) -> dict[str, Any]:
 
 @functools.lru_cache(maxsize=256)
 def _closed_checks(scene: Scene, horizon: float) -> tuple[Checks, float]:
-    """Rounding errors of the closed form in double, and how far an integration is from it beyond its own error."""
+    """Rounding errors of the closed form in double, and how far an integration is from it beyond its own error.
+
+    For the scenes that have a name it is kept on disk: it takes half a second, and every process would want it again.
+    """
+    if scenes().get(scene.name) != scene:
+        return _checked(scene, horizon)
+
+    def found() -> xr.Dataset:
+        checks, overlap = _checked(scene, horizon)
+        columns = {name: ("check", values) for name, values in zip(Checks._fields, checks, strict=True)}
+        return xr.Dataset({**columns, "overlap": ((), overlap)})
+
+    data = _kept(_cache_path(scene, np.array([horizon]), "checks"), found)
+    return Checks(*(data[name].values for name in Checks._fields)), float(data["overlap"])
+
+
+def _checked(scene: Scene, horizon: float) -> tuple[Checks, float]:
     times = check_times(scene, horizon)
     found = _closed_values(scene, times)
     checks = _seen(scene, times, found["quaternion"], found["phi"], found["psi"])
@@ -290,7 +307,11 @@ def reference(scene: "str | Scene", times: ArrayLike, precision: str = "longdoub
 def _cached(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
     if times.size > MOST_CACHED or precision == "closed-form":  # a microsecond a time, not worth a file
         return _compute(scene, times, precision)
-    path = _cache_path(scene, times, precision)
+    return _kept(_cache_path(scene, times, precision), lambda: _compute(scene, times, precision))
+
+
+def _kept(path: Path, compute: Callable[[], xr.Dataset]) -> xr.Dataset:
+    """What is in a file of the cache, or what is computed and put there."""
     if path.is_file():
         try:
             found = datasets.read(path)
@@ -300,7 +321,7 @@ def _cached(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
             pass
         said = f"the cached reference {path.name} is damaged and is computed again"
         warnings.warn(said, SymtopWarning, stacklevel=3)
-    data = _compute(scene, times, precision)
+    data = compute()
     try:
         datasets.write(data.assign_attrs(content=datasets.fingerprint(data)), path)
     except SymtopError as error:

@@ -1,6 +1,6 @@
 """kill -9 at random moments of `symtop study`, and the same command again until it is through.
 
-    python -m tests.kills --all [--quick]        the studies of `make studies`; about three times as long as they take
+python -m tests.kills --all [--quick]        the studies of `make studies`; about three times as long as they take
 """
 
 import contextlib

@@ -1,11 +1,9 @@
 """Hostile conditions: each ends with one sentence, its documented code and no partial file, and nothing is lost."""
 
-import contextlib
 import errno
 import json
 import os
 import random
-import shutil
 import signal
 import subprocess
 import sys
@@ -25,7 +23,7 @@ from symtop.integrators import compiled
 from symtop.study import run as runner
 from symtop.study import store, work
 from tests.commands import PROBE, contents, ended, leftovers, symtop
-from tests.kills import assert_same, survive
+from tests.kills import survive
 
 
 def probe(results, *words):

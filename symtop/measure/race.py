@@ -59,7 +59,7 @@ def entries(data: xr.Dataset, targets: Sequence[float] = TARGETS) -> list[Entry]
             work = np.where(cell["outcome"].values == "ok", cell["force_evaluations"].values, np.nan)
             serves: dict[int, list[int]] = {}
             for number, target in enumerate(targets):
-                if (least := least_work(cell, target)) is not None:
+                if (least := int(least_work(cell, target))) >= 0:
                     serves.setdefault(least, []).append(number)
             found += [
                 Entry(

@@ -10,7 +10,7 @@ differ by some per cent; otherwise the two are level. A rival that was not timed
 is behind for sure if it is so by `FAR` and by more than any forecast on that scene was seen to miss.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -69,18 +69,20 @@ def cheapest(
 
     Each takes part with its run of least work if that was raced, else with that of least cost.
     """
+    known = cell[list({quantity, cost, "outcome", "force_evaluations", "seconds_race"} & set(cell.data_vars))]
+    table = known.transpose("integrator", "setting")
+    price = table[cost].values
+    good = meeting(table, target, quantity) & (table["outcome"].values == "ok") & np.isfinite(price)
+    entered, least = least_work(table, target, quantity), np.argmin(np.where(good, price, np.inf), axis=-1)
+    tiers = cell["tier"].transpose("integrator", ...).values.reshape(price.shape[0], -1)[:, 0]
     found = []
-    for name in cell["integrator"].values:
-        own = cell.sel(integrator=name)
-        good = meeting(own, target, quantity) & (own["outcome"].values == "ok") & np.isfinite(own[cost].values)
-        entered = least_work(own, target, quantity)
-        if entered is None or not good.any():
+    for row, name in enumerate(cell["integrator"].values):
+        k = int(entered[row])
+        if k < 0 or not good[row].any() or tier not in (None, str(tiers[row])):
             continue
-        raced = cost == "seconds" and bool(good[entered] and own["seconds_race"].values[entered] > 0.0)
-        k = entered if raced else _least(good, own[cost])
-        kind = str(own["tier"].values.flat[0])
-        if tier in (None, kind):
-            found.append(Place(float(own[cost].values[k]), str(name), kind, k, float(own[quantity].values[k])))
+        if cost != "seconds" or not (good[row, k] and table["seconds_race"].values[row, k] > 0.0):
+            k = int(least[row])
+        found.append(Place(float(price[row, k]), str(name), str(tiers[row]), k, float(table[quantity].values[row, k])))
     return sorted(found)
 
 
@@ -90,16 +92,12 @@ def _worst_miss(cell: xr.Dataset) -> float:
     return float(np.nanmax(misses)) if np.isfinite(misses).any() else 0.0
 
 
-def _least(good: Any, values: xr.DataArray) -> int:
-    return int(np.argmin(np.where(good, values.values, np.inf)))
-
-
 def lead(cell: xr.Dataset, first: Place, second: Place) -> Lead:
     """By how much the first place is ahead of the second."""
-    ours, theirs = (
-        cell["seconds_samples"].sel(integrator=place.integrator).values[place.setting] for place in (first, second)
-    )
-    races = [cell["seconds_race"].sel(integrator=p.integrator).values[p.setting] for p in (first, second)]
+    names = cell["integrator"].values.tolist()
+    places = [(names.index(place.integrator), place.setting) for place in (first, second)]
+    ours, theirs = (cell["seconds_samples"].transpose("integrator", "setting", "batch").values[at] for at in places)
+    races = [cell["seconds_race"].transpose("integrator", "setting").values[at] for at in places]
     both = np.isfinite(ours) & np.isfinite(theirs) & (races[0] == races[1]) & (races[0] > 0.0)
     if both.sum() < LEAST_ROUNDS:
         ratio = second.cost / first.cost

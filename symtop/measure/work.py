@@ -199,8 +199,8 @@ def meeting(data: xr.Dataset, target: float, quantity: str = "axis") -> np.ndarr
         return np.asarray(data[quantity].values <= target)
 
 
-def least_work(data: xr.Dataset, target: float, quantity: str = "axis") -> int | None:
-    """Place of a method's run of least work that ended well and meets a target, over one horizon; None if none does."""
-    good = meeting(data, target, quantity) & (data["outcome"].values == "ok")
-    good &= np.isfinite(data["force_evaluations"].values)
-    return int(np.argmin(np.where(good, data["force_evaluations"].values, np.inf))) if good.any() else None
+def least_work(data: xr.Dataset, target: float, quantity: str = "axis") -> np.ndarray:
+    """Place along ``setting``, which comes last, of the run of least work that ended well and meets a target, or -1."""
+    work = data["force_evaluations"].values
+    good = meeting(data, target, quantity) & (data["outcome"].values == "ok") & np.isfinite(work)
+    return np.where(good.any(axis=-1), np.argmin(np.where(good, work, np.inf), axis=-1), -1)
