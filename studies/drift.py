@@ -1,4 +1,4 @@
-"""What happens to energy, momenta and phase over a million steps, and over a billion?"""
+"""What happens to energy, momenta and phase over a million steps, and over 10^8?"""
 
 import numpy as np
 import xarray as xr
@@ -319,7 +319,7 @@ def verdict(data: xr.Dataset) -> list[str]:
 STUDY = Study(
     name="drift",
     title="Drift",
-    question="What happens to energy, momenta and phase over a million steps, and over a billion?",
+    question="What happens to energy, momenta and phase over a million steps, and over 10^8?",
     how_to_read=(
         "A flat line is a bounded error, a line of slope one a steady drift, and a slope of one half the random walk "
         "of rounding. The discrete methods hold a larger but bounded energy error and exact momenta; a Runge-Kutta "

@@ -10,7 +10,7 @@ differ by some per cent; otherwise the two are level. A rival that was not timed
 is behind for sure if it is so by `FAR` and by more than any forecast on that scene was seen to miss.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 import xarray as xr
@@ -92,16 +92,31 @@ def _worst_miss(cell: xr.Dataset) -> float:
     return float(np.nanmax(misses)) if np.isfinite(misses).any() else 0.0
 
 
-def lead(cell: xr.Dataset, first: Place, second: Place) -> Lead:
+class Raced(NamedTuple):
+    """What a lead is judged by: one scene and one horizon."""
+
+    names: list[str]
+    samples: np.ndarray  # (integrator, setting, batch)
+    races: np.ndarray  # (integrator, setting)
+    miss: float  # of a forecast
+
+    @classmethod
+    def of(cls, cell: xr.Dataset) -> Self:
+        """Out of the study's dataset."""
+        samples = cell["seconds_samples"].transpose("integrator", "setting", "batch").values
+        races = cell["seconds_race"].transpose("integrator", "setting").values
+        return cls(cell["integrator"].values.tolist(), samples, races, _worst_miss(cell))
+
+
+def lead(raced: Raced, first: Place, second: Place) -> Lead:
     """By how much the first place is ahead of the second."""
-    names = cell["integrator"].values.tolist()
-    places = [(names.index(place.integrator), place.setting) for place in (first, second)]
-    ours, theirs = (cell["seconds_samples"].transpose("integrator", "setting", "batch").values[at] for at in places)
-    races = [cell["seconds_race"].transpose("integrator", "setting").values[at] for at in places]
+    places = [(raced.names.index(place.integrator), place.setting) for place in (first, second)]
+    ours, theirs = (raced.samples[at] for at in places)
+    races = [raced.races[at] for at in places]
     both = np.isfinite(ours) & np.isfinite(theirs) & (races[0] == races[1]) & (races[0] > 0.0)
     if both.sum() < LEAST_ROUNDS:
         ratio = second.cost / first.cost
-        return Lead(ratio, np.nan, np.nan, bool(ratio >= max(FAR, MARGIN * (1.0 + _worst_miss(cell)))))
+        return Lead(ratio, np.nan, np.nan, bool(ratio >= max(FAR, MARGIN * (1.0 + raced.miss))))
     ratios = theirs[both] / ours[both]
     middle, low, high = float(np.median(ratios)), float(ratios.min()), float(ratios.max())
     steady = all(np.median(row[both]) < (1.0 + NOISY) * row[both].min() for row in (ours, theirs))
@@ -116,7 +131,8 @@ def win(
     if not places:
         return None
     best, *others = places
-    leads = [(other, lead(cell, best, other)) for other in others]
+    raced = Raced.of(cell)
+    leads = [(other, lead(raced, best, other)) for other in others]
     level = tuple(other.integrator for other, ahead in leads if not ahead.sure)
     behind, ahead = next(((other, ahead) for other, ahead in leads if ahead.sure), (None, None))
     return Win(best, level, behind, ahead)

@@ -32,11 +32,14 @@ def execute(study: Study, tasks: Iterable[Task], workers: Workers, heard: Heard)
     for timed in (False, True):
         group = [task for task in chosen if study.is_timed(task.case) == timed]
         if group:
-            _see_through(study, group, workers, size_for(group, workers, timed=timed), heard)
+            _see_through(study, group, workers, size_for(group, workers, timed=timed), heard, timed=timed)
 
 
 def size_for(tasks: list[Task], workers: Workers, *, timed: bool) -> int:
-    """How many processes: none for few cases and for what only this process knows, one for timed ones."""
+    """How many processes: none for few cases and for what only this process knows.
+
+    Timed cases are handed over one at a time, to workers that have their kernels already if there are any.
+    """
     ours = {name for task in tasks for name in (task.case.scene, task.case.integrator)}
     if any(plugins.is_local(name) for name in ours):
         return HERE
@@ -44,10 +47,10 @@ def size_for(tasks: list[Task], workers: Workers, *, timed: bool) -> int:
         return CLUSTER
     if len(tasks) < WORTH_A_POOL:
         return HERE
-    return 1 if timed else min(workers.jobs, len(tasks))
+    return workers.hired() or 1 if timed else min(workers.jobs, len(tasks))
 
 
-def _see_through(study: Study, tasks: list[Task], workers: Workers, size: int, heard: Heard) -> None:
+def _see_through(study: Study, tasks: list[Task], workers: Workers, size: int, heard: Heard, *, timed: bool) -> None:
     left = {task.path: task for task in tasks}
     doubted: list[Task] = []
     fruitless = 0
@@ -60,7 +63,7 @@ def _see_through(study: Study, tasks: list[Task], workers: Workers, size: int, h
         suspect = next((task for task in doubted if task.path in left), None)
         now = size if suspect is None else 1
         try:
-            _drain(study, list(left.values()) if suspect is None else [suspect], workers, now, note)
+            _drain(study, list(left.values()) if suspect is None else [suspect], workers, now, note, timed=timed)
         except BrokenExecutor:
             workers.drop(now)
             begun = [task for task in left.values() if store.was_begun(Path(task.path))]
@@ -91,9 +94,9 @@ def _fail(task: Task, reason: str, trace: str, note: Heard) -> None:
     note(task, Result("failed", message))
 
 
-def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, note: Heard) -> None:
+def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, note: Heard, *, timed: bool) -> None:
     """Hand over all tasks, the first of each integrator before its others."""
-    pool, width = workers.pool(size), workers.width(size)
+    pool, width = workers.pool(size), 1 if timed else workers.width(size)
     known = study if size == HERE else None  # other processes load it by name
     followers: dict[str, list[Task]] = {}
     for task in tasks:

@@ -74,6 +74,10 @@ class Workers:
             self._pools[size] = ProcessPoolExecutor(size, context, work.obey, (os.getpid(),))
         return self._pools[size]
 
+    def hired(self) -> int:
+        """The size of the largest pool of processes that is open, or 0."""
+        return max(self._pools, default=HERE)
+
     def width(self, size: int) -> int:
         """How many cases to hand over at a time: enough that nobody waits, few enough to stop soon."""
         if size == CLUSTER:
