@@ -11,7 +11,7 @@ own) and batch; `measure/ranking.py` answers questions from it.
     nutation_period, precession_rate (and _bound)   relative errors of the mean frequencies
     shape, nutation_lag, precession_lag             parts of the axis error
     seconds, seconds_timed, seconds_foreseen, seconds_race, seconds_samples(batch), spread, reliable      see `race`
-    first_call, seconds_overhead, seconds_per_evaluation, foreseen_miss, pace, attitude_cost              of a method
+    first_call, seconds_overhead, seconds_per_evaluation, foreseen_miss, seconds_pace                     of a method
     stopped(horizon)                                why a method tried nothing finer
 """
 

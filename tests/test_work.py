@@ -223,7 +223,7 @@ def test_a_machine_that_turns_slow_before_the_race_slows_the_forecasts_too(monke
     np.testing.assert_allclose(found["seconds"].sel(integrator="strang"), true)  # one of them timed, two foreseen
     np.testing.assert_allclose(found["seconds"].sel(integrator="midpoint"), true)  # in no race: the others' pace
     assert found["seconds_timed"].values.tolist() == [[0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]
-    assert found["pace"].values[0] == pytest.approx(3.0)
+    assert found["seconds_pace"].values[0] == pytest.approx(3.0)
 
 
 def test_batches_of_a_round_are_neighbours_in_time():

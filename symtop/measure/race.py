@@ -10,8 +10,8 @@ There are too many settings to time them all, and most cannot win. So:
        order, so that samples of a round are pairs; if one that was not among them now seems to lead somewhere, it is
        timed with its rivals, until every leader was
     4  the machine may be faster or slower by then, so one run of step 1 of every method in a race is timed in it again:
-       the ratio is the method's `pace`, by which its forecasts are scaled; those of a method that was in no race are
-       scaled by the median of the others
+       the ratio is the method's `seconds_pace`, by which its forecasts are scaled; those of a method that was in no
+       race are scaled by the median of the others
 
 `seconds` is the smallest sample of step 3 where there is one (`seconds_timed` 1) and foreseen elsewhere (0). The shape
 of the line was fixed before step 3, so the runs of step 3 are a test of it that it has not seen: `foreseen_miss`.
@@ -140,22 +140,16 @@ def race(
     ``seconds_foreseen``, ``seconds_samples`` (all batches; NaN beyond those made), ``seconds_race`` (which race of
     step 3 they are from, 0 for none: samples pair up within one race), ``spread`` and ``reliable`` of the samples, and
     for each integrator ``first_call``, ``seconds_overhead``, ``seconds_per_evaluation``, ``foreseen_miss`` (largest
-    relative miss of a forecast in step 3), ``pace`` (see step 4) and ``attitude_cost`` (seconds of the
-    chart that shows the attitude over seconds of the one that shows the axis; 1 where they are the same).
+    relative miss of a forecast in step 3) and ``seconds_pace`` (see step 4).
     """
     names = list(dict.fromkeys(entry.name for entry in runs))
     methods = {name: integrator(name) for name in names}
     tier = {name: method.tier for name, method in methods.items()}
     first = {name: anchors([entry for entry in runs if entry.name == name], tier[name]) for name in names}
     opening = [entry for name in names for entry in first[name]]
-    wide = [entry for entry in (first[name][-1] for name in names) if _both(methods[entry.name])]
     calls = [_call(scene, methods, entry, horizons) for entry in opening]
-    calls += [_call(scene, methods, entry, horizons, "attitude") for entry in wide]
     found = timings(calls, 2, 0.5 * batch)  # the line only: no time that is shown
-    taken: dict[Entry, Timing] = dict(zip(opening, found, strict=False))
-    ratio = dict.fromkeys(names, 1.0)
-    for entry, timing in zip(wide, found[len(opening) :], strict=True):
-        ratio[entry.name] = timing.best / taken[entry].best
+    taken: dict[Entry, Timing] = dict(zip(opening, found, strict=True))
     lines = {name: line([(entry.work, taken[entry].best) for entry in first[name]]) for name in names}
     first_calls = [taken[first[name][0]].first_call for name in names]
     clocks = {name: clock(first[name], taken, batch) for name in names}
@@ -199,11 +193,10 @@ def race(
             misses[entry.name] = miss if math.isnan(misses[entry.name]) else max(misses[entry.name], miss)
     single = {
         "first_call": first_calls,
-        "pace": [pace.get(name, math.nan) for name in names],
+        "seconds_pace": [pace.get(name, math.nan) for name in names],
         "seconds_overhead": [lines[name].overhead for name in names],
         "seconds_per_evaluation": [lines[name].slope for name in names],
         "foreseen_miss": [misses[name] for name in names],
-        "attitude_cost": [ratio[name] for name in names],
     }
     dims = ("integrator", "horizon", "setting")
     return xr.Dataset(
@@ -214,12 +207,6 @@ def race(
     )
 
 
-def _both(method: Integrator) -> bool:
-    return choose_chart(method, "axis") != choose_chart(method, "attitude")
-
-
-def _call(
-    scene: Scene, methods: Mapping[str, Integrator], entry: Entry, horizons: Sequence[float], observe: str = "axis"
-) -> Any:
+def _call(scene: Scene, methods: Mapping[str, Integrator], entry: Entry, horizons: Sequence[float]) -> Any:
     method = methods[entry.name]
-    return bare_run(scene, method, choose_chart(method, observe), entry.setting, horizons[entry.far])
+    return bare_run(scene, method, choose_chart(method, "axis"), entry.setting, horizons[entry.far])

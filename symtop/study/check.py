@@ -22,7 +22,7 @@ from symtop.study.work import Result, Task
 
 SAMPLE = 5  # cases of each study
 # in the name of a variable that holds measured times
-CLOCKED = ("seconds", "reliable", "spread", "first_call", "foreseen", "attitude_cost")
+CLOCKED = ("seconds", "reliable", "spread", "first_call", "foreseen")
 
 
 class Checked(NamedTuple):

@@ -90,18 +90,13 @@ class Workers:
         if isinstance(pool, ProcessPoolExecutor):
             _kill(pool)
 
-    def stop(self) -> None:
-        """End all processes at once, with what they are computing, for good; what was computed is on disk."""
+    def close(self) -> None:
+        """End all processes at once, with what they are computing, for good; what was computed is on disk.
+
+        Left to end by themselves, workers take two seconds to free what they have compiled.
+        """
         for size in list(self._pools):
             self.drop(size)
-        self._leave()
-
-    def close(self) -> None:
-        """Let all processes end."""
-        for pool in self._pools.values():
-            if isinstance(pool, ProcessPoolExecutor):
-                pool.shutdown(wait=True, cancel_futures=True)
-        self._pools.clear()
         self._leave()
 
     def _leave(self) -> None:
@@ -116,10 +111,7 @@ class Workers:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is None:
-            self.close()
-        else:
-            self.stop()
+        self.close()
 
 
 def _cores() -> int:

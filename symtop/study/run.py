@@ -116,7 +116,7 @@ def _hired(workers: Workers | None, jobs: int | None, results: Path, study: Stud
     try:
         yield hired
     except BaseException:
-        hired.stop()
+        hired.close()
         store.tidy(results, study)
         raise
     if workers is None:
