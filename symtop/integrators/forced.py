@@ -16,17 +16,13 @@ Not in the registry, whose methods step the free top. Source: Marsden and West, 
 
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from symtop.checks import SymtopError, finite, one_of
 from symtop.integrators import unreduced
-from symtop.integrators.angles import chart_outcome, require_chart
+from symtop.integrators.angles import require_chart
 from symtop.integrators.compiled import register_jitable
 from symtop.integrators.discrete_lagrangian import RULES, quadrature
-from symtop.integrators.drive import March, driver
-from symtop.integrators.outcomes import NOT_CONVERGED
-from symtop.integrators.unreduced import LEAST, _node_sums, _rates, _solve
+from symtop.integrators.drive import March, Marks, driver
+from symtop.integrators.unreduced import solved
 from symtop.top import Angles, SymmetricTop
 
 begin = unreduced.begin
@@ -59,63 +55,31 @@ class DampedTop(NamedTuple):
 
 
 @register_jitable
-def _correction(par: Any, sums: Any, rate: Any, momentum: Any, h: float) -> Any:
-    """Newton's correction to the rates: those of `unreduced` with half a step of friction on the diagonal."""
-    w, v, u = rate
-    across, along = sums.across + 0.5 * h * par.c_phi, par.I3 + 0.5 * h * par.c_psi
-    residual = (
-        momentum[0] - par.I1 * w + h * sums.before,
-        momentum[1] - across * v - sums.mixed * u,
-        momentum[2] - sums.mixed * v - along * u,
-    )
-    return _solve(
-        (par.I1 - h * h * sums.stiffness, -h * sums.before_v, -h * sums.before_u),
-        (h * sums.after_v, across, sums.mixed),
-        (h * sums.after_u, sums.mixed, along),
-        residual,
-    )
+def _damped_inertia(par: Any, sums: Any, h: float) -> Any:
+    """That of `unreduced` with half a step of friction."""
+    return sums.across + 0.5 * h * par.c_phi, par.I3 + 0.5 * h * par.c_psi
 
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations."""
-    theta, momentum = state[0], state[3:]
-    near, far, farther = carry
-    w = 3.0 * (near[0] - far[0]) + farther[0]
-    v = 3.0 * (near[1] - far[1]) + farther[1]
-    u = 3.0 * (near[2] - far[2]) + farther[2]
-    effort = 0
-    last = np.inf
-    outcome = NOT_CONVERGED
-    sums = _node_sums(par, rule, theta, (w, v, u), h)
-    while effort < rule.iterations:
-        effort += 1
-        dw, dv, du = _correction(par, sums, (w, v, u), momentum, h)
-        change, size = abs(dw) + abs(dv) + abs(du), abs(w) + abs(v) + abs(u)
-        if change <= LEAST * size or 0.5 * last <= change <= rule.tolerance * size:
-            outcome = chart_outcome(theta + h * w)
-            break
-        last = change
-        w, v, u = w + dw, v + dv, u + du
-        if effort == rule.iterations // 2:
-            w, v, u = _rates(par, state)
-        sums = _node_sums(par, rule, theta, (w, v, u), h)
+    (w, v, u), sums, effort, outcome = solved(_damped_inertia, par, rule, state, carry, h)
     # p1 is D2 L_d + F_d^+, formed from the sums and from nothing else: the balance is a result, not an input
     step = (
         h * w,
         h * v,
         h * u,
-        par.I1 * w + h * sums.after - momentum[0],
-        sums.across * v + sums.mixed * u - 0.5 * h * par.c_phi * v - momentum[1],
-        sums.mixed * v + par.I3 * u - 0.5 * h * par.c_psi * u - momentum[2],
+        par.I1 * w + h * sums.after - state[3],
+        sums.across * v + sums.mixed * u - 0.5 * h * par.c_phi * v - state[4],
+        sums.mixed * v + par.I3 * u - 0.5 * h * par.c_psi * u - state[5],
     )
-    return step, ((w, v, u), near, far), effort, outcome
+    return step, ((w, v, u), carry[0], carry[1]), effort, outcome
 
 
 march = driver(begin, increment, observe)
 
 
 def damped_run(
-    top: SymmetricTop, start: Angles, friction: Friction, rule: str, h: float, marks: NDArray[np.int64]
+    top: SymmetricTop, start: Angles, friction: Friction, rule: str, h: float, marks: Marks
 ) -> March:  # fmt: skip
     """States (theta, phi, psi, p_theta, p_phi, p_psi) after the numbers of steps in `marks`, shape (samples, 6)."""
     require_chart(start)

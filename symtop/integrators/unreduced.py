@@ -100,18 +100,25 @@ def _solve(first: Any, second: Any, third: Any, right: Any) -> Any:
 
 
 @register_jitable
-def _correction(par: Any, sums: Any, rate: Any, momentum: Any, h: float) -> Any:
+def _inertia(par: Any, sums: Any, h: float) -> Any:
+    """The diagonal of the momenta's part of the system."""
+    return sums.across, par.I3
+
+
+@register_jitable
+def _correction(inertia: Any, par: Any, sums: Any, rate: Any, momentum: Any, h: float) -> Any:
     """Newton's correction to the rates."""
     w, v, u = rate
+    across, along = inertia(par, sums, h)
     residual = (
         momentum[0] - par.I1 * w + h * sums.before,
-        momentum[1] - sums.across * v - sums.mixed * u,
-        momentum[2] - sums.mixed * v - par.I3 * u,
+        momentum[1] - across * v - sums.mixed * u,
+        momentum[2] - sums.mixed * v - along * u,
     )
     return _solve(
         (par.I1 - h * h * sums.stiffness, -h * sums.before_v, -h * sums.before_u),
-        (h * sums.after_v, sums.across, sums.mixed),
-        (h * sums.after_u, sums.mixed, par.I3),
+        (h * sums.after_v, across, sums.mixed),
+        (h * sums.after_u, sums.mixed, along),
         residual,
     )
 
@@ -130,8 +137,9 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return (rate, rate, rate)
 
 
-def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations."""
+@register_jitable
+def solved(inertia: Any, par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
+    """The rates of a step, the sums at them, the number of Newton iterations, and the outcome."""
     theta, momentum = state[0], state[3:]
     # the rates are smooth in time: the parabola through their last three values predicts the next ones
     near, far, farther = carry
@@ -144,7 +152,7 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     sums = _node_sums(par, rule, theta, (w, v, u), h)
     while effort < rule.iterations:
         effort += 1
-        dw, dv, du = _correction(par, sums, (w, v, u), momentum, h)
+        dw, dv, du = _correction(inertia, par, sums, (w, v, u), momentum, h)
         change, size = abs(dw) + abs(dv) + abs(du), abs(w) + abs(v) + abs(u)
         # To stagnation, and p1 from the very sums whose residual was seen to vanish. Stopping as the reduced kernel
         # does, after a correction of 1e-8, saves 0.6 evaluations of 3.6 and lets p_phi of `goldstein` walk off
@@ -157,15 +165,21 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
         if effort == rule.iterations // 2:
             w, v, u = _rates(par, state)  # the prediction may lie outside the basin of the root
         sums = _node_sums(par, rule, theta, (w, v, u), h)
+    return (w, v, u), sums, effort, outcome
+
+
+def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
+    """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations."""
+    (w, v, u), sums, effort, outcome = solved(_inertia, par, rule, state, carry, h)
     step = (
         h * w,
         h * v,
         h * u,
-        par.I1 * w + h * sums.after - momentum[0],
-        sums.across * v + sums.mixed * u - momentum[1],
-        sums.mixed * v + par.I3 * u - momentum[2],
+        par.I1 * w + h * sums.after - state[3],
+        sums.across * v + sums.mixed * u - state[4],
+        sums.mixed * v + par.I3 * u - state[5],
     )
-    return step, ((w, v, u), near, far), effort, outcome
+    return step, ((w, v, u), carry[0], carry[1]), effort, outcome
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
