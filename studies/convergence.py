@@ -14,6 +14,8 @@ from symtop.study.study import Case, Picture, Study, Table
 SCENES = ["spheroid", "goldstein", "loop", "hairer-lubich-wanner"]
 BASIC = ("midpoint", "trapezoidal", "stormer-verlet")
 JUDGED = ("attitude", "theta", "energy")
+LARGE = 0.01  # radians: larger errors follow no power of the step
+STEEP = 8  # the guide of a higher order would fall out of the figure over the width of one of a lower
 
 
 def cases(quick: bool) -> list[Case]:
@@ -62,6 +64,13 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     return drawn
 
 
+def _constants(cell: xr.Dataset, quantity: str, power: int) -> list[float]:
+    """Where a guide may lie if no order could be fitted: error / h^power where it is neither large nor rounding."""
+    h, error, bound = (cell[name].values for name in ("step_size", quantity, f"{quantity}_bound"))
+    good = (error < LARGE) & (error > 100.0 * bound) & np.isfinite(h)
+    return [float(value) for value in (error[good] / h[good] ** power).ravel()]
+
+
 def _picture(data: xr.Dataset, quantity: str, power: int) -> Picture:
     scenes = [str(name) for name in data["scene"].values]
     orders = fits(data, quantity)
@@ -70,10 +79,11 @@ def _picture(data: xr.Dataset, quantity: str, power: int) -> Picture:
     figure, axes = figures.error_curves(data, scenes, "step_size", quantity, labels, judged)
     for axis, name in zip(axes.flat, scenes, strict=False):
         fitted = [fit.constant for (where, _), fit in orders.items() if where == name and np.isfinite(fit.slope)]
-        if power and fitted:
+        constants = fitted or _constants(data.sel(scene=name), quantity, power)
+        if power and constants:
             coarse = float(np.nanmax(data["step_size"].sel(scene=name).values))
-            ends = (0.2 * coarse, coarse)
-            style.slope_guide(axis, power, ends, 0.15 * min(fitted) * ends[0] ** power, f"$h^{{{power}}}$")
+            ends = ((0.2 if power < STEEP else 0.5) * coarse, coarse)
+            style.slope_guide(axis, power, ends, 0.15 * min(constants) * ends[0] ** power, f"$h^{{{power}}}$")
     slopes = [fit.slope for fit in orders.values() if np.isfinite(fit.slope)]
     range_ = (
         f"Fitted orders lie between {min(slopes):.3f} and {max(slopes):.3f}." if slopes else "None could be fitted."

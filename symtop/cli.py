@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from symtop import __version__
-from symtop.checks import SymtopError
+from symtop.checks import SymtopError, positive
 
 
 def _completing(of: str) -> Any:
@@ -308,6 +308,8 @@ def study(
     if quick and full:
         msg = "quick and full must not be given together"
         raise SymtopError(msg)
+    if limit is not None:
+        positive("limit", limit)
     folder = Path(results) / "quick" if quick else Path(results)
     chosen = command.choose(names, every=every)
     options = command.Options(folder, quick, full, fresh, jobs, scheduler, limit, as_json)

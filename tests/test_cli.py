@@ -50,6 +50,7 @@ def test_tables_are_complete_and_json_is_json():
         (["run", "spheroid", "midpoint", "--step-size", "nan"], "step_size must be a finite number"),
         (["run", "spheroid", "midpoint", "--step-size", "-1"], "step_size must be above zero"),
         (["run", "spheroid", "midpoint", "--step-size", "1e-300"], "the limit is"),
+        (["study", "convergence", "--status", "--limit", "-5"], "limit must be"),
         (["run", "spheroid", "midpoint", "--step-size", "99"], "at most the horizon"),
         (["run", "spheroid", "midpoint", "--step-size", "x"], "not a valid float"),
         (["run", "spheroid", "midpoint", "--step-size", "0.1", "--tolerance", "1e-3"], "not tolerance"),
