@@ -159,7 +159,7 @@ def _moved(cells: xr.Dataset) -> tuple[float, float]:
 
 
 def _walk(cell: xr.Dataset) -> str:
-    name, ratio = str(cell["integrator"].values), float(cell["rounding_plain_end"] / cell["rounding_end"])
+    name, ratio = str(cell["integrator"].values), float(cell["rounding_gain"])
     slope, doubt = float(cell["rounding_exponent"]), float(cell["rounding_exponent_interval"])
     said = f"{name} grows as n^{slope:.2f} +- {doubt:.2f}"
     walk = "agrees" if abs(slope - 0.5) <= doubt else "does not agree"
@@ -258,6 +258,7 @@ ROUNDING_PARTS = {
     "rounding_end": "drift at the end",
     "rounding_plain_exponent": "exponent, plain sums",
     "rounding_plain_end": "drift at the end, plain sums",
+    "rounding_gain": "gain, the same starts",
     "rounding_p_phi": "largest change of p_phi",
     "rounding_p_psi": "largest change of p_psi",
 }

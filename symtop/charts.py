@@ -31,42 +31,50 @@ CHARTS = ("angles", "axis", "attitude")
 
 def axis_from_angles(theta: Any, phi: Any) -> Array:
     """Unit vector along the top's axis, shape (..., 3)."""
-    return _stacked(_axis(np, theta, phi))
+    return _stacked(axis_parts(np, theta, phi))
 
 
 def quaternion_from_angles(theta: Any, phi: Any, psi: Any) -> Array:
     """Unit quaternion (w, x, y, z) from body to space, shape (..., 4)."""
-    return _stacked(_quaternion(np, theta, phi, psi))
+    return _stacked(quaternion_parts(np, theta, phi, psi))
 
 
 def momentum_from_angles(top: SymmetricTop, theta: Any, phi: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any) -> Array:
     """Angular momentum in the space frame, shape (..., 3): its three terms are along n, e x n and e."""
-    return _stacked(_momentum(np, top, theta, phi, theta_dot, phi_dot, psi_dot))
+    return _stacked(momentum_parts(np, top, theta, phi, theta_dot, phi_dot, psi_dot))
 
 
-def space_state(chart: str, top: SymmetricTop, at: Angles) -> tuple[float, ...]:
+def space_state(chart: str, top: SymmetricTop, at: Angles) -> Array:
     """State (e, L) or (q, L) of a start in one of the space-frame charts."""
-    place = _axis(math, at.theta, at.phi) if chart == "axis" else _quaternion(math, at.theta, at.phi, at.psi)
-    return *place, *_momentum(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
+    return np.array(space_numbers(chart, top, at))
 
 
-# the formulas themselves, on the functions of `math` for a single state: 2 us, and 9 us on those of NumPy
+def space_numbers(chart: str, top: SymmetricTop, at: Angles) -> tuple[float, ...]:
+    """The same as plain numbers, for a kernel."""
+    place = axis_parts(math, at.theta, at.phi) if chart == "axis" else quaternion_parts(math, at.theta, at.phi, at.psi)
+    return *place, *momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
 
 
-def _axis(of: Any, theta: Any, phi: Any) -> tuple[Any, ...]:
+# the formulas themselves, on the functions of `math` for a single state (2 us, and 9 us on those of NumPy) or of mpmath
+
+
+def axis_parts(of: Any, theta: Any, phi: Any) -> tuple[Any, ...]:
+    """The axis, by the sine and cosine of a module."""
     sine = of.sin(theta)
     return sine * of.sin(phi), -sine * of.cos(phi), of.cos(theta)
 
 
-def _quaternion(of: Any, theta: Any, phi: Any, psi: Any) -> tuple[Any, ...]:
+def quaternion_parts(of: Any, theta: Any, phi: Any, psi: Any) -> tuple[Any, ...]:
+    """The quaternion, by the sine and cosine of a module."""
     half, total, difference = 0.5 * theta, 0.5 * (phi + psi), 0.5 * (phi - psi)
     cosine, sine = of.cos(half), of.sin(half)
     return cosine * of.cos(total), sine * of.cos(difference), sine * of.sin(difference), cosine * of.sin(total)
 
 
-def _momentum(
+def momentum_parts(
     of: Any, top: SymmetricTop, theta: Any, phi: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any
 ) -> tuple[Any, ...]:
+    """The angular momentum, by the sine and cosine of a module."""
     s, c, sin_phi, cos_phi = of.sin(theta), of.cos(theta), of.sin(phi), of.cos(phi)
     nod, swing, spin = top.I1 * theta_dot, top.I1 * phi_dot * s, top.I3 * (psi_dot + phi_dot * c)
     across = spin * s - swing * c
@@ -150,9 +158,9 @@ def rates_from_momentum(top: SymmetricTop, axis: Array, phi: Any, momentum: Arra
     return theta_dot, phi_dot, p_psi / top.I3 - phi_dot * axis[..., 2]
 
 
-def angles_from_attitude(top: SymmetricTop, state: Array | tuple[float, ...]) -> Angles:
+def angles_from_attitude(top: SymmetricTop, state: Array) -> Angles:
     """Angles and rates of an attitude state; phi and psi modulo 2 pi, not at a pole."""
-    quaternion, momentum = np.asarray(state[:4]), np.asarray(state[4:])
+    quaternion, momentum = state[:4], state[4:]
     theta, phi, psi = angles_from_quaternion(quaternion)
     rates = rates_from_momentum(top, axis_from_quaternion(quaternion), phi, momentum)
     return Angles(*(float(value) for value in (theta, phi, psi, *rates)))

@@ -172,7 +172,7 @@ def _closed_checks(scene: Scene, horizon: float) -> tuple[Checks, float]:
         columns = {name: ("check", values) for name, values in zip(Checks._fields, checks, strict=True)}
         return xr.Dataset({**columns, "overlap": ((), overlap)})
 
-    data = _kept(_cache_path(scene, np.array([horizon]), "checks"), found)
+    data = _kept(_cache_path(scene, np.array([horizon]), "checks"), found, None)
     return Checks(*(data[name].values for name in Checks._fields)), float(data["overlap"])
 
 
@@ -307,11 +307,14 @@ def reference(scene: "str | Scene", times: ArrayLike, precision: str = "longdoub
 def _cached(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
     if times.size > MOST_CACHED or precision == "closed-form":  # a microsecond a time, not worth a file
         return _compute(scene, times, precision)
-    return _kept(_cache_path(scene, times, precision), lambda: _compute(scene, times, precision))
+    return _kept(_cache_path(scene, times, precision), lambda: _compute(scene, times, precision), 4)
 
 
-def _kept(path: Path, compute: Callable[[], xr.Dataset]) -> xr.Dataset:
-    """What is in a file of the cache, or what is computed and put there."""
+def _kept(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> xr.Dataset:
+    """What is in a file of the cache, or what is computed and put there.
+
+    Warnings point so many calls up; with None there are none, because nobody asked for a file.
+    """
     if path.is_file():
         try:
             found = datasets.read(path)
@@ -319,13 +322,15 @@ def _kept(path: Path, compute: Callable[[], xr.Dataset]) -> xr.Dataset:
                 return found
         except SymtopError:
             pass
-        said = f"the cached reference {path.name} is damaged and is computed again"
-        warnings.warn(said, SymtopWarning, stacklevel=3)
+        if depth is not None:
+            said = f"the cached reference {path.name} is damaged and is computed again"
+            warnings.warn(said, SymtopWarning, stacklevel=depth)
     data = compute()
     try:
         datasets.write(data.assign_attrs(content=datasets.fingerprint(data)), path)
     except SymtopError as error:
-        warnings.warn(f"the reference is not kept: {error}", SymtopWarning, stacklevel=3)
+        if depth is not None:
+            warnings.warn(f"the reference is not kept: {error}", SymtopWarning, stacklevel=depth)
     return data
 
 
@@ -333,6 +338,7 @@ def _cache_path(scene: Scene, times: charts.Array, precision: str) -> Path:
     from symtop.integrators.compiled import cache_root  # noqa: PLC0415
 
     digest = hashlib.sha256(_sources().encode())
+    digest.update(f"{datasets.provenance()['dependencies']} {have_heyoka()}".encode())
     digest.update(repr((scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY)).encode())
     digest.update(times.tobytes())
     return cache_root() / "reference" / f"{digest.hexdigest()[:32]}.nc"

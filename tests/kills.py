@@ -42,9 +42,9 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
     command = ["study", *words, "--jobs", 2, "--results"]
     assert ended(symtop(*command, calm), PATIENCE)[0] == 0
     count = lost = most = rounds = 0
-    done: dict[Path, int] = {}  # finished cases, by the identity of their file
+    done: dict[Path, tuple[int, int]] = {}  # finished cases: the identity of their file and when it was written
     while count < kills:
-        before = set(results.rglob(".*.lock"))
+        before, start = set(results.rglob(".*.lock")), time.time()
         process = symtop(*command, results, PROBE_PAUSE=0.2)
         if draw.random() < 0.9:  # the others come while it is still starting
             while process.poll() is None and not set(results.rglob(".*.lock")) - before:
@@ -55,11 +55,13 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
             alone = draw.random() < 0.5
             (os.kill if alone else os.killpg)(process.pid, signal.SIGKILL)
             count += 1
-        process.communicate()
+        _, said = process.communicate()
+        assert process.returncode in (0, -signal.SIGKILL), said
         time.sleep(1.5)  # workers whose parent was killed have ended by then
-        now = {path: path.stat().st_ino for path in results.rglob("cases/*/*.nc")}
+        files = {path: path.stat() for path in results.rglob("cases/*/*.nc")}
+        now = {path: (about.st_ino, about.st_mtime_ns) for path, about in files.items()}
         assert done.items() <= now.items()  # not one was written a second time
-        begun = len(list(results.rglob(".*.lock")))
+        begun = sum(lock.stat().st_mtime >= start for lock in results.rglob(".*.lock"))
         assert begun <= 2  # what a kill costs: one case a worker
         lost, most, done = lost + begun, max(most, begun), now
         if process.returncode == 0:

@@ -262,14 +262,33 @@ def test_any_order_and_repeated_times_come_back_as_asked():
 
 
 def test_without_heyoka_the_closed_form_stands_alone_and_says_so(monkeypatch, cache):
-    import sys
-
     monkeypatch.setitem(sys.modules, "heyoka", None)
     with pytest.warns(symtop.SymtopWarning, match="heyoka is not installed"):
         data = symtop.reference("spheroid", [1.0, 2.0, 7.77])
     assert data.attrs["precision"] == "closed-form"
     assert data.attrs["asked_for"] == "longdouble"
     assert np.all(data["theta_error_bound"] < 1e-13)
+
+
+def test_a_certificate_is_kept_and_one_made_without_heyoka_is_not_taken_for_one_with_it(monkeypatch, cache):
+    module = sys.modules["symtop.reference"]
+
+    def overlap():
+        module._closed_checks.cache_clear()  # as in a new process
+        data = symtop.reference("goldstein", [1.0, 2.5], precision="closed-form")
+        return data.attrs["overlap_with_integration"], data["theta_error_bound"].values
+
+    with monkeypatch.context() as hidden:
+        hidden.setitem(sys.modules, "heyoka", None)
+        assert np.isnan(overlap()[0])
+    made, bound = overlap()
+    assert 0.0 <= made < 1e-12
+    with monkeypatch.context() as lazy:
+        lazy.setattr(module, "_checked", None)  # it is not called again
+        kept, same = overlap()
+    assert kept == made
+    assert np.array_equal(same, bound)
+    module._closed_checks.cache_clear()
 
 
 def test_checks_reach_the_horizon_and_the_fastest_moments():

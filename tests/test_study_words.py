@@ -64,7 +64,7 @@ def test_a_change_of_law_is_told_above_rounding_only(drift):
 
 @pytest.mark.parametrize(("power", "says"), [(0.45, "(agrees with"), (0.8, "(does not agree with")])
 def test_a_walk_of_rounding_is_held_against_one_half(drift, power, says):
-    known = {"exponent": power, "exponent_interval": 0.06, "end": 1e-15, "plain_end": 1e-13}
+    known = {"exponent": power, "exponent_interval": 0.06, "end": 1e-15, "gain": 100.0}
     cell = xr.Dataset({f"rounding_{name}": value for name, value in known.items()}, coords={"integrator": "strang"})
     said = drift._walk(cell)
     assert f"strang grows as n^{power:.2f} +- 0.06 {says}" in said

@@ -114,7 +114,7 @@ static inline int increment(
     step[0] = lever * (state[1] - kick0);
     step[1] = -(kick0 + kick1);
     step[2] = turn;
-    step[3] = h * (par->p_psi / par->I3) - turn * C;
+    step[3] = fma(h, par->p_psi / par->I3, -(turn * C));
     past[3] = past[2];
     past[2] = past[1];
     past[1] = past[0];

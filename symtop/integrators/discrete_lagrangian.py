@@ -194,7 +194,7 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     # rounding, but always to the same side: the energy drifted by 4e-14 in 3e6 steps
     d = lever * (state[1] - kick0)
     C = sums.C - sums.P1 * correction
-    step = (d, -(kick0 + kick1), turn, h * (par.p_psi / par.I3) - turn * C)
+    step = (d, -(kick0 + kick1), turn, fused(h, par.p_psi / par.I3, -(turn * C)))
     return step, (force.W0 + force.W0_slope * correction, carry[0], carry[1], carry[2]), effort, outcome
 
 

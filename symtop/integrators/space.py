@@ -32,7 +32,7 @@ class SpaceTop(NamedTuple):
 
 def _prepare(chart: str, top: SymmetricTop, at: Angles) -> tuple[SpaceTop, tuple[float, ...]]:
     spin = top.I3 * at.spin * (1.0 / top.I3 - 1.0 / top.I1)
-    return SpaceTop(top.I1, top.mgl, spin), charts.space_state(chart, top, at)
+    return SpaceTop(top.I1, top.mgl, spin), charts.space_numbers(chart, top, at)
 
 
 def on_axis(top: SymmetricTop, at: Angles) -> tuple[SpaceTop, tuple[float, ...]]:

@@ -88,24 +88,10 @@ def start_numbers(chart: str, precision: str, top: SymmetricTop, at: Angles) -> 
 
     kind = arithmetic(precision).kind
     with workdps(60):
-        theta, phi, psi, theta_dot, phi_dot, psi_dot = (mp.mpf(getattr(at, name)) for name in at.__slots__)
-        s, c, sin_phi, cos_phi = mp.sin(theta), mp.cos(theta), mp.sin(phi), mp.cos(phi)
-        half, total, difference = theta / 2, (phi + psi) / 2, (phi - psi) / 2
-        nod, swing = top.I1 * theta_dot, top.I1 * phi_dot * s
-        spin = top.I3 * (psi_dot + phi_dot * c)
-        attitude = [
-            mp.cos(half) * mp.cos(total),
-            mp.sin(half) * mp.cos(difference),
-            mp.sin(half) * mp.sin(difference),
-            mp.cos(half) * mp.sin(total),
-        ]
-        axis = [s * sin_phi, -s * cos_phi, c]
-        momentum = [
-            nod * cos_phi + (spin * s - swing * c) * sin_phi,
-            nod * sin_phi - (spin * s - swing * c) * cos_phi,
-            swing * s + spin * c,
-        ]
-        state = [*(axis if chart == "axis" else attitude), *momentum]
+        theta, phi, psi, *rates = (mp.mpf(getattr(at, name)) for name in at.__slots__)
+        place = charts.axis_parts(mp, theta, phi) if chart == "axis" else charts.quaternion_parts(mp, theta, phi, psi)
+        state = [*place, *charts.momentum_parts(mp, top, theta, phi, *rates)]
+        spin = top.I3 * (rates[2] + rates[1] * mp.cos(theta))
         twist = spin * (1 / mp.mpf(top.I3) - 1 / mp.mpf(top.I1))
         parameters = [1 / mp.mpf(top.I1), mp.mpf(top.mgl), twist]
         return tuple(kind(mp.nstr(value, 50)) for value in state), tuple(

@@ -131,8 +131,8 @@ def win(
     if not places:
         return None
     best, *others = places
-    raced = Raced.of(cell)
-    leads = [(other, lead(raced, best, other)) for other in others]
+    raced = Raced.of(cell) if others else None
+    leads = [(other, lead(raced, best, other)) for other in others if raced is not None]
     level = tuple(other.integrator for other, ahead in leads if not ahead.sure)
     behind, ahead = next(((other, ahead) for other, ahead in leads if ahead.sure), (None, None))
     return Win(best, level, behind, ahead)

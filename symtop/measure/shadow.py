@@ -95,7 +95,7 @@ class Oscillation(NamedTuple):
     """A periodic function of the angle about the middle of a closed curve: a level and a Fourier series.
 
     The level comes in two parts, a large number and what is missing from it. Rounded to one double it would be wrong
-    by half a unit in the last place of the energy, 3.5e-17 of it, in every window of a run.
+    by up to half a unit in its last place in every window of a run: 3.5e-17 (root mean square) was seen.
     """
 
     centre: float

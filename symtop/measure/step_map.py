@@ -90,7 +90,7 @@ class StepMap:
     def at(self, start: Angles) -> Array:
         """Y of a start itself."""
         if self.chart != "angles":
-            state = np.array(charts.space_state(self.chart, self.top, start))
+            state = charts.space_state(self.chart, self.top, start)
             return np.concatenate([state[:-3], state[-3:] / self.unit])
         return self.point(start)
 

@@ -38,7 +38,7 @@ def execute(study: Study, tasks: Iterable[Task], workers: Workers, heard: Heard)
 def size_for(tasks: list[Task], workers: Workers, *, timed: bool) -> int:
     """How many processes: none for few cases and for what only this process knows.
 
-    Timed cases are handed over one at a time, to workers that have their kernels already if there are any.
+    Many timed cases are handed over one at a time, to workers that have their kernels already if there are any.
     """
     ours = {name for task in tasks for name in (task.case.scene, task.case.integrator)}
     if any(plugins.is_local(name) for name in ours):

@@ -144,6 +144,7 @@ def claim(path: Path, *, wait: bool) -> Iterator[bool]:
                 return
             if not _is_file(handle, lock):  # its holder removed it while we waited
                 continue
+            os.utime(handle)  # since when it is held
             try:
                 yield True
             finally:

@@ -16,6 +16,7 @@ from symtop.top import Angles, SymmetricTop
 
 PACKAGE, DISTRIBUTION = "scipy-odeint", "scipy"
 MOST_STEPS = 1_000_000  # between two samples
+SUCCESS = "Integration successful."
 
 
 def _solver(field: Callable[[SymmetricTop], Any]) -> Solver:
@@ -31,6 +32,8 @@ def _solver(field: Callable[[SymmetricTop], Any]) -> Solver:
             mxstep=MOST_STEPS,
             full_output=True,
         )
+        if about["message"] != SUCCESS:  # it leaves zeros where it did not get to, and counts that mean nothing
+            return run_of(plan, [], 0, 0)
         return run_of(plan, states[times.size - plan.times.size :], int(about["nst"][-1]), int(about["nfe"][-1]))
 
     return solve
