@@ -27,9 +27,10 @@ def symtop(*words: object, cwd: Path | None = None, **environment: object) -> su
 
 
 def ended(process: subprocess.Popen, seconds: float = 240.0) -> tuple[int, str, str]:
-    """Exit code, output and errors of a command; none of them may hold a traceback."""
+    """Exit code, output and errors of a command; none of them may hold a traceback or a leak."""
     out, err = process.communicate(timeout=seconds)
     assert "Traceback" not in out + err, err
+    assert "leaked" not in err, err
     return process.returncode, out, err
 
 

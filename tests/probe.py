@@ -10,6 +10,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import xarray as xr
+from tqdm import tqdm
 
 from symtop.integrators.registry import integrator, integrators
 from symtop.scenes import scene
@@ -30,6 +31,7 @@ def measure(case: Case) -> xr.Dataset:
     if log:
         with Path(log).open("a") as file:
             file.write(f"{case.label}\n")
+    tqdm(total=1, disable=True)  # as a long run has one
     time.sleep(float(os.environ.get("PROBE_PAUSE", "0")))
     run = simulate(
         scene(case.scene), integrator(case.integrator), samples=51, observe="axis", guard=False, **case.settings

@@ -17,6 +17,7 @@ from types import FrameType
 from typing import NamedTuple
 
 import xarray as xr
+from tqdm import tqdm
 
 from symtop import datasets
 from symtop.checks import SymtopError
@@ -143,6 +144,7 @@ def _last_resort(seconds: float, trace: Path) -> Iterator[None]:
 def obey(parent: int) -> None:
     """In a worker of a pool: leave interrupts to the parent, and end with it however it ends."""
     _expendable.append(True)
+    tqdm.set_lock(threading.RLock())  # its own would be a semaphore of the system, left behind when a worker is ended
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
