@@ -45,7 +45,8 @@ def round_off(where: Scene, method: Integrator, steps: int, per_nutation: float,
     Dimensions ``member``, ``plain_member`` and ``rounding_window``, with ``rounding_elapsed`` steps (see `elapsed`).
     ``rounding`` and ``rounding_plain`` hold drifts, ``..._rms`` their root mean square, ``..._exponent`` its growth
     with ``..._exponent_interval`` (95 %) from as many steps on as the first window has, ``..._end`` its last value;
-    ``rounding_gain`` is how much less those drift by the end that were run with both;
+    ``rounding_gain`` is how much less those drift that were run with both, in the last decade of steps, because at one
+    moment a walk may be anywhere;
     ``rounding_p_phi`` and ``rounding_p_psi`` the largest change of a momentum with compensated sums.
     """
     found: dict[str, Any] = {}
@@ -73,6 +74,7 @@ def round_off(where: Scene, method: Integrator, steps: int, per_nutation: float,
             for momentum in ("p_phi", "p_psi"):
                 changes = [np.abs(run[f"{momentum}_{part}"].values) for run in runs for part in ("least", "largest")]
                 found[f"rounding_{momentum}"] = float(np.max(changes))
-    ends_of = {name: np.sqrt(np.mean(found[name][1][:PLAIN, -1] ** 2)) for name in ("rounding", "rounding_plain")}
-    found["rounding_gain"] = float(ends_of["rounding_plain"] / ends_of["rounding"])
+    late = found["rounding_elapsed"][1] > 0.1 * found["rounding_elapsed"][1][-1]
+    walked = [np.mean(found[name][1][:PLAIN, late] ** 2) for name in ("rounding_plain", "rounding")]
+    found["rounding_gain"] = float(np.sqrt(walked[0] / walked[1]))
     return xr.Dataset(found)
