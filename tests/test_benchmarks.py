@@ -125,6 +125,13 @@ def test_odeint_takes_the_steps_of_solve_ivps_lsoda_and_names_its_distribution()
     assert by_name["scipy-odeint-numba"].distribution == "scipy"
 
 
+def test_an_odeint_that_gives_up_is_a_failure_and_not_a_row_of_zeros(monkeypatch):
+    scene, found = symtop.scene("spheroid"), peers.load(("odeint",))[0]
+    monkeypatch.setattr("benchmarks.peers.adapters.odeint.MOST_STEPS", 5)
+    with pytest.warns(Warning, match="Excess work"):
+        assert np.isnan(measure.accuracy(scene, found[0].method, 1e-9).error)
+
+
 def test_a_peers_error_falls_with_its_tolerance():
     scene = symtop.scene("spheroid")
     method = next(peer.method for peer in peers.load(("scipy",))[0] if peer.method.name == "scipy-dop853-python")

@@ -7,6 +7,7 @@ new code, and it has no events and no dense output. Six equations on (e, L); rto
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from scipy.integrate import odeint
 
 from benchmarks.peers.common import ON_AXIS, SAME, compiled_field, peer, python_field, run_of, start_of, with_start
@@ -33,7 +34,7 @@ def _solver(field: Callable[[SymmetricTop], Any]) -> Solver:
             full_output=True,
         )
         if about["message"] != SUCCESS:  # it leaves zeros where it did not get to, and counts that mean nothing
-            return run_of(plan, [], 0, 0)
+            return run_of(plan, np.empty((0, 6)), 0, 0)
         return run_of(plan, states[times.size - plan.times.size :], int(about["nst"][-1]), int(about["nfe"][-1]))
 
     return solve
