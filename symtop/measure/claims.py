@@ -348,8 +348,8 @@ def _memory(method: Integrator, where: Scene) -> Finding:
         return Finding("memory", "", "", "inapplicable", "it makes no steps")
     size = long.memory_a_step(method, where)
     flat = size < FLAT
-    why = f"{size:.2f} bytes for each further step" + (", which is none" if flat else "")
-    return Finding("memory", "", "flat" if flat else f"{size:.0f} B a step", "measured", why, size, FLAT)
+    why = f"{size} bytes for each further step" + (", which is none" if flat else "")
+    return Finding("memory", "", "flat" if flat else f"{size} B a step", "measured", why, float(size), FLAT)
 
 
 def _pole_claim(method: Integrator) -> str:

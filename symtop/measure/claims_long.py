@@ -201,8 +201,14 @@ def cost_of_an_attempt(method: Integrator, where: Scene, chart: str) -> int:
     return max(math.gcd(*(cost - costs[0] for cost in costs)), 1) if len(set(costs)) > ATTEMPTS // 2 else 1
 
 
-def memory_a_step(method: Integrator, where: Scene) -> float:
-    """Bytes that a run keeps for each further step, by Python's own count of what NumPy and Python allocate."""
+POINTER = 8  # bytes
+
+
+def memory_a_step(method: Integrator, where: Scene) -> int:
+    """Bytes that a run keeps for each further step, by Python's own count of what NumPy and Python allocate.
+
+    In whole pointers: nothing smaller can be kept, and fractions of one are what Python happens to hold at the moment.
+    """
     few = max(100, round((4_000 if method.tier == "compiled" else 200) * min(1.0, 20.0 * SLOW.get(method.name, 1.0))))
     step = _period(where) / STEPS_A_NUTATION
     peaks, made = [], []
@@ -214,7 +220,7 @@ def memory_a_step(method: Integrator, where: Scene) -> float:
             peaks.append(tracemalloc.get_traced_memory()[1])
         finally:
             tracemalloc.stop()
-    return max(peaks[1] - peaks[0], 0) / max(made[1] - made[0], 1)
+    return POINTER * round(max(peaks[1] - peaks[0], 0) / max(made[1] - made[0], 1) / POINTER)
 
 
 # the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1
