@@ -82,8 +82,9 @@ def _picture(data: xr.Dataset, quantity: str, power: int) -> Picture:
         constants = fitted or _constants(data.sel(scene=name), quantity, power)
         if power and constants:
             coarse = float(np.nanmax(data["step_size"].sel(scene=name).values))
-            ends = ((0.2 if power < STEEP else 0.5) * coarse, coarse)
-            style.slope_guide(axis, power, ends, 0.15 * min(constants) * ends[0] ** power, f"$h^{{{power}}}$")
+            width, below = (0.2, 0.15) if power < STEEP else (0.5, 0.02)
+            ends = (width * coarse, coarse)
+            style.slope_guide(axis, power, ends, below * min(constants) * ends[0] ** power, f"$h^{{{power}}}$")
     slopes = [fit.slope for fit in orders.values() if np.isfinite(fit.slope)]
     range_ = (
         f"Fitted orders lie between {min(slopes):.3f} and {max(slopes):.3f}." if slopes else "None could be fitted."
