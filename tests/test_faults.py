@@ -252,6 +252,18 @@ def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
     assert not leftovers(tmp_path / "shared")
 
 
+def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(tmp_path):
+    code, output = probe(tmp_path)
+    assert code == 0, output
+    (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.nc")
+    case.unlink()
+    for name in (work.trace_path(case), store.lock_path(case), case.with_name(f".{case.name}.x.part.nc")):
+        name.touch()
+    code, output = probe(tmp_path)
+    assert "1 of 4 cases computed" in output
+    assert not leftovers(tmp_path)
+
+
 # ---- signals ---------------------------------------------------------------------------------------------------------
 
 

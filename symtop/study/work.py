@@ -77,6 +77,7 @@ def compute(task: Task, study: Study | None = None, *, wait: bool = False) -> Re
 
 def _compute(study: Study, task: Task, path: Path) -> Result:
     datasets.sweep(path)
+    trace_path(path).unlink(missing_ok=True)  # of a worker that was killed
     try:
         with limited(task.limit, trace_path(path)):
             data = study.measure(task.case)
