@@ -31,7 +31,7 @@ class Row(NamedTuple):
     ratio: float
     ratio_low: float
     ratio_high: float
-    difference: float  # of the two final states without fused multiply-add, relative
+    difference: float  # of the two final states where gcc fuses nothing by itself, relative
     verlet_steps: float
 
 
@@ -114,7 +114,7 @@ def lines(rows: list[Row]) -> list[str]:
     )
     table.append(
         f"{sum(row.difference == 0.0 for row in rows)} of {len(rows)} twins return the same bits after {CHECKED} steps "
-        "when neither uses a fused multiply-add."
+        "when gcc fuses no multiply and add by itself."
     )
     if slow:
         table.append(f"Slower than that: {', '.join(f'{row.name} [{row.chart}] {row.ratio:.2f}' for row in slow)}.")

@@ -2,8 +2,8 @@
 
 A twin is one C file for each kernel family (`twins/*.c`), compiled for each length of a table, because numba compiles
 for that length too. It gets what the Python kernel gets: the numbers of the top, the table, the start and the step.
-Built without fused multiply-add it returns the same bits, which is how we know that it is a twin; timed it has all
-that gcc can do with ``-O3 -march=native``.
+Built so that gcc fuses no multiply and add by itself it returns the same bits, which is how we know that it is a twin;
+timed it has all that gcc can do with ``-O3 -march=native``.
 """
 
 import ctypes
@@ -34,7 +34,7 @@ from symtop.scenes import Scene
 SOURCES = Path(__file__).resolve().parent / "twins"
 BUILD = Path(__file__).resolve().parent / "build"
 FAST = ("-O3", "-march=native")
-EXACT = (*FAST, "-ffp-contract=off")  # no fused multiply-add: rounds like the Python kernel
+EXACT = (*FAST, "-ffp-contract=off")  # gcc fuses nothing by itself: rounds like the Python kernel
 
 
 class Kernel(NamedTuple):
