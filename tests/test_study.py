@@ -4,8 +4,10 @@ import dataclasses
 import importlib
 import json
 import linecache
+import os
 import shutil
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -352,3 +354,37 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
     assert found["failures"] == ["unlucky on goldstein failed: RuntimeError: no luck"]
     assert list(datasets.read(tmp_path / "stability.nc")["integrator"].values) == ["midpoint"]
     assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten
+
+
+CLOCKED = """
+import os, time
+import matplotlib.pyplot as plt
+import xarray as xr
+from symtop.study.study import Case, Picture, Study
+
+def cases(quick):
+    return [Case("spheroid", "midpoint", {"k": k}, timed=k >= 8) for k in range(16)]
+
+def measure(case):
+    begin = time.monotonic()
+    time.sleep(0.05 if case.timed else 0.6)  # long enough for the second worker to start
+    one = xr.Dataset({"begin": begin, "end": time.monotonic(), "process": os.getpid(), "timed": float(case.timed)})
+    return one.expand_dims(k=[case.settings["k"]])
+
+STUDY = Study("clocked", "Clocked", "Alone?", "", cases, measure, lambda data: [], lambda data: ["It ran."])
+"""
+
+
+def test_timed_cases_run_one_at_a_time_in_workers_that_are_there_already(tmp_path):
+    (tmp_path / "clocked.py").write_text(CLOCKED)
+    runner.run(runner.load(str(tmp_path / "clocked.py")), tmp_path / "r", jobs=2, quiet=True)
+    found = [datasets.read(path) for path in (tmp_path / "r").rglob("cases/clocked/*.nc")]
+    spans = {timed: sorted((float(one["begin"][0]), float(one["end"][0])) for one in found if one["timed"][0] == timed)
+             for timed in (0.0, 1.0)}  # fmt: skip
+    crew = {timed: {int(one["process"][0]) for one in found if one["timed"][0] == timed} for timed in (0.0, 1.0)}
+    assert [len(spans[timed]) for timed in (0.0, 1.0)] == [8, 8]
+    assert all(end <= begin for (_, end), (begin, _) in pairwise(spans[1.0]))
+    assert max(end for _, end in spans[0.0]) <= spans[1.0][0][0]
+    assert any(begin < end for (_, end), (begin, _) in pairwise(spans[0.0]))  # the control: two at once
+    assert crew[1.0] <= crew[0.0]
+    assert os.getpid() not in crew[0.0]
