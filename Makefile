@@ -9,7 +9,6 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 PEERS := benchmarks/peers/.venv
-STUDIES := $(patsubst studies/%.py,%,$(wildcard studies/[!_]*.py))
 
 .DEFAULT_GOAL := help
 .PHONY: help setup studies quick report check-results test test-all lint bench peers clean

@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 from benchmarks import kernels, startup, targets, twin
-from symtop import datasets
-from symtop.study import store
+from symtop.base import datasets
+from symtop.runner import store
 
 
 def main() -> None:

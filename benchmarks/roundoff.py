@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 import symtop
-from symtop.integrators.fixed_step import inside
-from symtop.measure import shadow
+from symtop.measure import modified_energy as shadow
 from symtop.measure.errors import energy_scale
-from symtop.measure.longrun import PER_NUTATION, chart_of, long_run, windows
+from symtop.methods.fixed_step import inside
+from symtop.run.long_run import PER_NUTATION, chart_of, long_run, windows
 
 HERE = Path(__file__).resolve().parent
 WIDE = np.longdouble

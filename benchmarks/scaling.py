@@ -12,8 +12,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from symtop.study import run as runner
-from symtop.study.pools import Workers
+from symtop.runner import run as runner
+from symtop.runner.pools import Workers
 
 ENOUGH = 1.7  # times faster
 

@@ -9,8 +9,8 @@ import time
 import numpy as np
 
 import symtop
-from symtop.integrators.registry import Plan
 from symtop.measure.timing import timings
+from symtop.methods.registry import Plan
 
 STEP = 0.01
 FIRST = f"import symtop; symtop.simulate('spheroid', 'midpoint', step_size={STEP})"
@@ -44,7 +44,7 @@ def measure(repeats: int = 3) -> dict[str, float]:
     return {
         "python": bare,
         "import symtop": min(_process("import symtop") for _ in range(repeats)) - bare,
-        "symtop --help": min(_process("from symtop.cli import main; main(['--help'])") for _ in range(repeats)),
+        "symtop --help": min(_process("from symtop.cli.main import main; main(['--help'])") for _ in range(repeats)),
         "first simulate, nothing cached": cold,
         "first simulate, kernels cached": warm,
         "simulate adds to its kernel": whole.best - kernel.best,

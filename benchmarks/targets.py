@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 import symtop
-from symtop import charts
-from symtop.integrators.registry import Plan
 from symtop.measure.timing import timings
+from symtop.methods.registry import Plan
+from symtop.model import charts
 
 HORIZON = 8.0
 ACCURACY = 1e-9

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.integrators import (
+from symtop.methods import (
     discrete_lagrangian,
     galerkin,
     gauss,
@@ -27,9 +27,9 @@ from symtop.integrators import (
     splitting_space,
     unreduced,
 )
-from symtop.integrators.fixed_step import inside
-from symtop.integrators.registry import Integrator
-from symtop.scenes import Scene
+from symtop.methods.fixed_step import inside
+from symtop.methods.registry import Integrator
+from symtop.model.scenes import Scene
 
 SOURCES = Path(__file__).resolve().parent / "twins"
 BUILD = Path(__file__).resolve().parent / "build"
@@ -135,8 +135,7 @@ class Twin:
             self._par.ctypes.data, self._rule.ctypes.data, state.ctypes.data, self.kernel.h, steps, ctypes.byref(work)
         )
         if done != steps:
-            msg = f"the C twin stopped after {done} of {steps} steps"
-            raise RuntimeError(msg)
+            raise RuntimeError(f"the C twin stopped after {done} of {steps} steps")
         return state, work.value
 
     def shown(self, steps: int) -> tuple[np.ndarray, int]:

@@ -3,69 +3,80 @@
     >>> import symtop
     >>> data = symtop.simulate("spheroid", "midpoint", step_size=0.01)
 
-Names are imported on first use, so that ``import symtop`` costs nothing.
+Names are imported on first use, so that ``import symtop`` costs nothing; type checkers see where each comes from.
 """
 
 import importlib
-import sys
-from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from symtop.advise import Advice as Advice
+    from symtop.advise import recommend as recommend
+    from symtop.base.validate import SymtopError as SymtopError
+    from symtop.base.validate import SymtopWarning as SymtopWarning
+    from symtop.methods.citations import citation as citation
+    from symtop.methods.discrete_lagrangian import discrete_lagrangian as discrete_lagrangian
+    from symtop.methods.registry import Integrator as Integrator
+    from symtop.methods.registry import Plan as Plan
+    from symtop.methods.registry import Run as Run
+    from symtop.methods.registry import integrator as integrator
+    from symtop.methods.registry import integrators as integrators
+    from symtop.methods.registry import register as register
+    from symtop.methods.runge_kutta import runge_kutta as runge_kutta
+    from symtop.methods.splitting import composition as composition
+    from symtop.model.closed_form import ClosedForm as ClosedForm
+    from symtop.model.scenes import Scene as Scene
+    from symtop.model.scenes import register_scene as register_scene
+    from symtop.model.scenes import scene as scene
+    from symtop.model.scenes import scenes as scenes
+    from symtop.model.top import Angles as Angles
+    from symtop.model.top import Momenta as Momenta
+    from symtop.model.top import SymmetricTop as SymmetricTop
+    from symtop.run.long_run import long_run as long_run
+    from symtop.run.reference import reference as reference
+    from symtop.run.simulation import simulate as simulate
 
 __version__ = "0.1.0"
 
 _HOME = {
-    "Angles": "top",
-    "SymmetricTop": "top",
-    "Momenta": "top",
-    "Scene": "scenes",
-    "register_scene": "scenes",
-    "scene": "scenes",
-    "scenes": "scenes",
-    "SymtopError": "checks",
-    "SymtopWarning": "checks",
-    "Integrator": "integrators.registry",
-    "Plan": "integrators.registry",
-    "Run": "integrators.registry",
-    "integrator": "integrators.registry",
-    "integrators": "integrators.registry",
-    "register": "integrators.registry",
-    "discrete_lagrangian": "integrators.discrete_lagrangian",
-    "citation": "integrators.citations",
-    "composition": "integrators.splitting",
-    "runge_kutta": "integrators.runge_kutta",
-    "simulate": "simulate",
-    "long_run": "measure.longrun",
-    "reference": "reference",
-    "ClosedForm": "exact",
-    "recommend": "advise",
     "Advice": "advise",
+    "Angles": "model.top",
+    "ClosedForm": "model.closed_form",
+    "Integrator": "methods.registry",
+    "Momenta": "model.top",
+    "Plan": "methods.registry",
+    "Run": "methods.registry",
+    "Scene": "model.scenes",
+    "SymmetricTop": "model.top",
+    "SymtopError": "base.validate",
+    "SymtopWarning": "base.validate",
+    "citation": "methods.citations",
+    "composition": "methods.splitting",
+    "discrete_lagrangian": "methods.discrete_lagrangian",
+    "integrator": "methods.registry",
+    "integrators": "methods.registry",
+    "long_run": "run.long_run",
+    "recommend": "advise",
+    "reference": "run.reference",
+    "register": "methods.registry",
+    "register_scene": "model.scenes",
+    "runge_kutta": "methods.runge_kutta",
+    "scene": "model.scenes",
+    "scenes": "model.scenes",
+    "simulate": "run.simulation",
 }
 
 __all__ = ["__version__", *_HOME]  # noqa: PLE0604  (strings all)
 
+if not TYPE_CHECKING:  # a checker must not take it for a promise that every name is there
 
-class _Package(ModuleType):
-    """Keeps `symtop.scenes`, `integrators`, `simulate` and `reference` the functions that users call.
-
-    The import system would bind the submodules of the same names over them.
-    """
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in _HOME and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        msg = f"module 'symtop' has no attribute {name!r}"
-        raise AttributeError(msg)
-    value = getattr(importlib.import_module(f"symtop.{_HOME[name]}"), name)
-    globals()[name] = value
-    return value
+    def __getattr__(name: str) -> object:
+        if name not in _HOME:
+            raise AttributeError(f"module 'symtop' has no attribute {name!r}")
+        value = getattr(importlib.import_module(f"symtop.{_HOME[name]}"), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:
     return __all__
-
-
-sys.modules[__name__].__class__ = _Package

@@ -23,13 +23,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.checks import SymtopError, one_of, positive
-from symtop.integrators.registry import Integrator, integrators
+from symtop.base.validate import SymtopError, one_of, positive
 from symtop.measure import meet, ranking
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
-from symtop.scenes import Scene, scene, scenes
-from symtop.simulate import MOST_STEPS
+from symtop.methods.registry import Integrator, integrators
+from symtop.model.scenes import Scene, scene, scenes
+from symtop.run.simulation import MOST_STEPS
 
 ASKED = (*QUANTITIES, *FREQUENCIES)
 STORED = Path("results") / "work_precision.nc"
@@ -116,8 +116,7 @@ def recommend(
     chosen = where if isinstance(where, Scene) else scene(where)
     wanted = positive("accuracy", accuracy)
     if wanted >= math.pi:
-        msg = f"accuracy must be below pi, beyond which every angle is right, not {wanted!r}"
-        raise SymtopError(msg)
+        raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {wanted!r}")
     one_of("quantity", quantity, ASKED)
     end = chosen.horizon if horizon is None else positive("horizon", horizon)
     data = _stored(results)
@@ -155,15 +154,15 @@ def _stored(results: str | Path | None) -> xr.Dataset | None:
     file = STORED if results is None else Path(results) / STORED.name
     if not file.is_file():
         if results is not None:
-            msg = f"results holds no {STORED.name}: {str(results)!r}; run symtop study work_precision first"
-            raise SymtopError(msg)
+            raise SymtopError(
+                f"results holds no {STORED.name}: {str(results)!r}; run symtop study work_precision first"
+            )
         return None
     try:
         with xr.open_dataset(file) as data:
             return data.load()
     except (OSError, ValueError) as error:
-        msg = f"{file} cannot be read ({error}); run symtop study work_precision --fresh"
-        raise SymtopError(msg) from error
+        raise SymtopError(f"{file} cannot be read ({error}); run symtop study work_precision --fresh") from error
 
 
 def _usable(quantity: str) -> dict[str, Integrator]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from symtop import datasets
+from symtop.base import datasets
 
 PROBE = Path(__file__).parent / "probe.py"
 

@@ -10,8 +10,11 @@ import pytest
 
 os.environ.setdefault("SYMTOP_CACHE", str(Path(__file__).resolve().parent.parent / ".pytest_cache" / "symtop"))
 
-from symtop.scenes import Scene
-from symtop.top import Angles, SymmetricTop
+from symtop.model.scenes import Scene
+from symtop.model.top import Angles, SymmetricTop
+from symtop.runner import scripts
+
+scripts.install()  # tests import `symtop_studies`
 
 
 @pytest.fixture(scope="session")

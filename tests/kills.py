@@ -15,8 +15,8 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
-from symtop import datasets
-from symtop.study.check import differences
+from symtop.base import datasets
+from symtop.runner.check import differences
 from tests.commands import ended, leftovers, symtop
 
 PATIENCE = 2400.0  # seconds for an undisturbed run

@@ -12,10 +12,10 @@ import matplotlib.pyplot as plt
 import xarray as xr
 from tqdm import tqdm
 
-from symtop.integrators.registry import integrator, integrators
-from symtop.scenes import scene
-from symtop.simulate import simulate
-from symtop.study.study import Case, Picture, Study
+from symtop.methods.registry import integrator, integrators
+from symtop.model.scenes import scene
+from symtop.run.simulation import simulate
+from symtop.runner.study import Case, Picture, Study
 
 METHODS = ("midpoint", "stormer-verlet", "strang", "gauss-4", "rk4", "rk45")
 

@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 import symtop
-from symtop import charts, guard
-from symtop.integrators.registry import integrators
-from symtop.scenes import Scene, closed_form
-from symtop.simulate import choose_chart, make_plan
-from symtop.top import Angles, SymmetricTop
+from symtop.methods.registry import integrators
+from symtop.model import charts
+from symtop.model.scenes import Scene, closed_form
+from symtop.model.top import Angles, SymmetricTop
+from symtop.run import guard
+from symtop.run.simulation import choose_chart, make_plan
 
 MOST_STEPS = 1.5e5
 MOST_NUTATIONS = {"radau": 6.0, "taylor-quad": 30.0}  # so that no run takes seconds

@@ -3,9 +3,9 @@
 import numpy as np
 
 import symtop
-from symtop.integrators.registry import Integrator
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import LEAST, Fit, power_law
+from symtop.methods.registry import Integrator
 
 
 def measured_order(

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 import symtop
 from symtop import advise
 from symtop.advise import regime
-from symtop.cli import main
+from symtop.cli.main import main
 from symtop.measure import meet
 from symtop.measure.errors import errors
 

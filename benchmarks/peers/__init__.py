@@ -3,7 +3,7 @@
 import importlib
 from typing import NamedTuple
 
-from symtop.integrators.registry import Integrator
+from symtop.methods.registry import Integrator
 
 ADAPTERS = ("scipy", "odeint", "diffrax", "sundae", "mujoco", "rebound", "drake")
 

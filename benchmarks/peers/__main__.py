@@ -9,8 +9,8 @@ from pathlib import Path
 from benchmarks.peers import load
 from benchmarks.peers.measure import SCENES, measure
 from benchmarks.peers.summary import STUDY, lines
-from symtop import datasets
-from symtop.study import run, store
+from symtop.base import datasets
+from symtop.runner import run, store
 
 
 def main() -> None:

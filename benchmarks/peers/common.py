@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numba import carray, cfunc, njit, types
 
-from symtop.integrators.registry import Array, Integrator, Plan, Run, Solver
-from symtop.integrators.space import on_axis
-from symtop.top import Angles, SymmetricTop
+from symtop.methods.registry import Array, Integrator, Plan, Run, Solver
+from symtop.methods.space import on_axis
+from symtop.model.top import Angles, SymmetricTop
 
 ON_AXIS = "six equations on (e, L)"
 SAME = "rtol = atol = the tolerance"

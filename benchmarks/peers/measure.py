@@ -21,13 +21,13 @@ import xarray as xr
 
 import symtop
 from benchmarks.peers import Peer
-from symtop import charts
-from symtop.integrators.registry import Integrator
 from symtop.measure.accuracy import SAMPLES, judge_limit, knobs, step_ladder
 from symtop.measure.timing import bare_run, timings
-from symtop.reference import reference
-from symtop.scenes import Scene
-from symtop.simulate import as_dataset, choose_chart, make_plan
+from symtop.methods.registry import Integrator
+from symtop.model import charts
+from symtop.model.scenes import Scene
+from symtop.run.reference import reference
+from symtop.run.simulation import as_dataset, choose_chart, make_plan
 
 SCENES = ("spheroid", "goldstein", "fast")
 TARGETS = (1e-3, 1e-6, 1e-9)

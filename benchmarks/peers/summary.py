@@ -10,7 +10,7 @@ from benchmarks.kernels import ratio
 from benchmarks.peers.measure import HEYOKA, OURS, PERIODS, TARGETS
 from symtop.measure.timing import Timing
 from symtop.report import figures, style
-from symtop.study.study import Picture, Study, Table
+from symtop.runner.study import Picture, Study, Table
 
 JUDGED = TARGETS[1:]  # the accuracies at which a verdict is given
 ASKED = ("spheroid", "goldstein")  # the scenes on which SciPy is to be beaten by `WANTED`

@@ -8,10 +8,10 @@ The first four are tables of numbers. The last is a kernel of its own: symplecti
 import numpy as np
 
 import symtop
-from symtop.integrators.angles import chart_outcome, reduced
-from symtop.integrators.drive import driver
-from symtop.integrators.fixed_step import fixed_step
-from symtop.integrators.splitting_angles import force_angles
+from symtop.methods.angles import chart_outcome, reduced
+from symtop.methods.fixed_step import fixed_step
+from symtop.methods.loop import driver
+from symtop.methods.splitting_angles import force_angles
 
 # A discrete Lagrangian is a quadrature rule: nodes and weights. Two Gauss points:
 left, right = 0.5 - 3**0.5 / 6, 0.5 + 3**0.5 / 6

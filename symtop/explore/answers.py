@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop import __version__, charts
-from symtop.checks import SymtopError, finite, positive
-from symtop.integrators.registry import Integrator, integrator, integrators
+from symtop import __version__
+from symtop.base.validate import SymtopError, finite, positive
 from symtop.measure.conservation import CONSTANTS, residuals
-from symtop.scenes import Scene, closed_form, scenes
-from symtop.simulate import simulate
-from symtop.top import Angles, SymmetricTop
+from symtop.methods.registry import Integrator, integrator, integrators
+from symtop.model import charts
+from symtop.model.scenes import Scene, closed_form, scenes
+from symtop.model.top import Angles, SymmetricTop
+from symtop.run.simulation import simulate
 
 TOP = ("I1", "I3", "mgl")
 START = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
@@ -57,12 +58,10 @@ class Question:
 def question(fields: Mapping[str, Any]) -> Question:
     """A question from what a page sent; SymtopError says what is missing or makes no sense."""
     if not isinstance(fields, Mapping):
-        msg = f"a question must be a mapping of names to values, not {fields!r}"
-        raise SymtopError(msg)
+        raise SymtopError(f"a question must be a mapping of names to values, not {fields!r}")
     missing = [name for name in (*TOP, *START, "horizon", "integrator") if name not in fields]
     if missing:
-        msg = f"the question lacks {', '.join(missing)}"
-        raise SymtopError(msg)
+        raise SymtopError(f"the question lacks {', '.join(missing)}")
     top = SymmetricTop(*(finite(name, fields[name]) for name in TOP))
     start = Angles(*(finite(name, fields[name]) for name in START))
     method = integrator(str(fields["integrator"]))
@@ -71,11 +70,10 @@ def question(fields: Mapping[str, Any]) -> Question:
         return Question(where, method, None)
     setting = positive(method.knob, fields.get(method.knob))
     if method.knob == "step_size" and where.horizon / setting > MOST_STEPS:
-        msg = (
+        raise SymtopError(
             f"step_size must be at least {where.horizon / MOST_STEPS:.3g} here, not {setting!r}: "
             f"the explorer runs at most {MOST_STEPS} steps"
         )
-        raise SymtopError(msg)
     return Question(where, method, setting)
 
 
@@ -167,7 +165,7 @@ def script(asked: Question) -> str:
 
 def catalogue() -> dict[str, Any]:
     """The scenes and the integrators that can be chosen, with all that the page's controls need."""
-    from symtop.report import style  # noqa: PLC0415  (matplotlib: half a second)
+    from symtop.report import style  # matplotlib: half a second
 
     known = [
         {

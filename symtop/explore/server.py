@@ -16,8 +16,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-from symtop import datasets
-from symtop.checks import SymtopError, whole
+from symtop.base import datasets
+from symtop.base.validate import SymtopError, whole
 from symtop.explore import answers
 
 STATIC = Path(__file__).parent / "static"
@@ -131,8 +131,7 @@ def _parsed(body: bytes) -> Any:
     try:
         return json.loads(body)
     except (ValueError, RecursionError) as error:
-        msg = f"a question must be JSON: {error}"
-        raise SymtopError(msg) from None
+        raise SymtopError(f"a question must be JSON: {error}") from None
 
 
 def serve(port: int = 0) -> ThreadingHTTPServer:
@@ -140,8 +139,7 @@ def serve(port: int = 0) -> ThreadingHTTPServer:
     try:
         server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
     except (OSError, OverflowError) as error:
-        msg = f"port must be a free one between 0 and 65535, not {port!r}: {error}"
-        raise SymtopError(msg) from error
+        raise SymtopError(f"port must be a free one between 0 and 65535, not {port!r}: {error}") from error
     server.daemon_threads = True
     return server
 

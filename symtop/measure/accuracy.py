@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from symtop.integrators.registry import Integrator
 from symtop.measure.errors import QUANTITIES, attitude_error, energy_scale, errors, momentum_scale
 from symtop.measure.phase import phase
-from symtop.reference import reference
-from symtop.scenes import Scene
-from symtop.simulate import simulate
+from symtop.methods.registry import Integrator
+from symtop.model.scenes import Scene
+from symtop.run.reference import reference
+from symtop.run.simulation import simulate
 
 SAMPLES = 331
 ENOUGH = {"compiled": 1e9, "python": 2e4}  # force evaluations of a run after which no finer setting is tried

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from symtop.checks import SymtopError
-from symtop.scenes import Scene, closed_form
+from symtop.base.validate import SymtopError
+from symtop.model.scenes import Scene, closed_form
 
 NODES = 4096
 NARROWEST = 1e-6  # rad: a nutation narrower than this has no phase to speak of
@@ -30,13 +30,12 @@ class Clock:
     """The phase of the nutation of a scene as a function of (theta, theta')."""
 
     def __init__(self, where: Scene) -> None:
-        from scipy.interpolate import CubicSpline  # noqa: PLC0415  (0.3 s to import)
+        from scipy.interpolate import CubicSpline  # 0.3 s to import
 
         self.period = where.nutation_period
         exact = closed_form(where)
         if not has_phase(where):
-            msg = f"scene {where.name} has no nutation whose phase could be measured"
-            raise SymtopError(msg)
+            raise SymtopError(f"scene {where.name} has no nutation whose phase could be measured")
         times = self.period * np.arange(NODES + 1) / NODES
         motion = exact(times)
         u, v = np.cos(motion.theta), -np.sin(motion.theta) * motion.theta_dot

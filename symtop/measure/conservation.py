@@ -14,12 +14,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from symtop.integrators.registry import Integrator
 from symtop.measure.clock import Clock, has_phase
 from symtop.measure.errors import energy_scale, momentum_scale
 from symtop.measure.growth import change_point, growth, law, tops
-from symtop.scenes import Scene
-from symtop.simulate import simulate
+from symtop.methods.registry import Integrator
+from symtop.model.scenes import Scene
+from symtop.run.simulation import simulate
 
 CONSTANTS = ("energy", "p_phi", "p_psi")
 BLOCKS = 24
@@ -87,7 +87,7 @@ def residuals(scene: Scene, run: xr.Dataset) -> dict[str, np.ndarray]:
 
 def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
     """The linear trend of a residual (n,) at times (n,), from the means of `BLOCKS` equal stretches of the run."""
-    from scipy.stats import t as student  # noqa: PLC0415  (0.5 s to import)
+    from scipy.stats import t as student  # 0.5 s to import
 
     t, r = np.asarray(time, float), np.asarray(residual, float)
     good = np.isfinite(r)

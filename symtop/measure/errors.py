@@ -12,8 +12,8 @@ never share a norm.
 import numpy as np
 import xarray as xr
 
-from symtop import charts
-from symtop.scenes import Scene
+from symtop.model import charts
+from symtop.model.scenes import Scene
 
 QUANTITIES: dict[str, str] = {
     "axis": "angle between axes (rad)",

@@ -9,12 +9,12 @@ steps on log error against log setting; over a short horizon first, with the tar
 import math
 from typing import NamedTuple
 
-from symtop.integrators.registry import Integrator, integrators
 from symtop.measure.accuracy import error_row
 from symtop.measure.timing import bare_run, timings
 from symtop.measure.work import coarsest_step
-from symtop.scenes import Scene
-from symtop.simulate import choose_chart
+from symtop.methods.registry import Integrator, integrators
+from symtop.model.scenes import Scene
+from symtop.run.simulation import choose_chart
 
 SHORT = 12.37  # nutations of a trial run
 AIM = 0.5  # of the target: what the secant steers for

@@ -37,7 +37,7 @@ class Fit(NamedTuple):
 
 def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:
     """Least squares of log y on log x over the used points; NaN with fewer than three."""
-    from scipy.stats import t as student  # noqa: PLC0415  (0.5 s to import)
+    from scipy.stats import t as student  # 0.5 s to import
 
     x, y = np.asarray(x, float), np.asarray(y, float)
     mask = np.isfinite(x) & np.isfinite(y) & (x > 0.0) & (y > 0.0)
@@ -92,7 +92,7 @@ def _unjudged(used: NDArray[Any], reason: str) -> Fit:
 
 def _bends(h: NDArray[np.float64], e: NDArray[np.float64]) -> bool:
     """Does the slope change by more than `STRAIGHT` over these points, and significantly so?"""
-    from scipy.stats import t as student  # noqa: PLC0415  (0.5 s to import)
+    from scipy.stats import t as student  # 0.5 s to import
 
     u, v = np.log(h) - np.log(h).mean(), np.log(e)
     matrix = np.stack([np.ones_like(u), u, u * u], axis=1)

@@ -28,8 +28,8 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.verdicts import STEADY
-from symtop.scenes import Scene, closed_form
-from symtop.top import Angles, SymmetricTop
+from symtop.model.scenes import Scene, closed_form
+from symtop.model.top import Angles, SymmetricTop
 
 FREQUENCIES: dict[str, str] = {
     "nutation_period": "relative error of nutation period",

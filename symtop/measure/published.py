@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.reference import reference
-from symtop.scenes import closed_form, scene
+from symtop.model.scenes import closed_form, scene
+from symtop.run.reference import reference
 
 REMARK = "an asymmetric free body: tests the solver beside us, not symtop"
 
@@ -90,7 +90,7 @@ def _hairer() -> list[Published]:
 
 def _detest() -> list[Published]:
     """Euler's equations of DETEST B5, integrated by SciPy's DOP853 at its tightest tolerance."""
-    from scipy.integrate import solve_ivp  # noqa: PLC0415
+    from scipy.integrate import solve_ivp
 
     done = solve_ivp(
         lambda _, y: (y[1] * y[2], -y[0] * y[2], -0.51 * y[0] * y[1]), (0.0, 20.0), (0.0, 1.0, 1.0),

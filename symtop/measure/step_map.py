@@ -28,13 +28,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop import charts
-from symtop.checks import SymtopError
-from symtop.integrators.registry import Integrator, Plan, Run
+from symtop.base.validate import SymtopError
 from symtop.measure.errors import momentum_scale
-from symtop.scenes import Scene, closed_form
-from symtop.simulate import solve_plan
-from symtop.top import Angles, SymmetricTop
+from symtop.methods.registry import Integrator, Plan, Run
+from symtop.model import charts
+from symtop.model.scenes import Scene, closed_form
+from symtop.model.top import Angles, SymmetricTop
+from symtop.run.simulation import solve_plan
 
 Array = NDArray[np.float64]
 
@@ -67,8 +67,7 @@ class StepMap:
             plan = Plan(np.array([end]), end, math.nan, np.empty(0, dtype=np.int64), loose)
         done = solve_plan(self.method, self.chart, self.top, start, plan)
         if done.outcome != "ok" or not np.isfinite(done.states).all():
-            msg = f"a step of {h:.3g} in the {self.chart} chart ended as {done.outcome}"
-            raise SymtopError(msg)
+            raise SymtopError(f"a step of {h:.3g} in the {self.chart} chart ended as {done.outcome}")
         return done
 
     def shown(self, done: Run) -> Array:

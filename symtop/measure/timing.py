@@ -14,10 +14,10 @@ import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from symtop.integrators.registry import Integrator, Run
 from symtop.measure.accuracy import knobs
-from symtop.scenes import Scene
-from symtop.simulate import make_plan
+from symtop.methods.registry import Integrator, Run
+from symtop.model.scenes import Scene
+from symtop.run.simulation import make_plan
 
 BATCH = 0.02  # seconds
 CLEAR = 1e-3  # seconds: a trial that long shows how many calls make a batch

@@ -18,9 +18,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.integrators.outcomes import OUTCOMES
 from symtop.measure.errors import energy_scale, momentum_scale
-from symtop.scenes import Scene
+from symtop.methods.outcomes import OUTCOMES
+from symtop.model.scenes import Scene
 
 ACCURATE = 1e-2  # rad
 OUTSIDE = 0.1  # of the nutation's width, or rad if it has none

@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.integrators.registry import Integrator
 from symtop.measure.accuracy import as_table, error_row
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
-from symtop.scenes import Scene
+from symtop.methods.registry import Integrator
+from symtop.model.scenes import Scene
 
 Row = dict[str, Any]
 

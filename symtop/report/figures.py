@@ -187,7 +187,7 @@ def verdict_matrix(rows: Mapping[str, Sequence[Any]], claims: Sequence[str], sym
 
     `rows` holds an integrator's findings in the order of `claims`: things with `verdict`, `declared` and `measured`.
     """
-    from matplotlib.patches import Patch, Rectangle  # noqa: PLC0415
+    from matplotlib.patches import Patch, Rectangle
 
     figure, axes = panels(1, 1, width=14.5, height=0.6 + 0.235 * len(rows))
     axis = axes[0, 0]

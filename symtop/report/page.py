@@ -7,12 +7,13 @@ import math
 from pathlib import Path
 from typing import Any
 
-from symtop.checks import SymtopError
-from symtop.integrators.registry import integrators
-from symtop.report import charts, markdown
-from symtop.scenes import scenes
-from symtop.study import run as runner
-from symtop.study import store
+from symtop.base.validate import SymtopError
+from symtop.methods.registry import integrators
+from symtop.model.scenes import scenes
+from symtop.report import interactive as charts
+from symtop.report import markdown
+from symtop.runner import run as runner
+from symtop.runner import store
 
 TITLE = "Integrators on the heavy symmetric top"
 INTRODUCTION = (
@@ -93,21 +94,21 @@ def gather(results: Path) -> list[dict[str, Any]]:
             for picture in findings["pictures"]:
                 picture["data"] = _embedded(results / "figures" / picture["file"])
         except (OSError, KeyError, TypeError) as error:
-            msg = f"the findings of {name} in {results} are incomplete ({error}); run it again: {_command(name)}"
-            raise SymtopError(msg) from error
+            raise SymtopError(
+                f"the findings of {name} in {results} are incomplete ({error}); run it again: {_command(name)}"
+            ) from error
         findings.setdefault("opening", None)
         findings["charts"] = [{**chart, "prepared": charts.prepared(chart)} for chart in findings.get("charts", [])]
         findings["dataset"] = f"{name}.nc" if (results / f"{name}.nc").is_file() else ""
         found.append(findings)
     if not found:
-        msg = f"no study has left findings in {results}; run one first, for example: symtop study --all"
-        raise SymtopError(msg)
+        raise SymtopError(f"no study has left findings in {results}; run one first, for example: symtop study --all")
     return found
 
 
 def write(results: Path) -> Path:
     """Write ``report.html`` and its twin ``report.md`` into the results folder; returns the path of the page."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined

@@ -9,8 +9,8 @@ import xarray as xr
 
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES
+from symtop.model.scenes import Scene
 from symtop.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, legend_below, panels, save
-from symtop.scenes import Scene
 
 COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
 LEAST = 1e-17

@@ -32,9 +32,9 @@ def sphere(axis: Any, label: str = "") -> None:
 
 def solid_panels(rows: int, columns: int, size: float = 4.0) -> tuple[Figure, Any]:
     """A grid of three-dimensional axes, always two-dimensional."""
-    import matplotlib.pyplot as plt  # noqa: PLC0415
+    import matplotlib.pyplot as plt
 
-    from symtop.report.style import use  # noqa: PLC0415
+    from symtop.report.style import use
 
     use()
     return plt.subplots(
@@ -86,9 +86,9 @@ class Film(Figure):
 
     def savefig(self, fname: Any, **_: Any) -> None:
         """Write all frames with one palette of 32 colours, the triad's own among them."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
-        from PIL import Image  # noqa: PLC0415  (matplotlib brings it)
-        from PIL.ImageColor import getrgb  # noqa: PLC0415
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from PIL import Image  # matplotlib brings it
+        from PIL.ImageColor import getrgb
 
         canvas = FigureCanvasAgg(self)
         frames = []

@@ -12,7 +12,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 
-from symtop import datasets
+from symtop.base import datasets
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
@@ -66,7 +66,7 @@ def look(name: str) -> Look:
     """Colour and marker of an integrator: a fixed one, or a shade of its family and a marker by its place in it."""
     if name in _LOOKS:
         return _LOOKS[name]
-    from symtop.integrators.registry import integrators  # noqa: PLC0415
+    from symtop.methods.registry import integrators
 
     known = integrators()
     family = known[name].family if name in known else "other"
@@ -108,8 +108,8 @@ def compact(path: str | Path) -> None:
 
     A palette made from the picture alone would merge the colour of a few small markers with a neighbour's.
     """
-    from PIL import Image  # noqa: PLC0415  (matplotlib brings it)
-    from PIL.ImageColor import getrgb  # noqa: PLC0415
+    from PIL import Image  # matplotlib brings it
+    from PIL.ImageColor import getrgb
 
     shades = [shade for family in _SHADES.values() for shade in family]
     ours = dict.fromkeys([*shades, *(look.color for look in _LOOKS.values()), *OUTCOME_COLORS.values(), "#FFFFFF"])

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.peers.common import ON_AXIS, SAME, peer, run_of, start_of
-from symtop.integrators.registry import Integrator, Plan, Run, Solver
-from symtop.top import Angles, SymmetricTop
+from symtop.methods.registry import Integrator, Plan, Run, Solver
+from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "diffrax"
 MOST_STEPS = 2_000_000
@@ -59,8 +59,8 @@ def _solver(diffrax: Any, jax: Any, name: str, stages: int) -> Solver:
 
 def peers() -> list[Integrator]:
     """Three explicit pairs."""
-    import diffrax  # noqa: PLC0415
-    import jax  # noqa: PLC0415
+    import diffrax
+    import jax
 
     jax.config.update("jax_enable_x64", True)
     return [

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.peers.common import peer
-from symtop import charts
-from symtop.integrators.registry import Integrator, Plan, Run
-from symtop.top import Angles, SymmetricTop
+from symtop.methods.registry import Integrator, Plan, Run
+from symtop.model import charts
+from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "drake"
 LEAST = 1e-11  # below it the steps shrink until the run does not end
@@ -31,7 +31,7 @@ class Chain:
         self.plant_of = functools.lru_cache(maxsize=16)(_plant)
 
     def _begin(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Any, Any, Any]:
-        from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator  # noqa: PLC0415
+        from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
         plant = self.plant_of(top)
         simulator = Simulator(plant)
@@ -61,7 +61,7 @@ class Chain:
 
     def own_steps(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
         """Times and axes at the ends of the steps of a run to the horizon."""
-        from pydrake.systems.framework import EventStatus  # noqa: PLC0415
+        from pydrake.systems.framework import EventStatus
 
         simulator, plant, _ = self._begin(top, start, plan)
         times, axes = [], []
@@ -81,8 +81,8 @@ class Chain:
 
 
 def _plant(top: SymmetricTop) -> Any:
-    from pydrake.multibody.plant import MultibodyPlant  # noqa: PLC0415
-    from pydrake.multibody.tree import RevoluteJoint, SpatialInertia, UnitInertia  # noqa: PLC0415
+    from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.multibody.tree import RevoluteJoint, SpatialInertia, UnitInertia
 
     arm = 0.1 * top.I1**0.5
     plant = MultibodyPlant(0.0)

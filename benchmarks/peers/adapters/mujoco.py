@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.peers.common import peer
-from symtop import charts
-from symtop.integrators.registry import Integrator, Plan, Run, Solver
-from symtop.top import Angles, SymmetricTop
+from symtop.methods.registry import Integrator, Plan, Run, Solver
+from symtop.model import charts
+from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "mujoco"
 INTEGRATORS = {"RK4": ("mjINT_RK4", 4), "Euler": ("mjINT_EULER", 1), "implicit": ("mjINT_IMPLICIT", 1)}
@@ -80,7 +80,7 @@ def _matrix(quaternion: np.ndarray) -> np.ndarray:
 
 def peers() -> list[Integrator]:
     """Three of the engine's integrators; Euler is its default."""
-    import mujoco  # noqa: PLC0415
+    import mujoco
 
     return [
         peer(

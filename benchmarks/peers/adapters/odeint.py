@@ -11,9 +11,9 @@ import numpy as np
 from scipy.integrate import odeint
 
 from benchmarks.peers.common import ON_AXIS, SAME, compiled_field, peer, python_field, run_of, start_of, with_start
-from symtop.integrators.dormand_prince import LEAST_TOLERANCE
-from symtop.integrators.registry import Integrator, Plan, Run, Solver
-from symtop.top import Angles, SymmetricTop
+from symtop.methods.dormand_prince import LEAST_TOLERANCE
+from symtop.methods.registry import Integrator, Plan, Run, Solver
+from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE, DISTRIBUTION = "scipy-odeint", "scipy"
 MOST_STEPS = 1_000_000  # between two samples

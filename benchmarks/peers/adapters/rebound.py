@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.peers.common import ON_AXIS, c_field, peer, run_of, start_of
-from symtop.integrators.registry import Integrator, Plan, Run
-from symtop.top import Angles, SymmetricTop
+from symtop.methods.registry import Integrator, Plan, Run
+from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "rebound"
 MOST_STEPS = 200_000
@@ -63,7 +63,7 @@ class BulirschStoer:
 
 def peers() -> list[Integrator]:
     """One extrapolation method."""
-    import rebound  # noqa: PLC0415
+    import rebound
 
     says = f"{ON_AXIS}, right-hand side in C; eps_rel = eps_abs = the tolerance"
     return [peer("rebound-bs", BulirschStoer(rebound), says, tier="compiled")]

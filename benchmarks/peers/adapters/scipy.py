@@ -10,9 +10,9 @@ from typing import Any
 from scipy.integrate import solve_ivp
 
 from benchmarks.peers.common import ON_AXIS, SAME, compiled_field, peer, python_field, run_of, start_of
-from symtop.integrators.dormand_prince import LEAST_TOLERANCE
-from symtop.integrators.registry import Integrator, Plan, Run, Solver
-from symtop.top import Angles, SymmetricTop
+from symtop.methods.dormand_prince import LEAST_TOLERANCE
+from symtop.methods.registry import Integrator, Plan, Run, Solver
+from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "scipy"
 ORDERS = {"RK45": 5, "DOP853": 8, "LSODA": None, "Radau": 5}

@@ -9,8 +9,8 @@ import types
 from typing import Any
 
 from benchmarks.peers.common import ON_AXIS, SAME, filling_field, peer, run_of, start_of, with_start
-from symtop.integrators.registry import Integrator, Plan, Run, Solver
-from symtop.top import Angles, SymmetricTop
+from symtop.methods.registry import Integrator, Plan, Run, Solver
+from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "scikit-sundae"
 MOST_STEPS = 10_000_000
@@ -49,7 +49,7 @@ def _solver(cvode: types.ModuleType, family: str) -> Solver:
 
 def peers() -> list[Integrator]:
     """Both families of multistep methods."""
-    from sksundae import cvode  # noqa: PLC0415
+    from sksundae import cvode
 
     return [
         peer(

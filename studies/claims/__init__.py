@@ -1,0 +1,1 @@
+"""Is every declared property of an integrator true?"""

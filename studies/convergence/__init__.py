@@ -1,0 +1,1 @@
+"""At what rate does the error fall with the step?"""

@@ -1,0 +1,1 @@
+"""Does symtop reproduce the notebook it came from?"""

@@ -1,0 +1,1 @@
+"""What does modelling less buy?"""

@@ -1,0 +1,1 @@
+"""Where does each method fail, and how?"""

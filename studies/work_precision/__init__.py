@@ -1,0 +1,1 @@
+"""Which integrator is fastest at the accuracy I need?"""

@@ -1,0 +1,189 @@
+"""Labelled datasets: names and units of variables, provenance, and files that are whole or absent.
+
+Conventions are CF-1.11 where it applies. Only maps of bytes are compressed: round-off does not compress. No time stamps
+inside, so that equal inputs give equal bytes.
+"""
+
+import contextlib
+import functools
+import glob
+import hashlib
+import importlib.metadata
+import json
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop import __version__
+from symtop.base.validate import SymtopError
+
+# name: (long name, units)
+VARIABLES: dict[str, tuple[str, str]] = {
+    "time": ("elapsed time", "s"),
+    "theta": ("nutation angle", "rad"),
+    "phi": ("precession angle, unwrapped", "rad"),
+    "psi": ("spin angle, unwrapped", "rad"),
+    "axis": ("unit vector along the axis of the top, space frame", "1"),
+    "quaternion": ("attitude, body to space, (w, x, y, z)", "1"),
+    "energy": ("total energy", "kg m2 s-2"),
+    "p_theta": ("momentum conjugate to theta", "kg m2 s-1"),
+    "p_phi": ("momentum conjugate to phi, recomputed from the trajectory", "kg m2 s-1"),
+    "p_psi": ("momentum conjugate to psi, recomputed from the trajectory", "kg m2 s-1"),
+}
+
+LITTLE = 1_000_000  # bytes of a disk that count as none
+_DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")
+
+
+def _git(*words: str) -> str:
+    root = Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists():
+        return ""
+    try:
+        done = subprocess.run(  # noqa: S603
+            ["git", "-C", str(root), *words],  # noqa: S607
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+@functools.lru_cache(maxsize=1)
+def _provenance() -> tuple[tuple[str, str], ...]:
+    versions = {}
+    for package in _DEPENDENCIES:
+        try:
+            versions[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            versions[package] = "absent"
+    revision = _git("rev-parse", "--short=12", "HEAD") or "unknown"
+    dirty = bool(_git("status", "--porcelain", "--", "symtop", "studies"))
+    return (
+        ("symtop_version", __version__),
+        ("symtop_revision", revision + ("+changes" if dirty else "")),
+        ("python_version", platform.python_version()),
+        ("dependencies", json.dumps(versions, sort_keys=True)),
+        ("platform", f"{platform.system()} {platform.machine()}"),
+        ("processor", _processor()),
+    )
+
+
+def provenance() -> dict[str, str]:
+    """What made a dataset: versions, revision, machine. Flat strings, as netCDF wants them."""
+    return dict(_provenance())
+
+
+def describe(data: xr.Dataset, title: str, **attributes: Any) -> xr.Dataset:
+    """Give the variables their names and units and the dataset its provenance and attributes."""
+    for name, (long_name, units) in VARIABLES.items():
+        if name in data.variables:
+            data[name].attrs.update(long_name=long_name, units=units)
+    plain = {key: _plain(value) for key, value in attributes.items()}
+    data.attrs.update({"Conventions": "CF-1.11", "title": title, "source": "symtop", **plain, **provenance()})
+    return data
+
+
+def _plain(value: Any) -> Any:
+    """Attributes of netCDF files are strings, numbers or lists of them."""
+    if isinstance(value, (str, int, float)) and not isinstance(value, bool):
+        return value
+    return json.dumps(value, sort_keys=True, default=str)
+
+
+@contextlib.contextmanager
+def replacing(path: str | os.PathLike[str], suffix: str = "") -> Iterator[Path]:
+    """A file to write to in place of `path`, which it replaces in one move if all goes well and not at all if not.
+
+    Raises SymtopError if the disk is full, the folder cannot be written to, or `path` is a folder.
+    """
+    target = Path(path)
+    partial = ""
+    if "\0" in str(target):
+        raise SymtopError(f"a path must not hold a null character, as {str(target)!r} does")
+    try:
+        if target.is_dir():
+            raise SymtopError(f"cannot write {target}: it is a folder")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, partial = tempfile.mkstemp(prefix=f".{target.name}.", suffix=f".part{suffix}", dir=target.parent)
+        os.close(handle)
+        yield Path(partial)
+        with open(partial, "rb") as written:  # noqa: PTH123
+            os.fsync(written.fileno())
+        Path(partial).chmod(0o644)
+        Path(partial).replace(target)
+    except OSError as error:
+        raise SymtopError(f"cannot write {target}: {error.strerror or error}") from error
+    finally:
+        if partial:
+            Path(partial).unlink(missing_ok=True)
+
+
+def sweep(path: Path) -> None:
+    """Remove what writers that were killed have left of a file; for one who knows that nobody else is writing it."""
+    for left in path.parent.glob(f".{glob.escape(path.name)}.*.part*"):
+        left.unlink(missing_ok=True)
+
+
+def write(data: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write a netCDF file so that it is whole or not there, whatever happens meanwhile."""
+    encoding: dict[Any, dict[str, Any]] = {
+        name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"
+    }
+    encoding |= {name: {"zlib": True} for name, values in data.data_vars.items() if values.dtype.kind == "u"}
+    with replacing(path) as partial:
+        try:
+            data.to_netcdf(partial, engine="netcdf4", encoding=encoding)
+        except RuntimeError as error:  # the netCDF library's own word for a disk that is full
+            raise OSError(None, _room(partial.parent) or str(error)) from error
+    return Path(path)
+
+
+def _room(folder: Path) -> str:
+    """What to say if there is no room left in a folder; empty if there is."""
+    free = shutil.disk_usage(folder).free
+    return f"no room is left in {folder}" if free < LITTLE else ""
+
+
+def fingerprint(data: xr.Dataset) -> str:
+    """Hash of all values and their dimensions, so that a damaged or foreign file cannot pass for a good one."""
+    digest = hashlib.sha256()
+    for name in sorted(str(name) for name in data.variables):
+        variable = data[name]
+        values = np.ascontiguousarray(variable.values)
+        digest.update(f"{name}{variable.dims}{values.shape}".encode())
+        if values.dtype.kind in "OUT":  # text: kept as it is written, however it is stored
+            digest.update("\0".join(map(str, values.ravel())).encode())
+        else:
+            digest.update(values.dtype.kind.encode() + values.tobytes())
+    return digest.hexdigest()
+
+
+def read(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Load a netCDF file completely into memory and close it."""
+    try:
+        with xr.open_dataset(path, engine="netcdf4") as data:
+            return data.load()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise SymtopError(f"cannot read {path} as netCDF: {error}") from error

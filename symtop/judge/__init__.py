@@ -1,0 +1,1 @@
+"""Declared properties of an integrator against measured ones."""

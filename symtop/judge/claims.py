@@ -1,0 +1,376 @@
+"""The claims ledger: what an integrator says about itself, what a battery of measurements says, and a verdict.
+
+One battery judges every integrator alike, ours and a plug-in's, through nothing but its solvers:
+
+    order          slopes of the errors of attitude, theta and energy, and the limit of small steps (`claims_order`)
+    symplectic     the bracket after one step, in every chart                                          (`step_map`)
+    symmetric      one step forth and back, in every chart                                             (`step_map`)
+    energy, p_phi, p_psi, axis_length, invariant      a million steps, in every chart                  (`claims_long`)
+    explicit, work, memory                            what a step costs                                (`claims_long`)
+    pole           the axis passes a pole exactly                                                      (`claims_long`)
+
+A claim is refuted only far beyond what the measurement itself leaves in doubt; both numbers are in the ledger
+(`symtop.judge.ledger`). Nothing claimed of the energy means what the other claims imply: kept if it is among the
+conserved quantities, bounded if the method is symplectic and its step fixed (Benettin, Giorgilli, J. Stat. Phys. 74
+(1994) 1117). Work and iterations are what the solver reports; memory is what NumPy and Python allocate.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from symtop.base.validate import SymtopError
+from symtop.judge import claims_long as long
+from symtop.judge import claims_order as orders
+from symtop.judge.ledger import CLAIMS, Finding, Ledger, undecided
+from symtop.measure import step_map as maps
+from symtop.methods.registry import Integrator
+from symtop.model.scenes import Scene
+
+SCENE = "spheroid"
+CONSTANTS = ("energy", "p_phi", "p_psi", "axis_length")
+
+BAND = 0.4  # by how much a slope may differ from an order, beside its own interval: orders are whole numbers
+BESIDE = 0.7  # likewise for theta and energy, whose errors may vanish by chance within the window
+LOOSE_BAND = 0.6  # against the mean step of an adaptive method, whose steps do not all scale alike
+SYMPLECTIC = 1e-9  # a smaller defect of the bracket is none
+MET = 1e-8  # a larger one is one, if it stands out of its noise
+STANDS = 0.2  # the raw defect of a symplectic map falls to 1/256 over the widths
+RETURNED = 1e-10  # a return as close as this is exact
+MISSED = 1e-8
+ONE_MAP = 1e-9  # two steps are twice one step within this
+SHOWN = 24  # settings of the order that are kept
+FLAT = 8.0  # bytes a step: less than one number
+
+
+def declared_energy(method: Integrator) -> str:
+    """What a method claims of its energy, outright or by its other claims; empty if nothing."""
+    if method.energy_error is not None:
+        return method.energy_error
+    if "energy" in (method.conserves or ()):
+        return "kept"
+    return "bounded" if method.symplectic and method.knob == "step_size" else ""
+
+
+def judge(method: Integrator, where: Scene, *, quick: bool = False) -> Ledger:
+    """Measure every claim of a method on a scene; `quick` shortens the runs."""
+    traces: dict[str, np.ndarray] = {}
+    findings = {"order": _attempt("order", _yes_no_number(method.order), lambda: _order(method, where, quick, traces))}
+    findings |= _structure(method, where, quick, traces)
+    findings |= _over_steps(method, where, quick, traces)
+    findings["memory"] = _attempt("memory", "", lambda: _memory(method, where))
+    findings["pole"] = _attempt("pole", _pole_claim(method), lambda: _pole(method))
+    return Ledger(
+        method.name,
+        where.name,
+        tuple(findings[claim] for claim in CLAIMS),
+        traces,
+    )
+
+
+def _attempt(claim: str, declared: str, measure: Callable[[], Finding]) -> Finding:
+    try:
+        return measure()
+    except SymtopError as error:
+        return undecided(claim, declared, str(error))
+
+
+def _yes_no_number(value: bool | int | None) -> str:
+    if value is None:
+        return ""
+    return ("yes" if value else "no") if isinstance(value, bool) else str(value)
+
+
+def _agrees(*, declared: bool | None, found: bool | None) -> str:
+    if found is None:
+        return "undecided"
+    return "measured" if declared is None else "confirmed" if declared == found else "refuted"
+
+
+# ---- order -----------------------------------------------------------------------------------------------------------
+
+
+def _order(method: Integrator, where: Scene, quick: bool, traces: dict[str, np.ndarray]) -> Finding:
+    declared = _yes_no_number(method.order)
+    if method.knob is None:
+        return Finding("order", declared, "", "inapplicable", "it has no step and no tolerance")
+    found = orders.measured_order(method, where, quick=quick)
+    traces["step_size"], traces["error"], traces["fitted"] = orders.settings_shown(found, SHOWN)
+    main = found.fits[found.observed]
+    measured = str(main) if math.isfinite(main.slope) else ""
+    said = ", ".join(f"{name} {fit}" for name, fit in found.fits.items() if math.isfinite(fit.slope))
+    said = f"slopes {said} on {found.scene}" if said else "no slope"
+    if method.knob == "step_size":
+        power = method.order or 1
+        if math.isfinite(main.slope):
+            power = max(1, min(power if method.order else 99, round(main.slope)))
+        limit = orders.limit(method, where, power)
+        if limit.miss > orders.ROUNDING and limit.miss > 10.0 * limit.doubt:
+            why = f"as its step goes to zero it goes to a motion that is wrong by {limit.miss:.1e} ({said})"
+            return Finding(
+                "order", declared, f"wrong limit, {limit.miss:.0e}", "refuted" if declared else "measured", why,
+                limit.miss, orders.ROUNDING,
+            )  # fmt: skip
+    if not measured:
+        return Finding("order", declared, "", "undecided", f"{main.reason} ({said})")
+    if method.order is None:
+        return Finding("order", declared, measured, "measured", said, main.slope, main.interval)
+    band = BAND if method.knob == "step_size" else LOOSE_BAND
+    low = any(fit.slope + fit.interval < method.order - BESIDE for fit in found.fits.values())
+    off = abs(main.slope - method.order) > band + main.interval
+    if off or (low and method.knob == "step_size"):
+        why = f"the error falls with another power of the step: {said}"
+        return Finding("order", declared, measured, "refuted", why, main.slope, band + main.interval)
+    return Finding("order", declared, measured, "confirmed", said, main.slope, band + main.interval)
+
+
+# ---- structure of a step ---------------------------------------------------------------------------------------------
+
+
+class _Chart(NamedTuple):
+    """What one chart says on one question: yes, no, or neither."""
+
+    chart: str
+    answer: bool | None
+    value: float
+    resolution: float
+    why: str
+
+
+def _structure(method: Integrator, where: Scene, quick: bool, traces: dict[str, np.ndarray]) -> dict[str, Finding]:
+    brackets, returns = [], []
+    names = method.charts()[-1:] if quick else method.charts()
+    for chart in names:
+        try:
+            step, start = maps.step_map(method, chart, where)
+            defect = maps.symplectic_defect(step, start)
+            gap = maps.restart_gap(step, start)
+            brackets.append(_bracket(chart, defect, gap))
+            traces["defect_width"], traces["bracket_defect"] = defect.widths, defect.raw
+            returns.append(_returned(chart, maps.return_miss(step, start), gap))
+        except SymtopError as error:
+            unknown = _Chart(chart, None, math.nan, math.nan, undecided("", "", str(error)).why)
+            brackets.append(unknown)
+            returns.append(unknown)
+    return {
+        "symplectic": _over_charts("symplectic", method.symplectic, brackets),
+        "symmetric": _over_charts("symmetric", method.symmetric, returns),
+    }
+
+
+def _bracket(chart: str, defect: maps.Defect, gap: float) -> _Chart:
+    floor = max(3.0 * defect.noise, 1e-12)
+    shrinks = f"from {defect.raw[0]:.0e} to {defect.raw[-1]:.0e} as the differencing width shrinks 16 times"
+    if defect.size <= SYMPLECTIC and defect.noise <= SYMPLECTIC:
+        return _Chart(chart, True, defect.size, floor, f"defect of the bracket {defect.size:.0e} (it falls {shrinks})")
+    stays = f"defect of the bracket {defect.size:.1e} (it goes {shrinks})"
+    met = defect.size > max(10.0 * defect.noise, MET)
+    met = met or (defect.raw[-1] > STANDS * defect.raw[0] and defect.raw[-1] > 100.0 * MET)
+    if gap > ONE_MAP:
+        if chart != "axis" and defect.rest <= max(3.0 * defect.noise, SYMPLECTIC):
+            why = f"one number that a run takes from its start explains the defect ({defect.rest:.0e} is left)"
+            return _Chart(chart, True, defect.rest, floor, why)
+        return _Chart(chart, None, defect.size, floor, f"two steps differ from twice one step by {gap:.0e}: no one map")
+    return _Chart(chart, False if met else None, defect.size, floor, stays)
+
+
+def _returned(chart: str, miss: float, gap: float) -> _Chart:
+    why = f"a step forth and back misses the start by {miss:.1e}"
+    if miss > RETURNED and gap > ONE_MAP:
+        return _Chart(chart, None, miss, RETURNED, f"two steps differ from twice one step by {gap:.0e}: no one map")
+    return _Chart(chart, True if miss <= RETURNED else False if miss > MISSED else None, miss, RETURNED, why)
+
+
+def _over_charts(claim: str, declared: bool | None, found: list[_Chart]) -> Finding:
+    """No if any chart says no, yes if one says yes and none no."""
+    for answer in (False, True, None):
+        agreeing = [one for one in found if one.answer is answer]
+        if agreeing:
+            worst = max(agreeing, key=lambda one: one.value if math.isfinite(one.value) else -1.0)
+            words = {True: f"yes, {worst.value:.0e}", False: f"no, {worst.value:.0e}", None: ""}[answer]
+            verdict = _agrees(declared=declared, found=answer)
+            why = f"{worst.why}, in the {worst.chart} chart"
+            return Finding(claim, _yes_no_number(declared), words, verdict, why, worst.value, worst.resolution)
+    return undecided(claim, _yes_no_number(declared), "no chart could be tried")
+
+
+# ---- a million steps -------------------------------------------------------------------------------------------------
+
+
+KINDS = ("kept", "bounded", "random walk", "growing", "drift")  # from best to worst
+BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")
+
+
+def _over_steps(method: Integrator, where: Scene, quick: bool, traces: dict[str, np.ndarray]) -> dict[str, Finding]:
+    """Everything that one long run in each chart shows; the worst chart decides, and the finding names it."""
+    runs, found = [], []
+    for chart in method.charts():
+        try:
+            run = long.long_run(method, where, chart, quick=quick)
+        except SymtopError as error:
+            found.append(_unseen(method, str(error)))
+            continue
+        runs.append(run)
+        rest = [_invariant(method, run), _explicit(method, where, run), _work(method, run)]
+        found.append({one.claim: one for one in [*(_kept(method, run, claim) for claim in CONSTANTS), *rest]})
+    if runs:
+        least = min(runs, key=lambda run: run.steps)
+        traces["steps_run"], traces["nutations_run"] = np.array(least.steps), np.array(least.nutations)
+    return {
+        claim: _worst([_named(one[claim], chart) for one, chart in zip(found, method.charts(), strict=True)])
+        for claim in found[0]
+    }
+
+
+def _declared(method: Integrator, claim: str) -> str:
+    """What a method says of a claim that a long run judges."""
+    if claim == "energy":
+        return declared_energy(method)
+    if claim in CONSTANTS:
+        return "kept" if claim in (method.conserves or ()) else ""
+    own = sorted((method.conserves or frozenset()) - set(CONSTANTS))
+    return {"invariant": ", ".join(own), "explicit": _yes_no_number(method.explicit)}.get(claim, "")
+
+
+def _unseen(method: Integrator, error: str) -> dict[str, Finding]:
+    """What is left to say of a chart whose long run breaks."""
+    claims = (*CONSTANTS, "invariant", "explicit", "work")
+    return {claim: undecided(claim, _declared(method, claim), error) for claim in claims}
+
+
+def _named(found: Finding, chart: str) -> Finding:
+    """The finding with its chart, where the reason does not speak of it already."""
+    plain = found.verdict == "inapplicable" or found.why.endswith(" chart")
+    return found if plain else found._replace(why=f"{found.why}, in the {chart} chart")
+
+
+def _worst(found: list[Finding]) -> Finding:
+    """The finding that decides: by its verdict, then by the kind of growth, then by its number."""
+
+    def badness(one: Finding) -> tuple[int, int, float]:
+        kind = one.measured.split(",")[0]
+        growth = KINDS.index(kind) if kind in KINDS else -1
+        return BADNESS.index(one.verdict), growth, one.value if math.isfinite(one.value) else -1.0
+
+    return max(found, key=badness)
+
+
+def _span(run: long.LongRun) -> str:
+    steps = f"{run.steps} steps" if run.steps else "a formula"
+    return f"{steps} over {run.nutations:.3g} nutations"
+
+
+def _kept(method: Integrator, run: long.LongRun, claim: str) -> Finding:
+    declared = _declared(method, claim)
+    if claim not in run.constants:
+        return Finding(claim, declared, "", "inapplicable", f"the {run.chart} chart has no such constant")
+    return _constant(claim, declared, run, run.constants[claim])
+
+
+def _constant(claim: str, declared: str, run: long.LongRun, found: long.Constant) -> Finding:
+    kind = found.kind
+    measured = f"{kind}, {found.largest:.0e}".replace("0e+00", "0") if kind != "unknown" else ""
+    why = f"largest relative change {found.largest:.1e} in {_span(run)}, {found.a_step:.0e} in one step at most"
+    if kind not in ("kept", "unknown"):
+        why += f", growth exponent {found.exponent:.2f} +- {found.interval:.2f}"
+        if kind == "drift":
+            why += f", drifting by {found.rise / max(run.steps, 1):.1e} a step"
+    if run.outcome not in ("ok", "not_finite") or (kind in ("kept", "bounded") and run.outcome != "ok"):
+        why += f"; but the run {run.message}"
+        return Finding(claim, declared, measured, "undecided", why, found.largest, found.floor)
+    if kind == "unknown":
+        why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"
+        return Finding(claim, declared, measured, "undecided", why, found.largest, found.floor)
+    if declared == "bounded" and found.grows is None:
+        why += ", which leaves open whether it grows"
+        return Finding(claim, declared, measured, "undecided", why, found.largest, found.floor)
+    true = {"kept": kind == "kept", "bounded": not found.grows}.get(declared)
+    verdict = "measured" if true is None else "confirmed" if true else "refuted"
+    return Finding(claim, declared, measured, verdict, why, found.largest, found.floor)
+
+
+def _invariant(method: Integrator, run: long.LongRun) -> Finding:
+    """What a method claims to conserve that is not a constant of the true motion."""
+    declared = _declared(method, "invariant")
+    if not declared:
+        return Finding("invariant", "", "", "inapplicable", "it claims no invariant of its own")
+    own = declared.split(", ")
+    known = [name for name in own if name in run.constants]
+    if known != own:
+        unknown = ", ".join(name for name in own if name not in run.constants)
+        return undecided("invariant", declared, f"the battery has no formula for {unknown}")
+    worst = max(known, key=lambda name: run.constants[name].largest)
+    return _constant("invariant", "kept", run, run.constants[worst])._replace(declared=declared)
+
+
+# ---- cost and chart --------------------------------------------------------------------------------------------------
+
+
+def _explicit(method: Integrator, where: Scene, run: long.LongRun) -> Finding:
+    declared = _declared(method, "explicit")
+    if method.knob is None:
+        return Finding("explicit", declared, "", "inapplicable", "it makes no steps")
+    if run.iterations > 0.0:
+        verdict = _agrees(declared=method.explicit, found=False)
+        why = f"it reports {run.iterations:.2f} iterations a step"
+        return Finding("explicit", declared, "no", verdict, why, run.iterations, 0.0)
+    stages = 0
+    if method.knob == "tolerance" and not run.steady_cost:
+        try:
+            stages = long.cost_of_an_attempt(method, where, run.chart)
+        except SymtopError as error:
+            return undecided("explicit", declared, str(error))
+    if run.steady_cost or stages > 1:
+        cost = f"{run.evaluations:.2f} forces a step, always"
+        if stages > 1:
+            cost = f"forces by the {stages}: so many for each step, accepted or rejected"
+        if method.explicit is False:
+            why = f"it reports no iterations and {cost}; so does a method that solves linear equations"
+            return Finding("explicit", declared, "", "undecided", why, 0.0, 0.0)
+        verdict = _agrees(declared=method.explicit, found=True)
+        return Finding("explicit", declared, "yes", verdict, f"it reports no iterations and {cost}", 0.0, 0.0)
+    return undecided("explicit", declared, "it reports no iterations, but its steps do not all cost the same")
+
+
+def _work(method: Integrator, run: long.LongRun) -> Finding:
+    if method.knob is None:
+        return Finding("work", "", "", "inapplicable", "it makes no steps")
+    solves = f" and {run.iterations:.2f} iterations" if run.iterations else ""
+    why = f"{run.evaluations:.2f} force evaluations{solves} a step, in {_span(run)}"
+    short = f"{run.evaluations:.1f}" + (f" ({run.iterations:.1f} it.)" if run.iterations else "")
+    return Finding("work", "", short, "measured", why, run.evaluations, 0.0)
+
+
+def _memory(method: Integrator, where: Scene) -> Finding:
+    if method.knob is None:
+        return Finding("memory", "", "", "inapplicable", "it makes no steps")
+    size = long.memory_a_step(method, where)
+    flat = size < FLAT
+    why = f"{size} bytes for each further step" + (", which is none" if flat else "")
+    return Finding("memory", "", "flat" if flat else f"{size} B a step", "measured", why, float(size), FLAT)
+
+
+def _pole_claim(method: Integrator) -> str:
+    return "no pole" if set(method.solvers) & {"axis", "attitude"} else ""
+
+
+def _pole(method: Integrator) -> Finding:
+    declared, found = _pole_claim(method), long.passages(method)
+    said = "; ".join(
+        f"{one.chart}: passes, off by {one.error:.0e} and {one.finer:.0e} with finer steps" if one.passes
+        else f"{one.chart}: ends there ({one.outcome})" if one.outcome != "ok"
+        else f"{one.chart}: comes out wrong by {one.error:.0e}, {one.finer:.0e} with finer steps"
+        for one in found
+    )  # fmt: skip
+    judged = [one for one in found if one.chart != "angles"] or found
+    words = ["passes" if one.passes else "wrong" if one.outcome == "ok" else "ends there" for one in judged]
+    measured = ", ".join(dict.fromkeys(words))
+    worst = max(one.finer for one in judged)
+    if not declared:
+        return Finding("pole", declared, measured, "measured", said, worst, long.POLE_RIGHT)
+    if any(one.outcome not in ("ok", "left_chart", "not_finite") for one in judged):
+        return Finding("pole", declared, measured, "undecided", said, worst, long.POLE_RIGHT)
+    verdict = "confirmed" if all(one.passes for one in judged) else "refuted"
+    return Finding("pole", declared, measured, verdict, said, worst, long.POLE_RIGHT)

@@ -1,0 +1,271 @@
+"""What a million steps do to the constants of the motion, what a step costs, and what happens at a pole.
+
+A constant is kept if after n steps it is off by no more than `KEPT`, relative, or by the random walk that the rounding
+seen in one step makes, n^1/2 times as much: a bias beyond a thousandth of that rounding is seen in a million steps.
+An energy that is not kept is bounded, a random walk or a drift by the exponent of its growth (0, 1/2, 1) if its 95 %
+interval excludes the others (`symtop.measure.growth.behaviour`), and else just growing. A drift that hides below a
+bounded oscillation shows in the means of 24 equal stretches, and counts if the line through them exceeds `SURE` of its
+own intervals. Random walks pass a plain test of the slope in one case in three; this one they do not pass, and at the
+size of rounding nothing but the size is judged. Every chart of a method makes its own run.
+
+A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau, whatever its tau: c is fitted, and it
+is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
+
+Python solvers are too slow for a million steps: they run for as many as `EVALUATIONS` allow, and the ledger says so.
+"""
+
+import dataclasses
+import math
+import tracemalloc
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from symtop.measure.conservation import residuals, trend
+from symtop.measure.errors import errors
+from symtop.measure.growth import behaviour, growth
+from symtop.methods.registry import Integrator
+from symtop.model.scenes import Scene
+from symtop.model.top import Angles, SymmetricTop
+from symtop.run.reference import reference
+from symtop.run.simulation import simulate
+
+Array = NDArray[np.float64]
+
+STEPS, QUICK_STEPS = 1_000_000, 50_000
+STEPS_A_NUTATION = 118.02
+FINER = (1.0, 3.17, 10.03)  # times more, if a run does not reach its end
+SAMPLES = 4001
+PILOT = 400  # steps of the run that is sampled at every step
+EVALUATIONS = {"compiled": 2e8, "python": 4e4}
+TOLERANCE = 1e-6  # of an adaptive method without a default of its own
+SLOW = {"taylor-quad": 0.002}  # quadruple precision is software
+KEPT = 1e-11
+ROUNDING = 2e-13  # a change in one step that may be rounding, where |p| is small beside what makes it up
+BOUNDED = 0.25  # an exponent that exceeds it with its whole interval is growth
+SURE = 8.0
+ATTEMPTS = 12  # runs that show what an attempt at a step costs
+VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
+
+
+class Constant(NamedTuple):
+    """What became of one constant of the motion."""
+
+    largest: float  # relative change
+    a_step: float  # largest change in one step
+    exponent: float  # of its growth with time
+    interval: float
+    floor: float  # a smaller change is rounding
+    rise: float  # of the line through the means over the whole run
+    certain: float  # the rise in units of its 95 % interval
+
+    @property
+    def kind(self) -> str:
+        """kept, bounded, random walk, drift, or just growing; unknown without a size or an exponent to judge it by."""
+        found = behaviour(self.largest, self.exponent, self.interval, self.floor)
+        if found == "kept":
+            return found
+        if not (math.isfinite(self.largest) and math.isfinite(self.exponent)):
+            return "unknown"
+        drifts = abs(self.certain) > SURE and abs(self.rise) > VISIBLE * self.largest
+        return "drift" if drifts else found
+
+    @property
+    def grows(self) -> bool | None:
+        """Is it beyond doubt that it grows? None if the exponent leaves that open."""
+        if self.kind in ("kept", "bounded", "unknown"):
+            return None if self.kind == "unknown" else False
+        return True if self.kind == "drift" or self.exponent - self.interval > BOUNDED else None
+
+
+class LongRun(NamedTuple):
+    """One long run: its constants by name, and its cost."""
+
+    constants: dict[str, Constant]
+    outcome: str
+    message: str
+    chart: str
+    steps: int
+    nutations: float
+    evaluations: float  # of the force, a step
+    iterations: float  # of a solver, a step
+    steady_cost: bool  # every run of the same number of steps cost the same, at two step sizes
+
+
+def _period(where: Scene) -> float:
+    return where.nutation_period if math.isfinite(where.nutation_period) else where.horizon / 8.0
+
+
+def _run(method: Integrator, where: Scene, steps: float, step: float, samples: int) -> xr.Dataset:
+    """A run for `steps` times `step`: of that many steps, or for that time at the tolerance."""
+    if method.knob == "step_size":
+        return simulate(
+            where, method, step_size=step, horizon=round(steps) * step, samples=samples, observe="axis", guard=False
+        )
+    given = None if method.knob is None or method.default_tolerance is not None else TOLERANCE
+    return simulate(where, method, tolerance=given, horizon=steps * step, samples=samples, observe="axis", guard=False)
+
+
+def in_chart(method: Integrator, chart: str) -> Integrator:
+    """The method with nothing but its solver of one chart."""
+    return dataclasses.replace(method, solvers={chart: method.solvers[chart]})
+
+
+def long_run(method: Integrator, where: Scene, chart: str, *, quick: bool = False) -> LongRun:
+    """A million steps of a compiled method in one of its charts, fewer where that would take minutes."""
+    method = in_chart(method, chart)
+    for finer in FINER:  # a motion that passes close to a pole needs shorter steps
+        step = _period(where) / (STEPS_A_NUTATION * finer)
+        pilot = _run(method, where, PILOT, step, PILOT + 1)
+        cost = max(float(pilot.attrs["force_evaluations"]) / PILOT, 1.0)
+        most = QUICK_STEPS if quick else STEPS
+        steps = min(most, EVALUATIONS[method.tier] / cost) * SLOW.get(method.name, 1.0)
+        if method.knob is None:
+            steps = PILOT  # a formula has no steps: nothing adds up
+        run = _run(method, where, max(steps, PILOT), step, SAMPLES)
+        if run.attrs["outcome"] == "ok" or method.knob != "step_size":
+            break
+    other = _run(method, where, PILOT, 0.21 * step, PILOT + 1)
+    made = max(int(run.attrs["steps"]), 1)
+    found, small = constants(where, run), constants(where, pilot)
+    return LongRun(
+        {name: _judged(run["time"].values, values, small[name], made) for name, values in found.items()},
+        str(run.attrs["outcome"]),
+        str(run.attrs["outcome_message"]),
+        str(run.attrs["chart"]),
+        int(run.attrs["steps"]),
+        float(run.attrs["reached_time"]) / _period(where),
+        float(run.attrs["force_evaluations"]) / made,
+        float(run.attrs["newton_iterations"]) / made,
+        len({data.attrs["force_evaluations"] / max(data.attrs["steps"], 1) for data in (pilot, other)}) == 1,
+    )
+
+
+def constants(where: Scene, run: xr.Dataset) -> dict[str, Array]:
+    """Relative change of every constant that the run's chart has, at its samples."""
+    found = residuals(where, run)
+    if run.attrs["chart"] != "angles":
+        found["axis_length"] = np.linalg.norm(run["axis"].values, axis=1) - 1.0
+    if run.attrs["chart"] != "angles" and math.isfinite(run.attrs["step_size"]):
+        found["cayley_energy"] = _cayley_residual(where.top, run)
+    return found
+
+
+def _cayley_residual(top: SymmetricTop, run: xr.Dataset) -> Array:
+    """|L|^2/2 + c u - k^2 (1-u^2)/8 with the best c, relative to its size; |L|^2 is in the energy."""
+    u = run["axis"].values[:, 2]
+    spin: Array = 0.5 * run["p_psi"].values ** 2 * (1.0 / top.I3 - 1.0 / top.I1)
+    square: Array = top.I1 * (run["energy"].values - top.mgl * u - spin)  # |L|^2 / 2
+    kick = float(run.attrs["step_size"]) * top.mgl
+    rest = square - kick * kick * (1.0 - u) * (1.0 + u) / 8.0
+    good = np.isfinite(rest) & np.isfinite(u)
+    if good.sum() < 8 or np.ptp(u[good]) == 0.0:
+        return np.full(u.size, math.nan)
+    du, dr = u[good] - u[good].mean(), rest[good] - rest[good].mean()
+    c = -float(du @ dr) / float(du @ du)
+    whole: Array = rest + c * u
+    relative: Array = (whole - whole[0]) / float(np.max(np.abs(rest[good])))
+    return relative
+
+
+def _judged(time: Array, values: Array, every_step: Array, steps: int) -> Constant:
+    """Size, growth and trend of a residual over so many steps; `every_step` holds it at consecutive ones."""
+    size = np.abs(values[np.isfinite(values)])
+    jumps = np.abs(np.diff(every_step))
+    jumps = jumps[np.isfinite(jumps)]
+    power, line = growth(time, values), trend(time, values)
+    sure = abs(line.slope) / line.interval if line.interval > 0.0 else 0.0
+    a_step = float(jumps.max()) if jumps.size else math.nan
+    floor = max(KEPT, a_step * math.sqrt(steps)) if a_step <= ROUNDING else KEPT
+    largest = float(size.max()) if size.size else math.nan
+    return Constant(largest, a_step, power.slope, power.interval, floor, line.rise, sure)
+
+
+def cost_of_an_attempt(method: Integrator, where: Scene, chart: str) -> int:
+    """The number of forces that every step of an adaptive method comes in, rejected ones too; 1 if they vary.
+
+    A run costs the same number for its start and s forces for each attempt of a method with s stages: the costs of
+    `ATTEMPTS` runs to different times at different tolerances differ by multiples of s. Where a solver iterates until
+    it converges, they have no common divisor; by chance they had 2 in one case in 2000.
+    """
+    only, costs = in_chart(method, chart), []
+    for k in range(ATTEMPTS):
+        tolerance = max(10.0 ** (-4.0 - 0.4 * k), method.least_tolerance)
+        horizon = (1.37 + 0.23 * k) * _period(where)
+        run = simulate(where, only, tolerance=tolerance, horizon=horizon, samples=2, guard=False)
+        if run.attrs["outcome"] != "ok":
+            return 1
+        costs.append(int(run.attrs["force_evaluations"]))
+    return max(math.gcd(*(cost - costs[0] for cost in costs)), 1) if len(set(costs)) > ATTEMPTS // 2 else 1
+
+
+POINTER = 8  # bytes
+
+
+def memory_a_step(method: Integrator, where: Scene) -> int:
+    """Bytes that a run keeps for each further step, by Python's own count of what NumPy and Python allocate.
+
+    In whole pointers: nothing smaller can be kept, and fractions of one are what Python happens to hold at the moment.
+    """
+    few = max(100, round((4_000 if method.tier == "compiled" else 200) * min(1.0, 20.0 * SLOW.get(method.name, 1.0))))
+    step = _period(where) / STEPS_A_NUTATION
+    peaks, made = [], []
+    _run(method, where, few, step, 11)  # whatever is made once is made here
+    for steps in (few, 6 * few):
+        tracemalloc.start()
+        try:
+            made.append(int(_run(method, where, steps, step, 11).attrs["steps"]))
+            peaks.append(tracemalloc.get_traced_memory()[1])
+        finally:
+            tracemalloc.stop()
+    return POINTER * round(max(peaks[1] - peaks[0], 0) / max(made[1] - made[0], 1) / POINTER)
+
+
+# the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1
+_POLE_RATE = 0.5 / math.cos(0.5) ** 2
+POLE = Scene(
+    "pole",
+    SymmetricTop(1.0, 1.0, 1.0),
+    Angles(theta=1.0, theta_dot=-1.2, phi_dot=_POLE_RATE, psi_dot=1.0 - _POLE_RATE * math.cos(1.0)),
+    4.0,
+)
+POLE_STEPS = 400
+POLE_RIGHT = 1e-7  # rad: right, whatever the step
+
+
+class Passage(NamedTuple):
+    """What a method did in one chart when the axis passed a pole."""
+
+    chart: str
+    outcome: str
+    error: float  # of the axis, rad
+    finer: float  # with half the step or a tenth of the tolerance
+
+    @property
+    def passes(self) -> bool:
+        """Did it come out on the other side, with an error that falls with the step?"""
+        return self.outcome == "ok" and (self.finer < 0.7 * self.error or self.finer < POLE_RIGHT)
+
+
+def passages(method: Integrator) -> list[Passage]:
+    """What happens at a pole, in every chart of the method."""
+    found = []
+    for chart in method.charts():
+        only = in_chart(method, chart)
+        ends, errors_there = [], []
+        for finer in (1.0, 2.0):
+            step = POLE.horizon / (POLE_STEPS * finer)
+            knob = {"step_size": step} if method.knob == "step_size" else {}
+            if method.knob == "tolerance":
+                knob = {"tolerance": max(10.0 ** (-5.0 - finer), method.least_tolerance)}
+            run = simulate(
+                POLE, only, samples=201, observe="axis" if chart != "attitude" else "attitude", guard=False, **knob
+            )
+            truth = reference(POLE, run["time"].values, precision="closed-form")
+            ends.append(str(run.attrs["outcome"]))
+            miss = errors(POLE, run, truth)["axis"].values
+            errors_there.append(float(np.nanmax(miss)) if np.isfinite(miss).any() else math.nan)
+        found.append(Passage(chart, next((end for end in ends if end != "ok"), "ok"), *errors_there))
+    return found

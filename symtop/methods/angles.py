@@ -1,0 +1,49 @@
+"""The angles chart for kernels: state (theta, p_theta, phi, psi), parameters with both momenta.
+
+The chart ends at theta = 0 and pi. p_phi and p_psi enter as parameters, so every kernel of this chart must
+show them again from the increments that it produced (`observe` in `drive`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from symtop.base.validate import SymtopError
+from symtop.methods.compiled import register_jitable
+from symtop.methods.outcomes import LEFT_CHART, NOT_FINITE, OK
+from symtop.model.top import Angles, SymmetricTop
+
+
+class ReducedTop(NamedTuple):
+    """The top and its conserved momenta."""
+
+    I1: float
+    I3: float
+    mgl: float
+    p_psi: float
+    north: float  # p_phi - p_psi
+    south: float  # p_phi + p_psi
+
+
+@register_jitable
+def chart_outcome(theta: float) -> int:
+    """Is theta still a point of the chart?"""
+    if 0.0 < theta < np.pi:
+        return OK
+    if np.isfinite(theta):
+        return LEFT_CHART
+    return NOT_FINITE
+
+
+def require_chart(at: Angles) -> None:
+    """Refuse a start at a pole, where phi and psi have no meaning of their own."""
+    if not 0.0 < at.theta < np.pi:
+        raise SymtopError(f"theta must lie inside (0, pi) for an integrator in the angles chart, not {at.theta!r}")
+
+
+def reduced(top: SymmetricTop, at: Angles) -> tuple[ReducedTop, tuple[float, ...]]:
+    """Kernel parameters and state of a start; p_theta0 = dL/dtheta' is the discrete Legendre transform's start."""
+    require_chart(at)
+    momenta = top.momenta(at)
+    par = ReducedTop(top.I1, top.I3, top.mgl, momenta.p_psi, momenta.north, momenta.south)
+    return par, (at.theta, top.I1 * at.theta_dot, at.phi, at.psi)

@@ -1,0 +1,215 @@
+"""Dormand-Prince 5(4) with SciPy's step control, the whole loop compiled.
+
+    k_1 = f(y) (the last stage of the step before: first same as last),   k_i = f(y + h sum_{j<i} a_ij k_j),  i = 2 .. 6
+    y+ = y + h sum_i b_i k_i  (order 5),    k_7 = f(y+),    err = h sum_i e_i k_i  (order 5 minus order 4)
+    |err| = rms(err_m / (atol + rtol max(|y_m|, |y+_m|)))  must be below 1
+    h <- h min(10, .9 |err|^(-1/5)) after a step (min(1, ..) after a rejection),  h max(.2, .9 |err|^(-1/5)) rejected
+    y(t + x h) = y + h sum_i k_i (p_i1 x + p_i2 x^2 + p_i3 x^3 + p_i4 x^4)     samples between steps, order 4
+
+`rk45-compiled` is the same method as `rk45` on the same six equations (see `euler_lagrange`): it accepts and rejects
+the same steps, so that their times differ only by what Python costs and their errors not at all. It exists to keep
+the language out of a comparison of methods. Order 5, explicit, six evaluations a step; nothing is conserved.
+Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19; the interpolant: Shampine, Math. Comp. 46 (1986) 135;
+the initial step: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.4.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.cpython.unsafe.tuple import tuple_setitem
+from numpy.typing import NDArray
+
+from symtop.methods.angles import chart_outcome
+from symtop.methods.compiled import compile_kernel, register_jitable
+from symtop.methods.euler_lagrange import LEAST_TOLERANCE, as_run, field_angles, unreduced
+from symtop.methods.outcomes import NOT_FINITE, OK, OUT_OF_BUDGET, OUTCOMES, STEP_TOO_SMALL
+from symtop.methods.registry import Array, Integrator, Plan, Run
+from symtop.methods.runge_kutta import later_stages, store, weighted
+from symtop.model.top import Angles, SymmetricTop
+
+BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
+EVALUATIONS = 2_000_000_000  # a run's limit: about two minutes
+
+SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
+
+
+class Embedded(NamedTuple):
+    """An embedded pair: the tableau, the weights of its error estimate and those of its interpolant."""
+
+    a: tuple[float, ...]  # strict lower triangle without the last row, which is b
+    b: tuple[float, ...]
+    error: tuple[float, ...]
+    dense: tuple[tuple[float, ...], ...]  # one polynomial in x = (t - t_old)/h for each stage, without constant
+
+
+DORMAND_PRINCE = Embedded(
+    a=(
+        *(1 / 5,),
+        *(3 / 40, 9 / 40),
+        *(44 / 45, -56 / 15, 32 / 9),
+        *(19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
+        *(9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
+    ),
+    b=(35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+    error=(-71 / 57600, 0.0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40),
+    dense=(
+        (1.0, -8048581381 / 2820520608, 8663915743 / 2820520608, -12715105075 / 11282082432),
+        (0.0, 0.0, 0.0, 0.0),
+        (0.0, 131558114200 / 32700410799, -68118460800 / 10900136933, 87487479700 / 32700410799),
+        (0.0, -1754552775 / 470086768, 14199869525 / 1410260304, -10690763975 / 1880347072),
+        (0.0, 127303824393 / 49829197408, -318862633887 / 49829197408, 701980252875 / 199316789632),
+        (0.0, -282668133 / 205662961, 2019193451 / 616988883, -1453857185 / 822651844),
+        (0.0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423),
+    ),
+)
+
+
+@register_jitable
+def _plus(state: Any, step: Any) -> Any:
+    total = state
+    for m in range(len(state)):
+        total = tuple_setitem(total, m, state[m] + step[m])
+    return total
+
+
+@register_jitable
+def _rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
+    """Root mean square of a vector in units of what is allowed, tolerance (1 + |y|)."""
+    total = 0.0
+    for m in range(len(vector)):
+        part = vector[m] / (tolerance + max(abs(state[m]), abs(other[m])) * tolerance)
+        total += part * part
+    return math.sqrt(total / len(vector))
+
+
+@register_jitable
+def _interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any:
+    """The state at a fraction x of the step."""
+    weights = dense[0] + dense[1][:3]  # a tuple of seven
+    for i in range(len(dense)):
+        row = dense[i]
+        weights = tuple_setitem(weights, i, x * (row[0] + x * (row[1] + x * (row[2] + x * row[3]))))
+    return _plus(state, weighted(weights, state, slopes, h))
+
+
+@register_jitable
+def _try_steps(
+    par: Any, pair: Any, state: Any, slopes: Any, tolerance: float, t: float, step: float, end: float
+) -> Any:
+    """Shrink the step until its error passes: new state, new time, next step, evaluations, outcome."""
+    least = 10.0 * (np.nextafter(t, np.inf) - t)
+    step = max(step, least)
+    grow = GROW
+    evaluations = 0
+    while step >= least:
+        after = min(t + step, end)
+        h = after - t
+        later_stages(field_angles, par, pair.a, len(pair.b), state, slopes, h)
+        new = _plus(state, weighted(pair.b, state, slopes, h))
+        store(slopes, len(pair.b), field_angles(par, new))
+        evaluations += len(pair.b)
+        error = _rms(weighted(pair.error, state, slopes, h), state, new, tolerance)
+        change = GROW if error == 0.0 else SAFETY * error**-0.2
+        if error < 1.0:
+            return new, after, h * min(grow, change), evaluations, OK
+        step = h * (change if change > SHRINK else SHRINK)  # noqa: FURB136  (max would pass NaN on)
+        grow = 1.0
+    return state, t, step, evaluations, STEP_TOO_SMALL
+
+
+def march(  # type: ignore[no-untyped-def]
+    par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, found, ends
+):
+    """Steps until the end, a failure or `budget` evaluations; `found` takes the samples, `ends` the first step ends."""
+    evaluations = 0
+    outcome = OK
+    while t < end and outcome == OK and evaluations < budget:
+        before, start = state, t
+        state, t, step, effort, outcome = _try_steps(par, pair, before, slopes, tolerance, start, step, end)
+        evaluations += effort
+        if outcome != OK:
+            break
+        if steps < len(ends):
+            ends[steps] = t
+        steps += 1
+        while seen < len(times) and times[seen] <= t:
+            store(found, seen, _interpolate(pair.dense, before, slopes, t - start, (times[seen] - start) / (t - start)))
+            seen += 1
+        outcome = chart_outcome(state[0])
+        for m in range(len(state)):
+            slopes[0, m] = slopes[len(pair.b), m]
+            if not np.isfinite(state[m]):
+                outcome = NOT_FINITE
+    return state, t, step, steps, seen, evaluations, outcome
+
+
+march = compile_kernel(march, march)
+
+
+def first_step(par: Any, state: tuple[float, ...], end: float, tolerance: float) -> float:
+    """SciPy's initial step: 1 % of |y|/|f|, then from the size of the second derivative; two evaluations of f."""
+    slope = field_angles(par, state)
+    d0, d1 = _rms(state, state, state, tolerance), _rms(slope, state, state, tolerance)
+    trial = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, end)
+    moved = field_angles(par, tuple(y + trial * f for y, f in zip(state, slope, strict=True)))
+    d2 = _rms(tuple(x - y for x, y in zip(moved, slope, strict=True)), state, state, tolerance) / trial
+    guess = max(1e-6, 1e-3 * trial) if max(d1, d2) <= 1e-15 else (0.01 / max(d1, d2)) ** 0.2
+    return float(min(100.0 * trial, guess, end))
+
+
+class Walk(NamedTuple):
+    """What one adaptive run returns."""
+
+    found: Array  # (samples, 6), NaN after a failure
+    ends: NDArray[np.float64]  # times at the ends of the accepted steps, as many as were asked for
+    steps: int
+    evaluations: int
+    outcome: str
+    reached: float
+
+
+def walk(top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_PRINCE, record: int = 0) -> Walk:
+    """Integrate to the horizon; the ends of the first `record` steps are kept."""
+    par, state = unreduced(top, start)
+    found, ends = np.full((plan.times.size, len(state)), np.nan), np.full(record, np.nan)
+    slopes = np.empty((len(pair.error), len(state)))
+    slopes[0] = field_angles(par, state)
+    t, step = 0.0, first_step(par, state, plan.horizon, plan.tolerance)
+    steps, seen, evaluations, outcome = 0, 0, 2, OK
+    budget = plan.most(EVALUATIONS)
+    block = int(min(BLOCK, budget))
+    while t < plan.horizon and outcome == OK:
+        state, t, step, steps, seen, effort, outcome = march(
+            par, pair, plan.tolerance, plan.horizon, plan.times, block, state, slopes, t, step, steps, seen, found, ends
+        )
+        evaluations += effort
+        if outcome == OK and t < plan.horizon and evaluations > budget:
+            outcome = OUT_OF_BUDGET
+    return Walk(found, ends[:steps], steps, evaluations, OUTCOMES[outcome], plan.horizon if outcome == OK else t)
+
+
+def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+    """A solver of the registry."""
+    done = walk(top, start, plan)
+    return as_run(top, plan.times, done.found, done.steps, done.evaluations, done.outcome, done.reached)
+
+
+def built_in() -> list[Integrator]:
+    """Dormand and Prince's pair."""
+    return [
+        Integrator(
+            name="rk45-compiled",
+            family="runge-kutta",
+            summary="Dormand-Prince with SciPy's step control on the unreduced equations, compiled",
+            solvers={"angles": solve},
+            knob="tolerance",
+            order=5,
+            explicit=True,
+            symplectic=False,
+            symmetric=False,
+            conserves=frozenset(),
+            least_tolerance=LEAST_TOLERANCE,
+            reference="dormand-prince-1980",
+        ),
+    ]

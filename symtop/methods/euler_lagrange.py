@@ -1,0 +1,84 @@
+"""The unreduced chart for kernels and libraries: state (theta, phi, psi, theta', phi', psi'), nothing eliminated.
+
+The Euler-Lagrange equations, solved for the accelerations:
+
+    theta'' = sin(theta) [phi' (I1 phi' cos(theta) - I3 w3) + mgl] / I1,     w3 = psi' + phi' cos(theta)
+    phi''   = theta' (I3 w3 - 2 I1 phi' cos(theta)) / (I1 sin(theta))
+    psi''   = theta' phi' sin(theta) - phi'' cos(theta)
+
+Energy, p_phi and p_psi are functions of the state and parameters of nothing, so that every method is free to let them
+drift; in the reduced state (theta, p_theta, phi, psi) the momenta are parameters, and a drift that is there cannot
+be seen. The chart ends at theta = 0 and pi. Source: Goldstein, Classical Mechanics, section 5.7.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.methods.angles import require_chart
+from symtop.methods.compiled import register_jitable
+from symtop.methods.registry import Array, Run
+from symtop.model.top import Angles, SymmetricTop
+
+LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws the line
+
+
+class UnreducedTop(NamedTuple):
+    """The numbers of the top that the unreduced equations need."""
+
+    I1: float
+    I3: float
+    mgl: float
+
+
+@register_jitable
+def accelerations(I1: Any, I3: Any, mgl: Any, theta: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any) -> Any:
+    """theta'', phi'' and psi'' on floats; NaN exactly at a pole. Plain Python as it stands, and compiles."""
+    s, c = math.sin(theta), math.cos(theta)
+    if s == 0.0:  # compiled code would raise where it divides, and lose the run
+        return math.nan, math.nan, math.nan
+    spin = I3 * (psi_dot + phi_dot * c)
+    theta_ddot = s * (phi_dot * (I1 * phi_dot * c - spin) + mgl) / I1
+    phi_ddot = theta_dot * (spin - 2.0 * I1 * phi_dot * c) / (I1 * s)
+    return theta_ddot, phi_ddot, theta_dot * phi_dot * s - phi_ddot * c
+
+
+@register_jitable
+def field_angles(par: Any, y: Any) -> Any:
+    """Time derivative of the state."""
+    theta_ddot, phi_ddot, psi_ddot = accelerations(par.I1, par.I3, par.mgl, y[0], y[3], y[4], y[5])
+    return y[3], y[4], y[5], theta_ddot, phi_ddot, psi_ddot
+
+
+def unreduced(top: SymmetricTop, at: Angles) -> tuple[UnreducedTop, tuple[float, ...]]:
+    """Kernel parameters and state of a start."""
+    require_chart(at)
+    state = (at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot)
+    return UnreducedTop(top.I1, top.I3, top.mgl), state
+
+
+@register_jitable
+def momenta(par: Any, theta: Any, phi_dot: Any, psi_dot: Any) -> Any:
+    """p_phi and p_psi of angles and rates, floats or arrays."""
+    s, c = np.sin(theta), np.cos(theta)
+    p_psi = par.I3 * (psi_dot + phi_dot * c)
+    return par.I1 * phi_dot * s * s + p_psi * c, p_psi
+
+
+def observe_angles(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+    """p_phi and p_psi of the state after the step."""
+    return momenta(par, before[0] + dstate[0], before[4] + dstate[4], before[5] + dstate[5])
+
+
+def to_angles(par: Any, times: Array, states: Array) -> Array:
+    """Unreduced states, shape (samples, 6), as (theta, p_theta, phi, psi), the angles chart of `simulate`."""
+    return np.stack([states[:, 0], par.I1 * states[:, 3], states[:, 1], states[:, 2]], axis=-1)
+
+
+def as_run(
+    top: SymmetricTop, times: Array, found: Array, steps: int, evaluations: int, outcome: str, reached: float
+) -> Run:
+    """Samples of the unreduced state, shape (samples, 6), with p_theta and both momenta recomputed from the rates."""
+    p_phi, p_psi = momenta(top, found[:, 0], found[:, 4], found[:, 5])
+    return Run(to_angles(top, times, found), p_phi, p_psi, steps, evaluations, 0, outcome, reached)

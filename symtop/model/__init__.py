@@ -1,0 +1,1 @@
+"""The top: its equations, charts, scenes and exact motion."""

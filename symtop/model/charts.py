@@ -1,0 +1,181 @@
+"""The three charts of the top, the maps between them, and distances that no chart can distort.
+
+    angles    theta, p_theta, phi, psi; p_phi and p_psi are parameters    singular at theta = 0, pi
+    axis      e (3), L (3), space frame                                   singular nowhere
+    attitude  q (4), L (3), space frame                                   singular nowhere
+
+``q = (w, x, y, z)`` turns body vectors into space vectors, ``q = exp(phi k/2) exp(theta i/2) exp(psi k/2)``:
+
+    q = (cos x cos s, sin x cos d, sin x sin d, cos x sin s),   x = theta/2, s = (phi+psi)/2, d = (phi-psi)/2
+
+and ``e = q k q*``. In the space frame, with n = (cos phi, sin phi, 0) the line of nodes,
+``L = I1 theta' n + I1 phi' sin theta (e x n) + I3 w3 e``; then ``p_psi = L.e``, ``p_phi = L_z``,
+``p_theta = L.n``. Source: Marsden and Ratiu, Introduction to Mechanics and Symmetry, chapter 15.
+
+Distances are the angles of the smallest rotation, accurate for small angles: ``atan2(|a x b|, a.b)`` for
+axes, ``4 asin(|q - q'|/2)`` with the nearer sign for attitudes (2 acos has a floor of 1e-8).
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop.model.top import Angles, SymmetricTop
+
+Array = NDArray[np.float64]
+
+CHARTS = ("angles", "axis", "attitude")
+
+
+def axis_from_angles(theta: Any, phi: Any) -> Array:
+    """Unit vector along the top's axis, shape (..., 3)."""
+    return _stacked(axis_parts(np, theta, phi))
+
+
+def quaternion_from_angles(theta: Any, phi: Any, psi: Any) -> Array:
+    """Unit quaternion (w, x, y, z) from body to space, shape (..., 4)."""
+    return _stacked(quaternion_parts(np, theta, phi, psi))
+
+
+def momentum_from_angles(top: SymmetricTop, theta: Any, phi: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any) -> Array:
+    """Angular momentum in the space frame, shape (..., 3): its three terms are along n, e x n and e."""
+    return _stacked(momentum_parts(np, top, theta, phi, theta_dot, phi_dot, psi_dot))
+
+
+def space_state(chart: str, top: SymmetricTop, at: Angles) -> Array:
+    """State (e, L) or (q, L) of a start in one of the space-frame charts."""
+    return np.array(space_numbers(chart, top, at))
+
+
+def space_numbers(chart: str, top: SymmetricTop, at: Angles) -> tuple[float, ...]:
+    """The same as plain numbers, for a kernel."""
+    place = axis_parts(math, at.theta, at.phi) if chart == "axis" else quaternion_parts(math, at.theta, at.phi, at.psi)
+    return *place, *momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
+
+
+# the formulas themselves, on the functions of `math` for a single state (2 us, and 9 us on those of NumPy) or of mpmath
+
+
+def axis_parts(of: Any, theta: Any, phi: Any) -> tuple[Any, ...]:
+    """The axis, by the sine and cosine of a module."""
+    sine = of.sin(theta)
+    return sine * of.sin(phi), -sine * of.cos(phi), of.cos(theta)
+
+
+def quaternion_parts(of: Any, theta: Any, phi: Any, psi: Any) -> tuple[Any, ...]:
+    """The quaternion, by the sine and cosine of a module."""
+    half, total, difference = 0.5 * theta, 0.5 * (phi + psi), 0.5 * (phi - psi)
+    cosine, sine = of.cos(half), of.sin(half)
+    return cosine * of.cos(total), sine * of.cos(difference), sine * of.sin(difference), cosine * of.sin(total)
+
+
+def momentum_parts(
+    of: Any, top: SymmetricTop, theta: Any, phi: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any
+) -> tuple[Any, ...]:
+    """The angular momentum, by the sine and cosine of a module."""
+    s, c, sin_phi, cos_phi = of.sin(theta), of.cos(theta), of.sin(phi), of.cos(phi)
+    nod, swing, spin = top.I1 * theta_dot, top.I1 * phi_dot * s, top.I3 * (psi_dot + phi_dot * c)
+    across = spin * s - swing * c
+    return nod * cos_phi + across * sin_phi, nod * sin_phi - across * cos_phi, swing * s + spin * c
+
+
+def _stacked(components: tuple[Any, ...]) -> Array:
+    return np.stack(np.broadcast_arrays(*components), axis=-1)
+
+
+def axis_from_quaternion(quaternion: Array) -> Array:
+    """The third column of the rotation matrix, shape (..., 3)."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    right, back = x * z + w * y, y * z - w * x  # doubled by addition: quadruple precision has no 2.0
+    return np.stack([right + right, back + back, w * w - x * x - y * y + z * z], axis=-1)
+
+
+def transverse_from_quaternion(quaternion: Array) -> Array:
+    """The first column of the rotation matrix, a body-fixed axis across the top's, shape (..., 3)."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    return np.stack([w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)], axis=-1)
+
+
+def quaternion_from_frame(axis: Array, transverse: Array) -> Array:
+    """Unit quaternion of the body whose third and first axes are given, shape (..., 4); the sign is arbitrary.
+
+    Every row of 4 q q^T is a multiple of q; the row with the largest diagonal loses no digits (Shepperd 1978).
+    """
+    a, b, e = (np.moveaxis(column, -1, 0) for column in (transverse, np.cross(axis, transverse), axis))
+    rows = (
+        (1.0 + a[0] + b[1] + e[2], b[2] - e[1], e[0] - a[2], a[1] - b[0]),
+        (b[2] - e[1], 1.0 + a[0] - b[1] - e[2], a[1] + b[0], a[2] + e[0]),
+        (e[0] - a[2], a[1] + b[0], 1.0 - a[0] + b[1] - e[2], b[2] + e[1]),
+        (a[1] - b[0], a[2] + e[0], b[2] + e[1], 1.0 - a[0] - b[1] + e[2]),
+    )
+    products = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    best = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
+    row = np.take_along_axis(products, best[..., None, None], axis=-2)[..., 0, :]
+    unit: Array = row / np.sqrt(np.sum(row * row, axis=-1, keepdims=True))
+    return unit
+
+
+def theta_from_axis(axis: Array) -> Array:
+    """Inclination in [0, pi], accurate at both poles and for axes that are not quite of length one."""
+    return np.arctan2(np.sqrt(axis[..., 0] ** 2 + axis[..., 1] ** 2), axis[..., 2])
+
+
+def phi_from_axis(axis: Array) -> Array:
+    """Precession angle in (-pi, pi]; undefined (zero) at a pole."""
+    return np.arctan2(axis[..., 0], -axis[..., 1])
+
+
+def angles_from_quaternion(quaternion: Array) -> tuple[Array, Array, Array]:
+    """theta in [0, pi], phi and psi modulo 2 pi. At a pole only phi + psi (or phi - psi) has meaning."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    half = np.arctan2(np.sqrt(x * x + y * y), np.sqrt(w * w + z * z))
+    total, difference = np.arctan2(z, w), np.arctan2(y, x)
+    return half + half, total + difference, total - difference
+
+
+def unwrapped(angle: Array, guide: Array) -> Array:
+    """A continuous angle from samples of it modulo 2 pi; both shape (n,).
+
+    Between neighbouring samples the angle may turn many times: `guide`, the true motion, says how often, so that only
+    the *error* has to change by less than half a turn from sample to sample. It may grow to any size over the run.
+    """
+    lag = np.unwrap(angle - guide)
+    whole: Array = guide + (lag - 2.0 * np.pi * np.rint(lag[0] / (2.0 * np.pi)))
+    return whole
+
+
+def rates_from_momentum(top: SymmetricTop, axis: Array, phi: Any, momentum: Array) -> tuple[Any, Any, Any]:
+    """theta', phi', psi' of states given by axis, precession angle and space-frame L; not at a pole."""
+    node = np.stack([np.cos(phi), np.sin(phi), 0.0 * np.asarray(phi)], axis=-1)
+    sine_squared = axis[..., 0] ** 2 + axis[..., 1] ** 2
+    p_psi = np.sum(momentum * axis, axis=-1)
+    theta_dot = np.sum(momentum * node, axis=-1) / top.I1
+    # L_z - p_psi e_z = L_h.(horizontal part) - needs no difference of large numbers near a pole
+    horizontal = momentum[..., 0] * axis[..., 0] + momentum[..., 1] * axis[..., 1]
+    phi_dot = (momentum[..., 2] - axis[..., 2] * horizontal / sine_squared) / top.I1
+    return theta_dot, phi_dot, p_psi / top.I3 - phi_dot * axis[..., 2]
+
+
+def angles_from_attitude(top: SymmetricTop, state: Array) -> Angles:
+    """Angles and rates of an attitude state; phi and psi modulo 2 pi, not at a pole."""
+    quaternion, momentum = state[:4], state[4:]
+    theta, phi, psi = angles_from_quaternion(quaternion)
+    rates = rates_from_momentum(top, axis_from_quaternion(quaternion), phi, momentum)
+    return Angles(*(float(value) for value in (theta, phi, psi, *rates)))
+
+
+def axis_distance(first: Array, second: Array) -> Array:
+    """Angle between two axes in radians, shape (...), to 1e-16 however small."""
+    cross = np.cross(first, second)
+    angle: Array = np.arctan2(np.sqrt(np.sum(cross * cross, axis=-1)), np.sum(first * second, axis=-1))
+    return angle
+
+
+def attitude_distance(first: Array, second: Array) -> Array:
+    """Angle of the rotation between two orientations in radians, shape (...)."""
+    nearer = np.where(np.sum(first * second, axis=-1, keepdims=True) < 0.0, -second, second)
+    gap = np.sqrt(np.sum((first - nearer) ** 2, axis=-1))
+    angle: Array = 4.0 * np.arcsin(np.minimum(1.0, 0.5 * gap))
+    return angle

@@ -1,0 +1,342 @@
+"""Closed-form motion of the heavy symmetric top in arbitrary precision: the one derivation of its constants.
+
+With u = cos theta, a = p_psi/I1, b = p_phi/I1, beta = 2 mgl/I1, alpha = theta'^2 + phi'^2 sin^2 theta + beta u,
+
+    u'^2 = (1 - u^2)(alpha - beta u) - (b - a u)^2 = beta (u - u1)(u - u2)(u - u3),   -1 <= u1 <= u2 <= 1 <= u3,
+    u    = u1 + (u2 - u1) sn^2(tau | m),    tau = tau0 + Omega t,    4 Omega^2 = beta (u3 - u1),
+    m    = (u2 - u1)/(u3 - u1),             nutation period 2 K(m)/Omega.
+
+Each pole has a distance (floor: d = 1 + u, crown: d = 1 - u) and a twist (floor: b + a, crown: b - a), and with
+drift = a (I1/I3 - 1) the two natural angles obey
+
+    (phi + psi)' = drift + (b + a)/(1 + u),        (phi - psi)' = -drift + (b - a)/(1 - u),
+
+each an integral of the third kind, int dtau/d = Pi(n; tau)/d1 with n = (d1 - d2)/d1, d1 and d2 being the distances
+at u1 and u2. Carlson's form Pi = s RF(c^2, D, 1) + (n/3) s^3 RJ(c^2, D, 1, d/d1), D = m1 + m c^2, has no cancellation
+near a pole. A hanging top (mgl < 0) is the standing one seen upside down: theta -> pi - theta, psi -> -psi.
+
+Degenerate tops. The coefficients of u'^2 about the starting point are sums of a rational number, kept as an exact
+fraction, and a multiple of cos theta. One that vanishes is therefore known to vanish (an axis that passes through a
+pole, a start on a turning point, a steady precession); every other gap between roots is a nonzero number that enough
+digits resolve, and the precision is doubled until they do. Data next to a separatrix have a large, finite period; a
+moving axis with m = 1 exactly cannot come from rational data.
+
+Conventions where angles are singular. If the axis passes exactly through a pole, the twist there is 0, its term is
+dropped, and phi and psi jump by pi there and back in turn. If the axis stands on a pole only phi + psi (phi - psi
+at the lower one) has a meaning, and the other twist alone gives phi' = +-a/2.
+
+Sources: Klein and Sommerfeld, Theory of the Top, chapter 6 (theta functions); Goldstein, Classical Mechanics,
+section 5.7; Carlson, Numerical Algorithms 10 (1995) 13. Not a numerical integration: the error does not grow with
+time, except that a time of 10^k periods costs k of the 30 guard digits.
+"""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from symtop.base.validate import SymtopError, whole
+from symtop.model.exact_numbers import rational, rationals, real_roots
+from symtop.model.top import Angles, SymmetricTop
+
+GUARD_DIGITS, MOST_DIGITS = 30, 20_000  # the latter resolves relative gaps between roots down to 1e-5000
+
+
+class PreciseMotion(NamedTuple):
+    """Angles (radians; phi and psi unwrapped) and their rates at one time, as `mpmath.mpf`."""
+
+    theta: Any
+    phi: Any
+    psi: Any
+    theta_dot: Any
+    phi_dot: Any
+    psi_dot: Any
+
+
+class Pole(NamedTuple):
+    """A pole as the axis sees it: twist b +- a, and distances 1 +- u at the turning points u1 (low) and u2 (high)."""
+
+    twist: Any
+    low: Any
+    high: Any
+
+
+class Curve(NamedTuple):
+    """The elliptic curve of u(t) and the starting point on it."""
+
+    floor: Pole
+    crown: Pole
+    swing: Any  # u2 - u1
+    third: Any  # u3
+    stiffness: Any  # beta (u3 - u1) = 4 Omega^2
+    m: Any
+    m1: Any  # 1 - m
+    beyond: Any  # (u3 - 1)/(u3 - u2)
+    start_sn2: Any
+    start_cn2: Any
+
+
+class PreciseForm:
+    """Closed-form motion to `digits` significant digits.
+
+    `top` is a `SymmetricTop` or a sequence (I1, I3, mgl), `start` an `Angles` or a sequence (theta, phi, psi, theta',
+    phi', psi'); their entries may be floats (read as exact doubles), integers, fractions, decimal strings (read as
+    exact decimals) or mpf. Raises `SymtopError` for values outside the model.
+
+    Constants: `a`, `b`, `alpha`, `beta`, `energy`, `p_phi`, `p_psi`, `roots` (ascending; a free top has one at
+    infinity), `m`, `K`, `Omega`, `nutation_period` (that of small nutations for a steady precession, infinite where
+    none exists), `phi_per_period`, `psi_per_period`, `theta_range`. They are numbers of the private mpmath context
+    `ctx`, whose precision is the working one. For mgl < 0 `curve` is that of the top upside down, and `facing` is -1.
+    """
+
+    def __init__(self, top: SymmetricTop | Sequence[Any], start: Angles | Sequence[Any], digits: int = 30) -> None:
+        from mpmath.ctx_mp import MPContext  # mpmath costs 0.1 s to import
+
+        self.digits = whole("digits", digits, 1)
+        self.ctx: Any = MPContext()  # private: the precision of the caller's mpmath is neither used nor changed
+        body, state = rationals(top, start)
+        self.facing = -1 if body[2] < 0 else 1
+        self.ctx.dps = 4 * (self.digits + GUARD_DIGITS)
+        while not self._resolve(body, state):
+            self.ctx.dps *= 2
+            if self.ctx.dps > MOST_DIGITS:
+                raise SymtopError(
+                    f"the turning points must be separable with {MOST_DIGITS} digits; these values are too extreme"
+                )
+        self._set_periods(body, state)
+
+    def _resolve(self, body: list[Fraction], state: list[Fraction]) -> bool:
+        """Invariants and turning points; False if the present precision does not tell all gaps from zero."""
+        ctx, real, facing = self.ctx, self._real, self.facing
+        I1, I3, mgl = body
+        theta, _, _, theta_dot, phi_dot, psi_dot = state
+        half, cosine = real(theta) / 2, ctx.cos(real(theta))
+        above, below = 2 * ctx.sin(half) ** 2, 2 * ctx.cos(half) ** 2  # 1 - cos theta, 1 + cos theta
+        sine2 = above * below
+
+        lean = real((I1 - I3) * phi_dot) * cosine
+        north = above * (real(I1 * phi_dot - I3 * psi_dot) + lean) / real(I1)  # b - a
+        south = below * (real(I1 * phi_dot + I3 * psi_dot) - lean) / real(I1)  # b + a
+        torque = 2 * (real(I3 * phi_dot * psi_dot - mgl) + real((I3 - I1) * phi_dot**2) * cosine) / real(I1)
+        spin = real(psi_dot) + real(phi_dot) * cosine
+        self.a, self.b, self.beta = real(I3 / I1) * spin, (north + south) / 2, real(2 * mgl / I1)
+        kinetic = real(theta_dot**2) + real(phi_dot**2) * sine2
+        self.alpha = kinetic + self.beta * cosine
+        self.energy = real(I1 / 2) * self.alpha + real(I3 / 2) * spin**2
+
+        lead = facing * self.beta
+        curvature = 2 * self.beta * cosine - kinetic - self.a**2
+        slope = facing * (sine2 * torque - 2 * cosine * real(theta_dot**2))
+        x1, x2, x3 = real_roots(ctx, sine2 * real(theta_dot**2), slope, curvature, lead)  # of u'^2 in u - u(0)
+        up, down, twist_up, twist_down = (above, below, north, south) if facing > 0 else (below, above, south, north)
+        rests = x1 == x2
+        if twist_down == 0 and not rests:
+            x1 = -down
+        if twist_up == 0 and not rests:
+            x2, x3 = (up, x3) if abs(x2 - up) <= abs(x3 - up) else (x2, up)
+        rigid = rests or not lead  # no elliptic function needed
+        self.curve = Curve(
+            floor=Pole(twist_down, down + x1, down + x2),
+            crown=Pole(twist_up, up - x1, up - x2),
+            swing=x2 - x1,
+            third=facing * cosine + x3,
+            stiffness=-curvature if rigid else lead * (x3 - x1),
+            m=ctx.zero if rigid else (x2 - x1) / (x3 - x1),
+            m1=ctx.one if rigid else (x3 - x2) / (x3 - x1),
+            beyond=ctx.one if rigid else (x3 - up) / (x3 - x2),
+            start_sn2=ctx.zero if rests else -x1 / (x2 - x1),
+            start_cn2=ctx.one if rests else x2 / (x2 - x1),
+        )
+        span = 1 + (abs(curvature / lead) if lead else 0)
+        gaps = [*self.curve.floor[1:], *self.curve.crown[1:], self.curve.swing, *self.curve[5:]]
+        smallest = min(gap for gap in gaps if gap != 0)
+        if smallest < span * ctx.mpf(10) ** (-ctx.dps // 4):  # hidden by rounding errors
+            return False
+        decades = int(0.30103 * (ctx.mag(span) - ctx.mag(smallest))) + 1
+        ctx.dps = self.digits + GUARD_DIGITS + decades
+        return True
+
+    def _set_periods(self, body: list[Fraction], state: list[Fraction]) -> None:
+        """Complete integrals, the phase of the starting point and the mean rates."""
+        ctx, curve = self.ctx, self.curve
+        self.I1, self.I3, self.mgl = map(self._real, body)
+        phi0, psi0, theta_dot = map(self._real, state[1:4])
+        self.angles0 = (phi0 + self.facing * psi0, phi0 - self.facing * psi0)
+        self.p_phi, self.p_psi = self.I1 * self.b, self.I1 * self.a
+        self.drift = self.facing * self.a * (self.I1 / self.I3 - 1)
+        self.m, self.m1 = +curve.m, +curve.m1
+        self.K = ctx.elliprf(0, self.m1, 1)
+        self.K1 = ctx.elliprf(0, self.m, 1) if self.m else ctx.inf
+        self.Omega = ctx.sqrt(curve.stiffness) / 2 if curve.stiffness > 0 else ctx.zero
+        self.nutation_period = 2 * self.K / self.Omega if self.Omega else ctx.inf
+
+        rising = -1 if self.facing * theta_dot > 0 else 1  # the sign of u'
+        sn, cn = rising * ctx.sqrt(curve.start_sn2), ctx.sqrt(curve.start_cn2)
+        self.tau0 = self._integral(None, sn, cn)
+        self._complete = [self._integral(pole, ctx.one, ctx.zero) for pole in curve[:2]]
+        self._begun = [self._integral(pole, sn, cn) for pole in curve[:2]]
+        # Through a pole the half-angle sine is continued with its sign, positive at the start; cn >= 0 there.
+        self.floor_sign = 1 if sn > 0 or (sn == 0 and theta_dot >= 0) else -1
+
+        factors = [pole.twist / pole.low if pole.twist else ctx.zero for pole in curve[:2]]
+        growth = [factor * whole_turn / self.K for factor, whole_turn in zip(factors, self._complete, strict=True)]
+        self.mean_rates = (self.drift + growth[0], growth[1] - self.drift)  # of phi + psi and phi - psi
+        self.lags0 = tuple(  # by how much they are ahead of their means at time 0, counted from a moment with u = u1
+            (factor * begun - self.tau0 * mean) / self.Omega if factor and self.Omega else ctx.zero
+            for factor, begun, mean in zip(factors, self._begun, growth, strict=True)
+        )
+        self.phi_rate = (growth[0] + growth[1]) / 2
+        self.psi_rate = self.facing * (self.drift + (growth[0] - growth[1]) / 2)
+        self.phi_per_period, self.psi_per_period = (
+            rate * self.nutation_period if rate else ctx.zero for rate in (self.phi_rate, self.psi_rate)
+        )
+        self.roots = tuple(sorted(self.facing * u for u in (curve.floor.low - 1, curve.floor.high - 1, curve.third)))
+        ends = zip(curve.floor[1:], curve.crown[1:], strict=True)
+        self.theta_range = tuple(sorted(self._theta(ctx.sqrt(down), ctx.sqrt(up)) for down, up in ends))
+
+    def zero_heights(self) -> tuple[Any, Any]:
+        """Imaginary parts in [0, K1] of the zeros i w (floor, 1 + u = 0) and K + i w (crown, 1 - u = 0)."""
+        ctx, (floor, crown, swing, *_) = self.ctx, self.curve
+        sn2, cn2 = floor.low / floor.high, swing / floor.high
+        lower = ctx.sqrt(sn2) * ctx.elliprf(cn2, cn2 + self.m * sn2, 1)
+        sn2, dn2 = crown.high / (self.m1 * crown.low), swing / crown.low
+        return lower, ctx.sqrt(sn2) * ctx.elliprf(self.curve.beyond * dn2, dn2, 1)
+
+    def __call__(self, time: Any) -> PreciseMotion:
+        """Angles and rates at `time` (float, string, fraction or mpf)."""
+        down, up, total, difference, nod = self._state(time)
+        phi, psi = (total + difference) / 2, self.facing * (total - difference) / 2
+        halves = ((self.curve.floor.twist, down), (self.curve.crown.twist, up))
+        phi_dot = sum((twist / (4 * half**2) for twist, half in halves if twist), self.ctx.zero)
+        psi_dot = self.p_psi / self.I3 - self.facing * (down**2 - up**2) * phi_dot
+        cosine, sine = (down, up) if self.facing > 0 else (up, down)
+        if (cosine < 0) != (sine < 0):
+            phi, psi, nod = phi + self.ctx.pi, psi + (self.ctx.pi if cosine < 0 else -self.ctx.pi), -nod
+        motion = (self._theta(abs(down), abs(up)), phi, psi, self.facing * nod, phi_dot, psi_dot)
+        return PreciseMotion(*map(_plain, motion))
+
+    def axis(self, time: Any) -> tuple[Any, ...]:
+        """Unit vector (x, y, z) along the top's axis."""
+        down, up, total, difference, _ = self._state(time)
+        sine, phi = 2 * down * up, (total + difference) / 2
+        axis = (sine * self.ctx.sin(phi), -sine * self.ctx.cos(phi), self.facing * (down**2 - up**2))
+        return tuple(map(_plain, axis))
+
+    def quaternion(self, time: Any) -> tuple[Any, ...]:
+        """Attitude (w, x, y, z), body to space, from the integrals of the third kind."""
+        down, up, total, difference, _ = self._state(time)
+        return self._quaternion(down * self.ctx.expj(total / 2), up * self.ctx.expj(difference / 2))
+
+    def theta_quaternion(self, time: Any) -> tuple[Any, ...]:
+        """Attitude (w, x, y, z) by theta functions, as Klein and Sommerfeld write it: a second, branch-free evaluation.
+
+        With z = pi tau/2K and the pole at z = z0 (floor i y, crown pi/2 + i y; y has the sign of the twist), the halves
+        are ``sqrt(d/2) exp(i angle/2) = C exp(i rate tau) theta_1(z - z0)/theta_4(z)``. C and the rate follow from the
+        value and derivative at the turning point far from the pole. Only roots and phase are shared with `quaternion`.
+        """
+        if self.curve.swing == 0:
+            return self.quaternion(time)
+        ctx, (floor, crown, *_, start_sn2, start_cn2) = self.ctx, self.curve
+        scale, quarter, heights = ctx.pi / (2 * self.K), ctx.pi / 2, self.zero_heights()
+        nome = ctx.exp(-ctx.pi * self.K1 / self.K) if self.m else ctx.zero
+        passed = self.Omega * self._real(rational("time", time))
+        start, now = scale * self.tau0, scale * (self.tau0 + passed)
+        halves = []
+        for pole, height, angle, drift, distance, far, on_pole in (
+            (floor, heights[0], self.angles0[0], self.drift, floor.high, quarter, floor.low == start_sn2 == 0),
+            (crown, heights[1], self.angles0[1], -self.drift, crown.low, 0, crown.high == start_cn2 == 0),
+        ):
+            zero = ctx.mpc(quarter - far, (-1 if pole.twist < 0 else 1) * scale * height)
+            value, derivative = _theta_series(ctx, 1, far - zero, nome)
+            turning = (drift + pole.twist / distance) / (2 * self.Omega) - scale * ctx.im(derivative / value)
+            size = ctx.sqrt(distance / 2) * _theta_series(ctx, 4, far, nome)[0] / abs(value)
+            begin = _theta_series(ctx, 1, start - zero, nome)[0]
+            if on_pole:  # continue towards theta'
+                begin = ctx.mpc(self.floor_sign if far else -1)
+            wave = _theta_series(ctx, 1, now - zero, nome)[0] / _theta_series(ctx, 4, now, nome)[0]
+            halves.append(size * ctx.expj(angle / 2 - ctx.arg(begin) + turning * passed) * wave)
+        return self._quaternion(*halves)
+
+    def _state(self, time: Any) -> tuple[Any, Any, Any, Any, Any]:
+        """sqrt((1 + u)/2) and sqrt((1 - u)/2), signed, phi + psi, phi - psi and theta', all in the upright picture."""
+        ctx, curve = self.ctx, self.curve
+        elapsed = self._real(rational("time", time))
+        if curve.swing == 0:
+            angles = [angle + rate * elapsed for angle, rate in zip(self.angles0, self.mean_rates, strict=True)]
+            return ctx.sqrt(curve.floor.low / 2), ctx.sqrt(curve.crown.low / 2), angles[0], angles[1], ctx.zero
+        tau = self.tau0 + self.Omega * elapsed
+        turns = ctx.nint(tau / (2 * self.K))
+        sn, cn, dn = self._jacobi(tau - 2 * turns * self.K)
+        side = -1 if turns % 2 else 1
+        angles, halves, ratios = [], [], []
+        for i, (pole, drift, wave, sign, least, most) in enumerate((
+            (curve.floor, self.drift, sn, side * self.floor_sign, curve.floor.low, curve.floor.high),
+            (curve.crown, -self.drift, cn, side, curve.crown.high, curve.crown.low),
+        )):  # fmt: skip
+            gained = 2 * turns * self._complete[i] + self._integral(pole, sn, cn) - self._begun[i]
+            turned = pole.twist / pole.low * gained / self.Omega if pole.twist else 0
+            angles.append(self.angles0[i] + drift * elapsed + turned)
+            through = sign * ctx.sqrt(most / 2)
+            half = through * wave if least == 0 else ctx.sqrt((pole.low * cn**2 + pole.high * sn**2) / 2)
+            halves.append(half)
+            ratios.append(1 / through if least == 0 else wave / half)
+        return *halves, *angles, -self.Omega * curve.swing * dn * ratios[0] * ratios[1]
+
+    def _integral(self, pole: Pole | None, sn: Any, cn: Any) -> Any:
+        """Pi(n; tau) of a pole (0 if its twist is 0), or tau itself, from sn and cn of tau; abs(tau) <= K."""
+        ctx, c2 = self.ctx, cn**2
+        if pole is not None and pole.twist == 0:
+            return ctx.zero
+        delta = self.m1 + self.m * c2
+        first = sn * ctx.elliprf(c2, delta, 1)
+        if pole is None:
+            return first
+        near = (pole.low * c2 + pole.high * sn**2) / pole.low
+        return first + (1 - pole.high / pole.low) / 3 * sn**3 * ctx.elliprj(c2, delta, 1, near)
+
+    def _jacobi(self, tau: Any) -> tuple[Any, Any, Any]:
+        """sn, cn, dn for abs(tau) <= K, from the nearer of 0 and K: cn and dn keep their digits as m -> 1."""
+        ctx, short = self.ctx, abs(tau)
+        swap = short > self.K / 2
+        mean, other, gap, ratios = ctx.one, ctx.sqrt(self.m1), ctx.sqrt(self.m), []
+        while gap > mean * ctx.eps:  # the arithmetic-geometric mean, and the ratios c/a of its steps
+            mean, other, gap = (mean + other) / 2, ctx.sqrt(mean * other), (mean - other) / 2
+            ratios.append(gap / mean)
+        angle = 2 ** len(ratios) * mean * (self.K - short if swap else short)
+        for ratio in reversed(ratios):
+            angle = (angle + ctx.asin(ratio * ctx.sin(angle))) / 2
+        sn, cn = ctx.sin(angle), ctx.cos(angle)
+        dn = ctx.sqrt(self.m1 + self.m * cn**2)
+        if swap:
+            sn, cn, dn = cn / dn, ctx.sqrt(self.m1) * sn / dn, ctx.sqrt(self.m1) / dn
+        return (-sn if tau < 0 else sn), cn, dn
+
+    def _theta(self, down: Any, up: Any) -> Any:
+        return 2 * (self.ctx.atan2(up, down) if self.facing > 0 else self.ctx.atan2(down, up))
+
+    def _quaternion(self, down: Any, up: Any) -> tuple[Any, ...]:
+        first, second = (down, up) if self.facing > 0 else (up, down)
+        return tuple(map(_plain, (first.real, second.real, second.imag, first.imag)))
+
+    def _real(self, value: Fraction) -> Any:
+        return self.ctx.mpf(value.numerator) / value.denominator
+
+
+def _plain(value: Any) -> Any:
+    """The same number as an ordinary `mpmath.mpf`."""
+    from mpmath import mp
+
+    return mp.make_mpf(value._mpf_)
+
+
+def _theta_series(ctx: Any, kind: int, z: Any, nome: Any) -> tuple[Any, Any]:
+    """theta_1(z) without its factor 2 q^(1/4), or theta_4(z), and the derivative; nome q in [0, 1)."""
+    value, derivative = (ctx.sin(z), ctx.cos(z)) if kind == 1 else (ctx.one, ctx.zero)
+    growth, n, weight = 2 * abs(ctx.im(z)), 0, ctx.one
+    while abs(weight) * ctx.exp((n + 1) * growth) * (2 * n + 2) > ctx.eps:
+        n += 1
+        weight = (-1) ** n * (nome ** (n * (n + 1)) if kind == 1 else 2 * nome ** (n * n))
+        k = 2 * n + 1 if kind == 1 else 2 * n
+        sine, cosine = ctx.sin(k * z), ctx.cos(k * z)
+        value += weight * (sine if kind == 1 else cosine)
+        derivative += weight * k * (cosine if kind == 1 else -sine)
+    return value, derivative

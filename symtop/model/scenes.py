@@ -1,0 +1,253 @@
+"""Scenes: one top, one start, one horizon, and what the scene is there to show.
+
+The horizon and all times are in the units of the top (seconds, if its parameters are SI). Where a start
+follows from a formula, the formula stands beside it.
+"""
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from symtop.base.shown import Catalogue, record_table
+from symtop.base.validate import SymtopError, finite, label, one_of, positive
+from symtop.model.top import Angles, SymmetricTop
+
+if TYPE_CHECKING:
+    from symtop.model.closed_form import ClosedForm
+
+OBSERVABLES = ("nutation", "axis", "attitude")
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A top, its start and a horizon; `observes` names the smallest thing the scene is watched for.
+
+    ``nutation`` is theta alone, ``axis`` the direction of the axis, ``attitude`` the whole orientation.
+    """
+
+    name: str
+    top: SymmetricTop
+    start: Angles
+    horizon: float
+    purpose: str = ""
+    observes: str = "attitude"
+
+    def __post_init__(self) -> None:
+        label("name", self.name)
+        if not isinstance(self.top, SymmetricTop):
+            raise SymtopError(f"top must be a SymmetricTop, not {self.top!r}")
+        if not isinstance(self.start, Angles):
+            raise SymtopError(f"start must be Angles, not {self.start!r}")
+        object.__setattr__(self, "horizon", positive("horizon", self.horizon))
+        one_of("observes", self.observes, OBSERVABLES)
+
+    @property
+    def nutation_period(self) -> float:
+        """Time of one full nutation; infinite on a separatrix."""
+        return self.top.nutation_period(self.start)
+
+    def _repr_html_(self) -> str:
+        return record_table(self, ("name", "purpose", "top", "start", "horizon", "nutation_period", "observes"))
+
+
+@functools.lru_cache(maxsize=256)
+def _closed_form(top: SymmetricTop, start: Angles) -> "ClosedForm":
+    from symtop.model.closed_form import ClosedForm
+
+    return ClosedForm(top, start)
+
+
+def closed_form(scene: Scene) -> "ClosedForm":
+    """The exact motion of a scene; made once (20 ms) and kept."""
+    return _closed_form(scene.top, scene.start)
+
+
+def spinning(spin: float, precession: float = 0.0, *, name: str = "", purpose: str = "") -> Scene:
+    """The family over spin: I1 = 2, I3 = 1, mgl = 2, let go at theta = 0.8 with w3 = `spin` and a precession."""
+    theta, w3, turn = 0.8, finite("spin", spin), finite("precession", precession)
+    start = Angles(theta=theta, phi_dot=turn, psi_dot=w3 - turn * math.cos(theta))
+    said = purpose or f"let go at theta = {theta} with a spin of {w3:g}"
+    return Scene(name or f"spinning-{w3:.12g}", SymmetricTop(2.0, 1.0, 2.0), start, 20.0, said)
+
+
+def grazing(delta: float, *, name: str = "", purpose: str = "") -> Scene:
+    """The family over the gap p_phi - p_psi = `delta`: a fall towards the upper pole that misses it by 1.1 delta.
+
+    I1 = I3 = mgl = p_psi = 1, p_phi = 1 + delta, theta = 1, theta' = -1.2; the horizon is one nutation. The axis passes
+    the pole at abs(theta') of about 1.2, so that the passage lasts about delta and turns phi by half a turn.
+    """
+    gap, theta = finite("delta", delta), 1.0
+    cosine = math.cos(theta)
+    precession = (gap + 2.0 * math.sin(0.5 * theta) ** 2) / math.sin(theta) ** 2  # (p_phi - p_psi cos) / I1 sin^2
+    start = Angles(theta=theta, theta_dot=-1.2, phi_dot=precession, psi_dot=1.0 - precession * cosine)
+    said = purpose or f"passes the upper pole with p_phi - p_psi = {gap:g}"
+    return Scene(name or f"grazing-{gap:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 4.22, said)
+
+
+def sleeping(spin: float, tilt: float = 1e-3, *, name: str = "", purpose: str = "") -> Scene:
+    """The family of tops let go almost upright: I1 = I3 = mgl = 1, w3 = `spin`, theta = `tilt`.
+
+    The upright top is stable for I3 w3 >= 2 sqrt(I1 mgl), here for spin >= 2; below, a tilt grows at the rate
+    sqrt(4 - spin^2)/2 until the top lies at about acos(spin^2/2 - 1), rises again, and so on.
+    """
+    w3 = finite("spin", spin)
+    said = purpose or f"let go almost upright with a spin of {w3:g}"
+    return Scene(name or f"sleeping-{w3:.12g}", SymmetricTop(1.0, 1.0, 1.0), Angles(theta=tilt, psi_dot=w3), 60.0, said)
+
+
+def steady(spin: float, *, name: str = "", purpose: str = "") -> Scene:
+    """The family of steady precessions: I1 = 2, I3 = 1, mgl = 2, theta = 60 degrees, w3 = `spin`, the slow branch.
+
+    The rate is the smaller root of I1 Omega^2 cos(theta) - I3 w3 Omega + mgl = 0, which needs I3 w3 >= 2 sqrt 2 here.
+    """
+    top, theta, w3 = SymmetricTop(2.0, 1.0, 2.0), math.pi / 3.0, positive("spin", spin)
+    momentum, weight = top.I3 * w3, top.I1 * math.cos(theta)
+    room = momentum * momentum - 4.0 * weight * top.mgl
+    if room < 0.0:
+        raise SymtopError(
+            f"spin must be at least {2.0 * math.sqrt(weight * top.mgl) / top.I3:.6g} to precess steadily, not {w3!r}"
+        )
+    precession = 2.0 * top.mgl / (momentum + math.sqrt(room))
+    start = Angles(theta=theta, phi_dot=precession, psi_dot=w3 - precession * math.cos(theta))
+    return Scene(name or f"steady-{w3:.12g}", top, start, 20.0, purpose or f"steady precession at a spin of {w3:g}")
+
+
+def _separatrix() -> Scene:
+    """Woodhouse, Introduction to Analytical Dynamics, problem 5.3: u = cos theta = 1/(1 + sech g t), g^2 = mgl/I1.
+
+    theta0 = pi/3, phi' = 2g/sqrt 3, psi' = (3 I1 - I3) g/(I3 sqrt 3).
+    """
+    top = SymmetricTop(2.0, 1.0, 2.0)
+    g, root = math.sqrt(top.mgl / top.I1), math.sqrt(3.0)
+    start = Angles(math.pi / 3.0, phi_dot=2.0 * g / root, psi_dot=(3.0 * top.I1 - top.I3) * g / (top.I3 * root))
+    purpose = "rises towards the upright for ever: every disturbance grows as exp(g t/2), and no step saves a long run"
+    return Scene("separatrix", top, start, 20.0 / g, purpose)
+
+
+def _goldstein(name: str, theta_dot: float, purpose: str) -> Scene:
+    """a = p_psi/I1 = 2.5, b = p_phi/I1 = 1.7: phi' = (b - a u)/(1 - u^2), psi' = a I1/I3 - phi' u, u = cos 43 deg."""
+    start = Angles(
+        theta=math.radians(43.0),
+        theta_dot=theta_dot,
+        phi_dot=-0.2760228916930134,
+        psi_dot=5.201870363571313,
+    )
+    return Scene(name, SymmetricTop(2.0, 1.0, 2.0), start, 70.0, purpose)
+
+
+# The notebook prints alpha = 2 E1/I1 = 1.6 and a release at rest; alpha = 1.6 means this rate instead of zero.
+_ALPHA_RATE = 0.31914824723237937
+
+
+def _kinon_betsch() -> Scene:
+    """Steady precession at 10 rad/s: I3 w3 Omega = I1 Omega^2 cos(theta) + mgl."""
+    top = SymmetricTop(0.00450622196249, 0.000530143760293, 0.520071028848)
+    theta, precession = math.radians(60.0), 10.0
+    spin = (top.I1 * precession**2 * math.cos(theta) + top.mgl) / (top.I3 * precession)
+    start = Angles(theta=theta, phi_dot=precession, psi_dot=spin - precession * math.cos(theta))
+    return Scene("kinon-betsch", top, start, 2.0, "steady precession of a small real gyroscope, a published benchmark")
+
+
+@functools.lru_cache(maxsize=1)
+def _catalogue() -> dict[str, Scene]:
+    spheroid = SymmetricTop(2.0, 1.0, 9.81 * 2.7386127875258306)
+    third = math.pi / 3.0
+    catalogue = [
+        Scene(
+            "spheroid",
+            spheroid,
+            Angles(theta=0.4, phi=0.1, psi=0.1, theta_dot=0.1, phi_dot=10.0, psi_dot=0.1),
+            8.0,
+            "the notebook's first top: violent nutation from 23 to 99 degrees",
+        ),
+        _goldstein("goldstein", 0.0, "the notebook's second top, released at rest (alpha = 1.4981)"),
+        _goldstein(
+            "goldstein-falling", -_ALPHA_RATE, "the second top with the printed alpha = 1.6, theta falling at first"
+        ),
+        _goldstein(
+            "goldstein-rising", _ALPHA_RATE, "the second top with the printed alpha = 1.6, theta rising at first"
+        ),
+        spinning(10.0, name="cusp", purpose="released from rest: the axis comes to rest again at each cusp"),
+        spinning(10.0, -0.3, name="loop", purpose="started against its precession: the axis draws loops"),
+        spinning(10.0, 0.1, name="wave", purpose="started along its precession: the axis draws a wave"),
+        Scene(
+            "fast",
+            SymmetricTop(2.0, 1.0, 2.0),
+            Angles(theta=0.5, psi_dot=100.0),
+            8.0,
+            "a very fast spin: 64 small nutations, gravity a perturbation of the free top",
+        ),
+        Scene(
+            "steady",
+            SymmetricTop(2.0, 1.0, 2.0),
+            Angles(theta=third, phi_dot=1.0, psi_dot=2.5),
+            20.0,
+            "exactly steady precession: whatever nutates here is error",
+        ),
+        Scene(
+            "hairer-lubich-wanner",
+            SymmetricTop(0.5, 1.0, 1.0),
+            Angles(theta=math.acos(0.6), phi=2.0 * math.atan(2.0), theta_dot=0.4, phi_dot=2.5, psi_dot=-1.1),
+            30.0,
+            "the flat top of Geometric Numerical Integration, figure VII.5.3",
+        ),
+        Scene(
+            "simo-wong",
+            SymmetricTop(5.0, 1.0, 20.0),
+            Angles(theta=0.05, psi_dot=50.0),
+            10.0,
+            "a fast top almost upright, the benchmark of structural dynamics",
+        ),
+        _kinon_betsch(),
+        Scene(
+            "bruls-cardona-arnold",
+            SymmetricTop(15.234375, 0.46875, 147.15),
+            Angles(theta=math.pi / 2, phi=math.pi, psi=math.pi / 2, phi_dot=-4.61538, psi_dot=150.0),
+            2.0,
+            "a published benchmark that grazes the lower pole at 0.00004 degrees: no place for angles",
+        ),
+        grazing(
+            1e-3, name="grazing", purpose="passes the upper pole at 0.06 degrees: a step in angles may jump over it"
+        ),
+        sleeping(2.5, name="sleeping", purpose="let go almost upright and fast enough to stay there (threshold 2)"),
+        sleeping(1.9, name="sleeping-unstable", purpose="let go almost upright and too slow: it falls and rises again"),
+        steady(20.0, name="steady-fast", purpose="steady precession of a fast top: a large step makes it nutate"),
+        _separatrix(),
+    ]
+    return {scene.name: scene for scene in catalogue}
+
+
+_added: dict[str, Scene] = {}
+
+
+def register_scene(entry: Scene) -> Scene:
+    """Add a scene to the catalogue, so that studies and commands know it by name."""
+    if not isinstance(entry, Scene):
+        raise SymtopError(f"register_scene needs a Scene, not {entry!r}")
+    if entry.name in _catalogue() or _added.get(entry.name, entry) != entry:
+        raise SymtopError(f"scene {entry.name!r} is already known; choose another name")
+    _added[entry.name] = entry
+    return entry
+
+
+def added_scenes() -> list[str]:
+    """Names of the scenes that were registered by the user."""
+    return list(_added)
+
+
+class _Scenes(Catalogue[Scene]):
+    columns = ("name", "horizon", "nutation_period", "observes", "purpose")
+
+
+def scenes() -> dict[str, Scene]:
+    """All known scenes, by name."""
+    return _Scenes({**_catalogue(), **_added})
+
+
+def scene(name: "str | Scene") -> Scene:
+    """The scene of that name; a Scene is returned as it is."""
+    if isinstance(name, Scene):
+        return name
+    known = scenes()
+    return known[one_of("scene", name, known)]

@@ -1,0 +1,298 @@
+"""The heavy symmetric (Lagrange) top: its parameters, energy, momenta and effective potential.
+
+Euler angles z-x-z: phi precession, theta nutation, psi spin; the axis of the top is
+``e = (sin theta sin phi, -sin theta cos phi, cos theta)``. The Lagrangian is
+
+    L = I1/2 (theta'^2 + phi'^2 sin^2 theta) + I3/2 (psi' + phi' cos theta)^2 - mgl cos theta
+
+phi and psi are cyclic, so that ``p_psi = I3 (psi' + phi' cos theta)`` and
+``p_phi = I1 phi' sin^2 theta + p_psi cos theta`` are conserved, and theta moves in the potential
+
+    V(theta) = (p_phi - p_psi cos theta)^2 / (2 I1 sin^2 theta) + mgl cos theta.
+
+The fraction cancels near a pole. With ``x = theta/2``, ``north = p_phi - p_psi`` (zero if the axis can
+pass theta = 0) and ``south = p_phi + p_psi`` (zero if it can pass theta = pi) it is a sum without
+subtraction, exact to rounding at both poles and free of branches:
+
+    V      = F^2 / (8 I1) + mgl cos theta,      F    = north cot x + south tan x
+    V'     = F F' / (4 I1) - mgl sin theta,     F'   = (south / cos^2 x - north / sin^2 x) / 2
+    V''    = (F'^2 + F F'') / (4 I1) - mgl cos theta
+    phi'   = (north / sin^2 x + south / cos^2 x) / (4 I1),      psi' = p_psi/I3 - phi' cos theta
+
+Units are any consistent set. Source: Goldstein, Classical Mechanics, section 5.7; the half-angle form
+is the partial-fraction split of ``(b - a u)/(1 - u^2)`` that Klein and Sommerfeld use.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.base.shown import record_table
+from symtop.base.validate import SymtopError, finite, positive
+
+LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
+
+
+def bounded(name: str, value: object, least: float = 0.0) -> float:
+    """Return `value` as a float of at most `LARGEST` in size."""
+    number = finite(name, value)
+    if not least <= abs(number) <= LARGEST:
+        raise SymtopError(f"{name} must be between {least:g} and {LARGEST:g} in size, not {number!r}")
+    return number
+
+
+class Momenta(NamedTuple):
+    """The two conserved momenta, with the two combinations that are small near a pole."""
+
+    p_phi: float
+    p_psi: float
+    north: float  # p_phi - p_psi, computed without cancellation near theta = 0
+    south: float  # p_phi + p_psi, computed without cancellation near theta = pi
+
+
+@dataclass(frozen=True, slots=True)
+class Angles:
+    """Euler angles (radians) and their rates (radians per unit time) at one instant."""
+
+    theta: float
+    phi: float = 0.0
+    psi: float = 0.0
+    theta_dot: float = 0.0
+    phi_dot: float = 0.0
+    psi_dot: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            object.__setattr__(self, name, bounded(name, getattr(self, name)))
+        if not 0.0 <= self.theta <= math.pi:
+            raise SymtopError(f"theta must lie in [0, pi], not {self.theta!r}")
+
+    @property
+    def spin(self) -> float:
+        """w3 = psi' + phi' cos theta, the angular velocity about the body's own axis."""
+        return self.psi_dot + self.phi_dot * math.cos(self.theta)
+
+
+def effective_force(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
+    """Return ``V'(theta)``, ``phi'`` and ``cos theta``: all that one kick of the reduced top needs.
+
+    Works on floats and on arrays, and compiles as it stands. Costs one sine and one cosine.
+    """
+    sin_x = np.sin(0.5 * theta)
+    cos_x = np.cos(0.5 * theta)
+    up = north / (sin_x * sin_x)
+    down = south / (cos_x * cos_x)
+    tilt = sin_x * cos_x  # sin(theta)/2, and F = tilt (up + down)
+    slope = tilt * ((up + down) * (down - up) / (8.0 * I1) - 2.0 * mgl)
+    return slope, (up + down) / (4.0 * I1), cos_x * cos_x - sin_x * sin_x
+
+
+def effective_stiffness(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
+    """Return ``V''(theta)``; at a steady precession ``sqrt(V''/I1)`` is the nutation frequency."""
+    sin_x = np.sin(0.5 * theta)
+    cos_x = np.cos(0.5 * theta)
+    up = north / (sin_x * sin_x)
+    down = south / (cos_x * cos_x)
+    tilt = sin_x * cos_x
+    slope = 0.5 * (down - up)
+    bend = 0.5 * (down * sin_x / cos_x + up * cos_x / sin_x)
+    return (slope * slope + tilt * (up + down) * bend) / (4.0 * I1) - mgl * (cos_x * cos_x - sin_x * sin_x)
+
+
+def effective_potential(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
+    """Return ``V(theta)``, without the constant ``p_psi^2 / 2 I3``."""
+    sin_x = np.sin(0.5 * theta)
+    cos_x = np.cos(0.5 * theta)
+    lever = north * cos_x / sin_x + south * sin_x / cos_x
+    return lever * lever / (8.0 * I1) + mgl * (cos_x * cos_x - sin_x * sin_x)
+
+
+@dataclass(frozen=True, slots=True)
+class SymmetricTop:
+    """A rigid body with a fixed point on its axis of symmetry.
+
+    `I1` is the moment of inertia across the axis and `I3` along it, both about the fixed point;
+    `mgl` is mass x gravity x distance of the centre of gravity from that point. ``mgl = 0`` is the free
+    top and ``mgl < 0`` the hanging one. No rigid body has ``I3 > 2 I1``.
+    """
+
+    I1: float
+    I3: float
+    mgl: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "I1", bounded("I1", positive("I1", self.I1), 1.0 / LARGEST))
+        object.__setattr__(self, "I3", bounded("I3", positive("I3", self.I3), 1.0 / LARGEST))
+        object.__setattr__(self, "mgl", bounded("mgl", self.mgl))
+        if self.I3 > 2.0 * self.I1:
+            raise SymtopError(
+                f"I3 must be at most 2 I1 (no rigid body exceeds it), not {self.I3!r} with I1 = {self.I1!r}"
+            )
+
+    def _repr_html_(self) -> str:
+        return record_table(self, ("I1", "I3", "mgl"))
+
+    @classmethod
+    def from_spheroid(
+        cls,
+        mass: float,
+        polar_radius: float,
+        equatorial_radius: float,
+        gravity: float = 9.81,
+        pivot_distance: float | None = None,
+    ) -> "SymmetricTop":
+        """A solid spheroid; radii along and across its axis.
+
+        With ``pivot_distance=None`` this is the reading of the notebook that the project began with:
+        inertia about the *centre of gravity*, and the polar radius as the lever arm. With a distance
+        the body is hung by a point of its axis that far from its centre, and ``I1`` gains
+        ``mass * pivot_distance^2`` (Huygens-Steiner).
+        """
+        mass = positive("mass", mass)
+        polar = positive("polar_radius", polar_radius)
+        equatorial = positive("equatorial_radius", equatorial_radius)
+        gravity = finite("gravity", gravity)
+        across = mass * (polar * polar + equatorial * equatorial) / 5.0
+        along = 2.0 * mass * equatorial * equatorial / 5.0
+        if pivot_distance is None:
+            return cls(across, along, mass * gravity * polar)
+        arm = finite("pivot_distance", pivot_distance)
+        return cls(across + mass * arm * arm, along, mass * gravity * arm)
+
+    def spheroid_radii(self, mass: float) -> tuple[float, float]:
+        """Polar and equatorial radius of the solid spheroid that has this inertia about its centre.
+
+        The way back of `from_spheroid` without a pivot distance. Raises SymtopError where there is no such body.
+        """
+        square = 5.0 * self.I3 / (2.0 * positive("mass", mass))
+        rest = 5.0 * self.I1 / mass - square
+        if rest <= 0.0:
+            raise SymtopError(f"no spheroid has I1 = {self.I1!r} and I3 = {self.I3!r}: I3 must be below 2 I1")
+        return math.sqrt(rest), math.sqrt(square)
+
+    def momenta(self, at: Angles) -> Momenta:
+        """The conserved momenta of a state, and their pole-safe combinations."""
+        p_psi = self.I3 * at.spin
+        sin_x, cos_x = math.sin(0.5 * at.theta), math.cos(0.5 * at.theta)
+        swing = 4.0 * self.I1 * at.phi_dot * (sin_x * cos_x) ** 2  # I1 phi' sin^2 theta
+        return Momenta(
+            p_phi=swing + p_psi * math.cos(at.theta),
+            p_psi=p_psi,
+            north=swing - 2.0 * p_psi * sin_x * sin_x,
+            south=swing + 2.0 * p_psi * cos_x * cos_x,
+        )
+
+    def energy(self, at: Angles) -> float:
+        """Total energy, kinetic plus potential."""
+        across = at.theta_dot**2 + (at.phi_dot * math.sin(at.theta)) ** 2
+        return 0.5 * self.I1 * across + 0.5 * self.I3 * at.spin**2 + self.mgl * math.cos(at.theta)
+
+    def reduced_energy(self, theta: Any, p_theta: Any, p_phi: Any, p_psi: Any) -> Any:
+        """Energy of reduced states ``(theta, p_theta; p_phi, p_psi)``, floats or arrays."""
+        potential = effective_potential(theta, p_phi - p_psi, p_phi + p_psi, self.I1, self.mgl)
+        return p_theta**2 / (2.0 * self.I1) + p_psi**2 / (2.0 * self.I3) + potential
+
+    def potential(self, theta: Any, momenta: Momenta) -> Any:
+        """Effective potential ``V(theta)`` at the given momenta."""
+        return effective_potential(theta, momenta.north, momenta.south, self.I1, self.mgl)
+
+    def potential_slope(self, theta: Any, momenta: Momenta) -> Any:
+        """``dV/dtheta``."""
+        return effective_force(theta, momenta.north, momenta.south, self.I1, self.mgl)[0]
+
+    def potential_curvature(self, theta: Any, momenta: Momenta) -> Any:
+        """``d2V/dtheta2``."""
+        return effective_stiffness(theta, momenta.north, momenta.south, self.I1, self.mgl)
+
+    def steady_theta(self, momenta: Momenta) -> float:
+        """The inclination at which these momenta precess steadily: the minimum of V."""
+        from scipy.optimize import brentq  # scipy.optimize costs 0.2 s to import
+
+        if momenta.north == 0.0 and self._sleeps(momenta.south, self.mgl):
+            return 0.0
+        if momenta.south == 0.0 and self._sleeps(momenta.north, -self.mgl):
+            return math.pi
+        below, above = 1e-9, math.pi - 1e-9
+        if self.potential_slope(below, momenta) >= 0.0:  # the minimum is closer to the pole than anyone can tell
+            return 0.0
+        if self.potential_slope(above, momenta) <= 0.0:
+            return math.pi
+        return float(brentq(self.potential_slope, below, above, args=(momenta,), xtol=4e-16, rtol=1e-15))
+
+    def _sleeps(self, through: float, mgl: float) -> bool:
+        """Is the pole that these momenta allow a minimum of V? `through` is 2 I3 w3 there."""
+        return through * through >= 16.0 * self.I1 * mgl
+
+    def nutation_frequency(self, momenta: Momenta) -> float:
+        """Angular frequency of small nutations about the steady precession with these momenta."""
+        theta = self.steady_theta(momenta)
+        if theta in (0.0, math.pi):
+            # x cot(x)-like limit of V'': one momentum combination vanishes, the other is 2 I3 w3
+            through = momenta.south if theta == 0.0 else momenta.north
+            mgl = self.mgl if theta == 0.0 else -self.mgl
+            return math.sqrt(max(through**2 / 16.0 - self.I1 * mgl, 0.0)) / self.I1
+        return math.sqrt(max(self.potential_curvature(theta, momenta), 0.0) / self.I1)
+
+    def turning_cosines(self, at: Angles) -> tuple[float, float]:
+        """The two values of cos(theta) between which this motion nutates, lower one first.
+
+        They are the roots in [-1, 1] of ``(1-u^2)(alpha - beta u) - (b - a u)^2`` to about 1e-14, or 1e-8 where
+        the two coincide; `symtop.exact` has them to any precision.
+        """
+        excess, beta, a, b = self._cubic(at)
+
+        def speed(u: float) -> float:
+            return (1.0 - u * u) * (excess + beta * (start - u)) - (b - a * u) ** 2
+
+        start = math.cos(at.theta)
+        return _bisect(speed, -1.0, start), _bisect(speed, 1.0, start)
+
+    def nutation_period(self, at: Angles) -> float:
+        """Time of one nutation, ``2 pi / AGM(sqrt(beta (u3-u1)), sqrt(beta (u3-u2)))``; inf on a separatrix."""
+        low, high = self.turning_cosines(at)
+        frequency, _ = self._mean(at, low, high)
+        return 2.0 * math.pi / frequency if frequency > 0.0 else math.inf
+
+    def mean_square_momentum(self, at: Angles) -> float:
+        """The mean of ``|L|^2 = 2 I1 (E - mgl u) + p_psi^2 (1 - I1/I3)`` over a nutation, to 1e-14."""
+        low, high = self.turning_cosines(at)
+        excess, beta, a, _ = self._cubic(at)
+        _, gained = self._mean(at, low, high)
+        return self.I1**2 * (excess + beta * (math.cos(at.theta) - low) - gained + a * a)
+
+    def _mean(self, at: Angles, low: float, high: float) -> tuple[float, float]:
+        """The AGM of sqrt(beta (u3-u1)) and sqrt(beta (u3-u2)), and the mean of beta (u - u1), u the cosine.
+
+        The mean is ``sum 2^(n-1) c_n^2``, c_0^2 = x^2 - y^2 and c_(n+1) = (x - y)/2 along the AGM (DLMF 19.8.6).
+        """
+        excess, beta, a, _ = self._cubic(at)
+        # Vieta: beta (u1 + u2 + u3) = alpha + a^2, so that beta -> 0 (the free top) is not a special case
+        total = excess + beta * math.cos(at.theta) + a * a
+        x, y = total - beta * (2.0 * low + high), total - beta * (low + 2.0 * high)
+        x, y = math.sqrt(max(x, 0.0)), math.sqrt(max(y, 0.0))
+        gained, weight = 0.5 * beta * (high - low), 1.0
+        while abs(x - y) > 4e-16 * x and x > 0.0 and y > 0.0:
+            gained += weight * (0.5 * (x - y)) ** 2
+            weight *= 2.0
+            x, y = 0.5 * (x + y), math.sqrt(x * y)
+        return y, gained
+
+    def _cubic(self, at: Angles) -> tuple[float, float, float, float]:
+        """alpha - beta cos(theta), beta, a and b of Goldstein's nutation cubic."""
+        momenta = self.momenta(at)
+        excess = at.theta_dot**2 + (at.phi_dot * math.sin(at.theta)) ** 2
+        return excess, 2.0 * self.mgl / self.I1, momenta.p_psi / self.I1, momenta.p_phi / self.I1
+
+
+def _bisect(function: Callable[[float], float], outside: float, inside: float) -> float:
+    """The sign change between `outside` (function <= 0) and `inside` (function >= 0)."""
+    for _ in range(60):
+        middle = 0.5 * (outside + inside)
+        if function(middle) < 0.0:
+            outside = middle
+        else:
+            inside = middle
+    return 0.5 * (outside + inside)

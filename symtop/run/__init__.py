@@ -1,0 +1,1 @@
+"""One run of one integrator, the truth beside it, and the guard before it."""

@@ -1,0 +1,252 @@
+"""What a run is going to be worth, forecast from a short piece of it before it starts.
+
+The method itself is run for two nutations or a tenth of the run, and compared with the closed form (0.2 us a point). A
+nutation is a closed orbit of the reduced top; its return map is 1 + N with N^2 = 0 (the motion is integrable:
+errors shear, they do not grow exponentially), so that an error e_1 of one piece becomes after n pieces
+
+    e_n = n e_1 + n (n-1)/2 N e_1,      N e_1 = e_2 - 2 e_1.
+
+Symplectic and symmetric methods commit no error along which N shears, and theirs grows linearly. Where two nutations
+cost too much, the probe takes a coarser step and scales its error by the declared order; the passage of a pole is
+then probed by itself at the step of the run.
+
+A step map is linearised where the reduced top stands still: at the steady precession with the momenta of the start,
+one step from two sides of theta and of p_theta gives a matrix of 2 x 2, whose eigenvalues say whether small nutations
+stay small and by what angle a step turns them. This is exact for any method, and needs no table of its coefficients.
+Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters X.3 and XI.3.
+"""
+
+import functools
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.methods.registry import Integrator, Plan, Run, integrator
+from symtop.model import charts
+from symtop.model.scenes import Scene, closed_form
+from symtop.model.top import Angles, SymmetricTop
+
+STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these, 0.05 to 3 ms
+AT_LEAST = 0.25  # of them a probe takes in any case, up to the whole run
+SHARE = 0.1  # of the run, which a probe may always take, but no more than the next two:
+MOST_NUTATIONS = 20.0
+MOST_STEPS = 20_000  # 0.6 ms of Stormer-Verlet
+POINTS = 300  # of a probe that are compared with the closed form
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
+PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
+LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nutation: a few of its steps, milliseconds
+TWINS = {"rk45": "rk45-compiled"}  # takes the same steps in a hundredth of the time
+LEAST_GROWTH = 0.05  # of the error of a piece: less growth from the first to the second is luck
+RESOLVED = 0.3  # rad that the axis may precess in one step at a pole: coarser probes say nothing about the passage
+ASIDE = 1e-5  # rad; how far a step map's starts are set aside, which leaves 1e-10 of its entries
+
+
+class Landmarks(NamedTuple):
+    """What is known exactly about a motion before it is computed."""
+
+    period: float  # of the nutation
+    frequency: float  # of small nutations about the steady precession with the same momenta
+    width: float  # of the nutation, rad
+    gap: float  # closest approach to a pole, rad
+    pole: str  # upper or lower
+    rate: float  # of precession there, rad per unit time
+    shear: float  # relative change of the period when the start is moved by rounding
+
+
+@functools.lru_cache(maxsize=256)
+def _landmarks(top: SymmetricTop, at: Angles) -> Landmarks:
+    form = closed_form(Scene("landmarks", top, at, 1.0))
+    momenta = top.momenta(at)
+    highest, lowest = form.theta_range
+    upper = highest <= math.pi - lowest
+    gap = highest if upper else math.pi - lowest
+    near, far = (momenta.north, momenta.south) if upper else (momenta.south, momenta.north)
+    sine = math.sin(0.5 * gap) ** 2
+    rate = abs(far / math.cos(0.5 * gap) ** 2 + (near / sine if sine > 0.0 else 0.0)) / (4.0 * top.I1)
+    moved = [
+        top.nutation_period(Angles(at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot * (1.0 + turn), at.psi_dot))
+        for turn in (-4e-16, 0.0, 4e-16)
+    ]
+    spread = max(moved) - min(moved)
+    shear = spread / max(moved) if math.isfinite(spread) else 1.0
+    pole, frequency = "upper" if upper else "lower", top.nutation_frequency(momenta)
+    return Landmarks(form.nutation_period, frequency, lowest - highest, gap, pole, rate, shear)
+
+
+def landmarks(scene: Scene) -> Landmarks:
+    """The landmarks of a scene's motion; made once (20 ms, most of it the closed form) and kept."""
+    return _landmarks(scene.top, scene.start)
+
+
+class Probe(NamedTuple):
+    """A short run compared with the closed form."""
+
+    times: charts.Array
+    error: charts.Array  # of the axis, rad; inf where the run had failed
+    outcome: str
+    reached: float  # time of the run, not of the probe
+
+
+class Forecast(NamedTuple):
+    """What a run is going to be worth."""
+
+    axis_error: float  # expected largest, rad; inf if the probe did not get through, 0 if there is nothing to probe
+    rounding: float  # what rounding alone will make of it, rad: large on a separatrix, whatever the method
+    steps_per_nutation: float  # nan for an adaptive method
+    samples_per_nutation: float
+    passage: float  # rad of precession in one step at the closest approach to a pole; nan for an adaptive method
+    outcome: str  # of the probe
+    reached: float
+
+
+def _run(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+    with np.errstate(all="ignore"):
+        return method.solvers[chart](top, start, plan)
+
+
+def _axis(chart: str, states: Any) -> charts.Array:
+    if chart == "angles":
+        return charts.axis_from_angles(states[:, 0], states[:, 2])
+    return states[:, :3] if chart == "axis" else charts.axis_from_quaternion(states[:, :4])
+
+
+def _probe(
+    scene: Scene, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
+) -> Probe:
+    """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance."""
+    form, start = closed_form(scene), scene.start
+    if since:
+        start = Angles(*(float(value) for value in form(since)))
+    place = np.arange(1.0, POINTS + 1.0)
+    place[:-1] += np.mod(GOLDEN * place[:-1], 1.0) - 0.5  # not commensurate with the nutation
+    if method.knob == "step_size":
+        steps = max(1, round(duration / step))
+        marks = np.unique(np.maximum(np.rint(place * (steps / POINTS)).astype(np.int64), 1))
+        piece = Plan(marks * step, steps * step, step, marks, math.nan)
+    else:
+        times = duration * (place / POINTS)
+        piece = Plan(times, duration, math.nan, np.empty(0, dtype=np.int64), plan.tolerance)
+    run = _run(method, chart, scene.top, start, piece)
+    with np.errstate(all="ignore"):
+        error = charts.axis_distance(_axis(chart, np.asarray(run.states)), form.axis(since + piece.times))
+    error[~np.isfinite(error)] = math.inf
+    outcome = "not_finite" if run.outcome == "ok" and not np.isfinite(error).all() else run.outcome
+    return Probe(piece.times, error, outcome, since + run.reached)
+
+
+def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
+    """The largest error of a probe, grown to the horizon; `straight` if the method's error grows linearly."""
+    half = 0.5 * float(probe.times[-1])
+    whole = float(np.max(probe.error))
+    n = horizon / half
+    if n <= 2.0 * (1.0 + 1e-9) or not math.isfinite(whole):
+        return whole
+    if whole < ROUNDED:
+        return whole * math.pow(0.5 * n, 1.5)
+    first = float(np.max(probe.error[probe.times <= half], initial=0.0))
+    if straight:
+        return whole + max(whole - first, LEAST_GROWTH * whole) * (n - 2.0)
+    return n * first + 0.5 * max(abs(whole - 2.0 * first), LEAST_GROWTH * whole) * n * (n - 1.0)
+
+
+def _closest_time(scene: Scene, period: float) -> float:
+    """When the axis first comes closest to a pole."""
+    form, middle, width = closed_form(scene), 0.5 * period, period
+    for _ in range(4):
+        times = middle + width * np.linspace(-0.5, 0.5, 129)
+        middle, width = float(times[int(np.argmin(np.sin(form(times).theta)))]), width / 40.0
+    return middle
+
+
+def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks) -> tuple[float, Probe]:
+    """The largest axis error to expect, and the probe that says so."""
+    straight = bool(method.symplectic or method.symmetric)
+    period = marks.period if math.isfinite(marks.period) else plan.horizon
+    share, twice = min(SHARE * plan.horizon, MOST_NUTATIONS * period), min(2.0 * period, plan.horizon)
+    if method.knob == "tolerance":
+        cheap = integrator(TWINS[method.name]) if method.tier == "python" and method.name in TWINS else method
+        least = twice if cheap.tier == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
+        piece = max(share, least)
+        partial = piece < min(period, 0.5 * plan.horizon)
+        since = max(0.0, _closest_time(scene, period) - 0.5 * piece) if partial else 0.0
+        probe = _probe(scene, cheap, chart, plan, piece, math.nan, since)
+        expected = grown(probe, plan.horizon, straight=straight) * (PARTIAL if partial else 1.0)
+        return max(expected, plan.tolerance), probe  # an error below what was asked for is luck
+    step = plan.step_size
+    share = min(share, MOST_STEPS * step)
+    allowed = max(STEPS[method.tier] * step, share)
+    if twice <= allowed:
+        piece = max(twice, share, AT_LEAST * STEPS[method.tier] * step)
+        probe = _probe(scene, method, chart, plan, min(plan.horizon, piece), step)
+        return grown(probe, plan.horizon, straight=straight), probe
+    coarse = twice / round(allowed / step)
+    probe = _probe(scene, method, chart, plan, twice, coarse)
+    finer: float = (step / coarse) ** (method.order or 1)
+    expected = grown(probe, plan.horizon, straight=straight) * finer
+    if chart == "angles" and marks.rate * coarse > RESOLVED:
+        since = max(0.0, _closest_time(scene, period) - 0.5 * allowed)
+        if since < plan.horizon:
+            probe = _probe(scene, method, chart, plan, min(allowed, plan.horizon - since), step, since)
+            passages = max(1.0, plan.horizon / period)
+            expected = float(np.max(probe.error)) * (passages if straight else passages**2)
+    return expected, probe
+
+
+def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Forecast:
+    """What this run is going to be worth. Costs a probe and never touches the run.
+
+    A method without a knob has nothing to get wrong and is not probed.
+    """
+    marks = landmarks(scene)
+    steps, passage = marks.period / plan.step_size, marks.rate * plan.step_size
+    samples = marks.period * (plan.times.size - 1) / plan.horizon
+    if method.knob is None:
+        return Forecast(0.0, 0.0, steps, samples, passage, "ok", plan.horizon)
+    expected, probe = _expected(scene, method, chart, plan, marks)
+    turns = plan.horizon / marks.period
+    rounding = marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0
+    return Forecast(expected, rounding, steps, samples, passage, probe.outcome, probe.reached)
+
+
+def step_map(scene: Scene, method: Integrator, chart: str, step: float) -> charts.Array | None:
+    """One step linearised about the steady precession with the scene's momenta, on (theta, p_theta / I1 omega).
+
+    None where that precession stands on a pole, small nutations have no frequency, or a step fails.
+    """
+    top, marks, momenta = scene.top, landmarks(scene), scene.top.momenta(scene.start)
+    theta = top.steady_theta(momenta)
+    if not ASIDE < theta < math.pi - ASIDE or marks.frequency <= 0.0:
+        return None
+    columns = []
+    size = np.array([1.0, top.I1 * marks.frequency])
+    plan = Plan(np.array([step]), step, step, np.array([1]), math.nan)
+    for aside, nod in ((ASIDE, 0.0), (0.0, ASIDE * marks.frequency)):
+        ends = []
+        for sign in (1.0, -1.0):
+            start = _with_momenta(top, theta + sign * aside, sign * nod, momenta.north, momenta.south)
+            run = _run(method, chart, top, start, plan)
+            if run.outcome != "ok":
+                return None
+            ends.append(_reduced(chart, run.states[0]))
+        columns.append((ends[0] - ends[1]) / (2.0 * ASIDE * size))
+    found = np.stack(columns, axis=1)
+    return found if np.isfinite(found).all() else None
+
+
+def _with_momenta(top: SymmetricTop, theta: float, theta_dot: float, north: float, south: float) -> Angles:
+    """A state with given p_phi - p_psi and p_phi + p_psi."""
+    x = 0.5 * theta
+    precession = (north / math.sin(x) ** 2 + south / math.cos(x) ** 2) / (4.0 * top.I1)
+    spin = 0.5 * (south - north) / top.I3 - precession * math.cos(theta)
+    return Angles(theta, theta_dot=theta_dot, phi_dot=precession, psi_dot=spin)
+
+
+def _reduced(chart: str, state: Any) -> charts.Array:
+    """theta and p_theta of one state."""
+    if chart == "angles":
+        return np.asarray(state[:2], dtype=np.float64)
+    axis, momentum = _axis(chart, np.asarray(state)[None])[0], np.asarray(state)[-3:]
+    phi = charts.phi_from_axis(axis)
+    return np.array([charts.theta_from_axis(axis), momentum[0] * np.cos(phi) + momentum[1] * np.sin(phi)])

@@ -1,0 +1,111 @@
+"""The guard before a run: one sentence with a remedy where a run is not going to be worth its time, else silence.
+
+Whether a run will go wrong is measured (`symtop.forecast`: the method on a short piece, against the closed form); why
+is read from exact landmarks of the motion. In this order:
+
+    instability   a step turns small nutations by no angle at all: they grow (Verlet beyond h omega = 2)
+    separatrix    the motion itself multiplies rounding by more than any method can bear
+    pole          the axis precesses by a radian or more in one step at its closest approach to a pole (angles only)
+    aliasing      fewer than two steps a nutation
+    resonance     a step turns the nutation by a third or a quarter of a turn (Verlet at h omega = sqrt 3)
+    early end     the probe did not get through
+    growth        small errors of every nutation add up until the horizon
+
+The guard never changes a run. It does not mind how many samples are kept: long runs have fewer than two a nutation by
+right, and `simulate` dithers those that would fall on the same phases.
+"""
+
+import math
+
+import numpy as np
+
+from symtop.methods.outcomes import sentence
+from symtop.methods.registry import Integrator, Plan
+from symtop.model.scenes import Scene
+from symtop.run.forecast import Forecast, Landmarks, forecast, landmarks, step_map
+
+EXPECTED = 2e-2  # rad; a larger forecast is worth a warning (of compiled methods, it was 0.38 of the error or more)
+AIM = 1e-3  # rad, what a remedy aims at
+SMALL_TURN = 0.3  # h omega below which no method loses small nutations
+GROWS = 1e-3  # how much larger than 1 a multiplier of the step map is when small nutations grow
+NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a resonance
+COARSE = 1.0  # rad of precession in a step
+
+
+def warning(scene: Scene, method: Integrator, chart: str, plan: Plan) -> str:
+    """What the user should know before this run, in one sentence with a remedy; empty if all is well."""
+    if method.knob is None:
+        return ""
+    found, marks = forecast(scene, method, chart, plan), landmarks(scene)
+    said = _unstable(scene, method, chart, plan, marks) or _cause(scene, method, chart, plan, marks, found)
+    return f"{method.name} on {scene.name}: {said}" if said else ""
+
+
+def _turn(scene: Scene, method: Integrator, chart: str, step: float) -> float:
+    """The angle by which a step turns small nutations; inf if they grow instead, nan if nobody can say."""
+    matrix = step_map(scene, method, chart, step)
+    if matrix is None:
+        return math.nan
+    multiplier = np.linalg.eigvals(matrix)
+    return math.inf if float(np.max(np.abs(multiplier))) > 1.0 + GROWS else abs(float(np.angle(multiplier[0])))
+
+
+def _unstable(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks) -> str:
+    step = plan.step_size
+    if not step * marks.frequency > SMALL_TURN or not math.isinf(_turn(scene, method, chart, step)):
+        return ""
+    good, bad = SMALL_TURN / marks.frequency, step
+    while bad - good > 1e-3 * bad:
+        middle = 0.5 * (good + bad)
+        good, bad = (good, middle) if math.isinf(_turn(scene, method, chart, middle)) else (middle, bad)
+    return (
+        f"small nutations (frequency {marks.frequency:.4g}) grow at a step of {step:.4g}, the method is stable up to "
+        f"{good:.4g} (h omega = {good * marks.frequency:.3f}); take a step below {0.5 * good:.2g}"
+    )
+
+
+def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks, found: Forecast) -> str:
+    """Why the run will go wrong, and what to do; empty if it will not."""
+    if found.rounding > EXPECTED and found.rounding >= min(found.axis_error, 1.0):
+        return (
+            "the motion passes so close to a separatrix that rounding alone decides when it falls; no method and no "
+            f"step help, shorten the horizon to less than one nutation of {marks.period:.4g}"
+        )
+    if not found.axis_error > EXPECTED:
+        return ""
+    size = f"expect an axis error of {min(found.axis_error, math.pi):.1g} rad by t = {plan.horizon:.4g}"
+    step, frequency = plan.step_size, marks.frequency
+    if chart == "angles" and found.passage > COARSE:
+        return (
+            f"{size}: the axis passes the {marks.pole} pole at {marks.gap:.2g} rad and precesses there by "
+            f"{found.passage:.2g} rad in a step; take a step below {0.1 / marks.rate:.1g} or an integrator whose chart "
+            "has no poles, such as strang"
+        )
+    if found.steps_per_nutation < 2.0:
+        return (
+            f"{size}: a step of {step:.4g} jumps over the nutation, whose period is {marks.period:.4g}; take a step "
+            f"below {marks.period / 20.0:.2g}"
+        )
+    if step * frequency > SMALL_TURN:
+        turn = _turn(scene, method, chart, step)
+        for order in (3, 4):
+            if abs(order * turn - 2.0 * math.pi) < NEAR * order:
+                return (
+                    f"{size}: a step turns the nutation by {turn:.4g} rad, close to 1/{order} of a turn, a resonance "
+                    f"(h omega = {step * frequency:.3f}); take a step of about {_smaller(method, plan, found):.2g}"
+                )
+    if found.outcome != "ok":
+        return f"expect the run to be {sentence(found.outcome, found.reached, plan.horizon)}"
+    if method.knob == "tolerance":
+        tolerance = max(plan.tolerance * AIM / min(found.axis_error, 1.0), method.least_tolerance)
+        return f"{size}: errors add up over {plan.horizon / marks.period:.3g} nutations; try tolerance {tolerance:.1g}"
+    return (
+        f"{size}: a step is 1/{found.steps_per_nutation:.3g} of a nutation and errors add up over "
+        f"{plan.horizon / marks.period:.3g} of them; take a step of about {_smaller(method, plan, found):.2g}"
+    )
+
+
+def _smaller(method: Integrator, plan: Plan, found: Forecast) -> float:
+    """The step at which the forecast would be `AIM`, if the method keeps its order."""
+    step = plan.step_size * math.pow(AIM / min(found.axis_error, 1.0), 1.0 / (method.order or 1))
+    return min(step, plan.step_size * found.steps_per_nutation / 20.0) if found.axis_error > 1.0 else step

@@ -1,0 +1,218 @@
+"""Linear stability of a method, seen from outside: a few steps of the method itself, next to a motion that stands.
+
+Near a steady precession the method's reduced map has a fixed point, and the inclination obeys a recurrence
+
+    theta_{k+1} - t theta_k + d theta_{k-1} = c,       fixed point c/(1 - t + d),     d = 1 for a symmetric method
+
+t is the trace of the linearised map. |t| <= 2: the discrete nutation turns by acos(t/2) a step; beyond, it grows.
+|t| = 2 is the linear limit, t = -1 a third of a turn a step, the resonance that leaves no neighbourhood of the fixed
+point (Moser; Verlet is there at h omega = sqrt 3 and the midpoint rule at 2 sqrt 3). So t(h), which four steps of any
+method show, has the limit and the resonances in it; nothing is assumed about how the method works.
+
+Near the upright (sleeping) top the axis z = e_x + i e_y obeys the same with c = 0 and complex t and d, |d| = 1, in
+charts without poles; in the angles chart the inclination does if p_phi = p_psi. The top sleeps while t^2/d lies in
+[0, 4]. With I1 = mgl = 1 and a = I3 w3 that ends for Strang's splitting where a tan(a h/4) = h, for Cayley's where
+a^2 = 4 + h^2; the motion itself sleeps for a >= 2. Source: Hairer, Lubich, Wanner, Geometric Numerical Integration,
+sections I.5 and X.4 (stability, resonance); Arnold, Mathematical Methods of Classical Mechanics, appendix 7.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from symtop.methods.registry import Integrator, Plan, Run
+from symtop.model import charts
+from symtop.model.scenes import Scene
+from symtop.model.top import Angles, Momenta, SymmetricTop
+
+NUDGE = 1e-6  # rad: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
+TILT = 1e-5  # rad, of the sleeping top
+STEPS = 4
+
+
+def few_steps(method: Integrator, chart: str, top: SymmetricTop, start: Angles, h: float, steps: int = STEPS) -> Run:
+    """The states after 0, 1, ... `steps` steps, as the chart has them."""
+    marks = np.arange(steps + 1, dtype=np.int64)
+    with np.errstate(all="ignore"):
+        return method.solvers[chart](
+            top, start, Plan(np.multiply(h, marks, dtype=float), h * steps, h, marks, math.nan)
+        )
+
+
+def chart_of(method: Integrator) -> str:
+    """The smallest chart of a method that shows the axis, one without poles if there is one."""
+    return next(chart for chart in ("axis", "angles", "attitude") if chart in method.solvers)
+
+
+def inclination(chart: str, states: np.ndarray) -> np.ndarray:
+    """theta of states of a chart."""
+    if chart == "angles":
+        return np.asarray(states[:, 0])
+    axis = states[:, :3] if chart == "axis" else charts.axis_from_quaternion(states[:, :4])
+    with np.errstate(over="ignore"):  # a run may have blown up
+        return charts.theta_from_axis(axis)
+
+
+def with_momenta(top: SymmetricTop, theta: float, momenta: Momenta) -> Angles:
+    """The state at rest in theta with these momenta; exact next to a pole, where p_phi - p_psi cos(theta) cancels."""
+    x = 0.5 * theta
+    rate = (momenta.north / math.sin(x) ** 2 + momenta.south / math.cos(x) ** 2) / (4.0 * top.I1)
+    return Angles(theta=theta, phi_dot=rate, psi_dot=momenta.p_psi / top.I3 - rate * math.cos(theta))
+
+
+class Trace(NamedTuple):
+    """The linearised map of a method at its own steady precession."""
+
+    trace: float  # NaN if the method has no fixed point near the steady precession
+    determinant: float
+    theta: float  # the fixed point
+
+    @property
+    def growth(self) -> float:
+        """Spectral radius; NaN if there is no fixed point."""
+        if not math.isfinite(self.trace):
+            return math.nan
+        return float(np.max(np.abs(np.roots([1.0, -self.trace, self.determinant]))))
+
+
+NO_TRACE = Trace(math.nan, math.nan, math.nan)
+
+
+def trace(method: Integrator, scene: Scene, h: float, rounds: int = 6) -> Trace:
+    """The trace of the map of one step h at the fixed point that the method has near a steady precession."""
+    top, momenta = scene.top, scene.top.momenta(scene.start)
+    chart, standing = chart_of(method), scene.start.theta
+    theta, found, moved = standing, NO_TRACE, math.inf
+    for _ in range(rounds):
+        if not 1e-3 < theta < math.pi - 1e-3:
+            return NO_TRACE
+        start = with_momenta(top, theta + NUDGE, momenta)
+        run = few_steps(method, chart, top, start, h)
+        y = inclination(chart, run.states) - theta
+        if run.outcome != "ok" or not np.isfinite(y).all():
+            return NO_TRACE
+        t, d, c = _recurrence(y, symmetric=bool(method.symmetric))
+        denominator = 1.0 - t + d
+        if denominator == 0.0:
+            return NO_TRACE
+        last, moved = moved, abs(c / denominator)
+        found = Trace(t, d, theta)
+        if moved < NUDGE:
+            return found
+        if moved > 2.0 * last:
+            return NO_TRACE
+        theta += c / denominator
+    return NO_TRACE
+
+
+def _recurrence(y: np.ndarray, *, symmetric: bool) -> tuple[float, float, float]:
+    """t, d and c of y_{k+1} - t y_k + d y_{k-1} = c by least squares; d = 1 for a symmetric method."""
+    one = np.ones(y.size - 2)
+    if symmetric:
+        t, c = np.linalg.lstsq(np.stack([y[1:-1], one], axis=1), y[2:] + y[:-2], rcond=None)[0]
+        return float(t), 1.0, float(c)
+    t, minus_d, c = np.linalg.lstsq(np.stack([y[1:-1], y[:-2], one], axis=1), y[2:], rcond=None)[0]
+    return float(t), -float(minus_d), float(c)
+
+
+def sleep_margin(method: Integrator, spin: float, h: float, top: SymmetricTop | None = None) -> float:
+    """Above zero while the method's upright top sleeps at this spin w3 and step, below when it falls; 1 at most.
+
+    x (1 - x) 4 with x = t^2/4d: the two ways to end it, x = 1 (a pair of frequencies meets) and x = 0 (the step turns
+    the top by half a turn), are both simple sign changes.
+    """
+    body = top or SymmetricTop(1.0, 1.0, 1.0)
+    chart = chart_of(method)
+    p_psi = body.I3 * spin
+    if chart == "angles":  # p_phi = p_psi: the axis would pass through the pole, and V is a parabola
+        rate = p_psi / (2.0 * body.I1 * math.cos(0.5 * TILT) ** 2)
+        start = Angles(theta=TILT, phi_dot=rate, psi_dot=spin - rate * math.cos(TILT))
+    else:
+        start = Angles(theta=TILT, psi_dot=spin)
+    states = few_steps(method, chart, body, start, h, 3).states
+    z = states[:, 0] + 0j if chart == "angles" else states[:, 0] + 1j * states[:, 1]
+    if not np.isfinite(z).all():
+        return math.nan
+    # z2 = t z1 - d z0, z3 = t z2 - d z1
+    base = z[1] * z[1] - z[0] * z[2]
+    if base == 0.0:
+        return math.nan
+    t, d = (z[1] * z[2] - z[0] * z[3]) / base, (z[2] * z[2] - z[1] * z[3]) / base
+    x = float((t * t / (4.0 * d)).real)
+    return 4.0 * x * (1.0 - x)
+
+
+def sign_changes(function: Callable[[float], float], grid: np.ndarray, tolerance: float = 1e-12) -> list[float]:
+    """Where a function changes its sign between neighbours of a grid, by bisection; jumps through NaN do not count."""
+    values = [function(float(x)) for x in grid]
+    found = []
+    for left, right, low, high in zip(grid[:-1], grid[1:], values[:-1], values[1:], strict=True):
+        if not (math.isfinite(low) and math.isfinite(high)) or (low > 0.0) == (high > 0.0):
+            continue
+        a, b = float(left), float(right)
+        while b - a > tolerance * max(1.0, abs(b)):
+            middle = 0.5 * (a + b)
+            value = function(middle)
+            if not math.isfinite(value):
+                break
+            a, b = (middle, b) if (value > 0.0) == (low > 0.0) else (a, middle)
+        found.append(0.5 * (a + b))
+    return found
+
+
+def sleeping_threshold(method: Integrator, h: float) -> float:
+    """The spin w3 at which the upright top of I1 = I3 = mgl = 1 begins to sleep under this method; the motion's is 2.
+
+    The largest root below the spin that turns the top by half a turn in a step. NaN where there is none, and for a
+    method that is not symmetric, whose tops all rise or fall a little in every step.
+    """
+    if not method.symmetric:
+        return math.nan
+    top_spin = min(6.0, 0.9 * 2.0 * math.pi / h)
+    roots = sign_changes(lambda spin: sleep_margin(method, spin, h), np.linspace(1.0, top_spin, 61))
+    return roots[-1] if roots else math.nan
+
+
+STEADILY = 1e-7  # t - 2 beyond rounding
+GROWING = 1e-4  # growth of a nutation per step that counts, for a method that is not symmetric
+
+
+def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[float, float]:
+    """Steps h of a grid at which small nutations first grow, and at which they first turn by a third of a turn; or NaN.
+
+    Both at the steady precession of `scene`. A fixed point that is lost between two steps (an implicit equation without
+    a solution, say) counts as the end of stability; a window narrower than the grid is not seen. Where a method is not
+    symmetric, nutations grow or shrink at every step: there the limit is where they begin to grow by 1e-4 a step, and a
+    third of a turn has no meaning.
+    """
+    found = [trace(method, scene, float(h)) for h in grid]
+
+    def unstable(at: Trace) -> bool:
+        if not method.symmetric:
+            return not at.growth <= 1.0 + GROWING
+        return not -2.0 <= at.trace <= 2.0 + STEADILY  # small steps have t just below 2, up to rounding
+
+    def turned(at: Trace) -> bool:
+        return at.trace <= -1.0
+
+    ends = []
+    for happens in (unstable, turned):
+        first = next((k for k, at in enumerate(found) if happens(at)), 0)
+        a, b = (float(grid[first - 1]), float(grid[first])) if first else (math.nan, math.nan)
+        for _ in range(40 if first else 0):
+            middle = 0.5 * (a + b)
+            a, b = (a, middle) if happens(trace(method, scene, middle)) else (middle, b)
+        ends.append(0.5 * (a + b))
+    limit, third = ends
+    return limit, third if method.symmetric and not third > limit else math.nan
+
+
+def sleeping_threshold_in_theory(name: str, h: float) -> float:
+    """The threshold of `sleeping_threshold` in closed form, for `strang` and `cayley`; 2 is that of the motion."""
+    if name == "cayley":
+        return math.sqrt(4.0 + h * h)
+    if name != "strang":
+        return 2.0
+    return sign_changes(lambda a: a * math.tan(0.25 * a * h) - h, np.array([1.0, min(2.5, 1.9 * math.pi / h)]))[0]

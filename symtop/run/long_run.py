@@ -1,0 +1,299 @@
+"""Long runs: a billion steps in the memory of a thousand, watched while they run, resumable to the same bits.
+
+A run is cut into windows: logarithmic in time, `PER_DECADE` a decade, until they would be longer than `LONGEST`
+steps. In each, `SAMPLES` samples are taken at whole steps that the golden ratio scatters, so that no stride is
+commensurate with the nutation; of every quantity the least, the largest and the mean are kept, and the samples are
+thrown away. Between samples there is the compiled loop alone.
+
+After a window the position of the run, all that its next step depends on, can be written to a checkpoint: whole or not
+at all, at most every `SAVE` seconds, and on an interrupt. A run that finds its checkpoint goes on from there. Where
+windows end is fixed by the number of steps alone, so that a resumed run has the bits of one that was never stopped.
+"""
+
+import contextlib
+import hashlib
+import json
+import math
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from tqdm import tqdm
+
+from symtop.base import datasets
+from symtop.base.ingredients import Ingredients
+from symtop.base.validate import SymtopError, positive, whole
+from symtop.measure import modified_energy as shadow
+from symtop.measure.errors import energy_scale, momentum_scale
+from symtop.methods.compiled import cache_root, source_digest
+from symtop.methods.fixed_step import FixedStep, inside
+from symtop.methods.loop import Loop, Position
+from symtop.methods.outcomes import OK, OUTCOMES, sentence
+from symtop.methods.registry import Integrator, integrator
+from symtop.model import charts
+from symtop.model.scenes import Scene
+from symtop.model.scenes import scene as find_scene
+from symtop.run.simulation import MOST_STEPS
+
+Array = np.ndarray
+Gauge = Callable[[Array, Array], dict[str, Array]]  # states and momenta of samples -> quantities
+
+PER_NUTATION = 1000.37  # steps, where nobody says otherwise: not commensurate with the nutation
+FIRST = 10_000  # steps of the first window
+PER_DECADE = 12
+LONGEST = 20_000_000  # steps: a window of this length takes a second or two, and no more than one is lost by a kill
+SAMPLES = 512
+SAVE = 2.0  # seconds
+QUANTITIES = ("energy", "modified_energy", "p_phi", "p_psi", "theta")
+
+
+def windows(steps: int) -> list[int]:
+    """Where windows end: logarithmic from `FIRST`, then every `LONGEST` steps, the last at `steps`."""
+    ends = [min(FIRST, steps)]
+    while ends[-1] < steps:
+        grown = round(FIRST * 10.0 ** (len(ends) / PER_DECADE))
+        ends.append(min(grown if grown - ends[-1] < LONGEST else ends[-1] + LONGEST, steps))
+    return ends
+
+
+def scattered(begin: int, end: int, samples: int = SAMPLES) -> Array:
+    """At most `samples` whole steps in (begin, end], `end` among them, with strides of no fixed ratio."""
+    place = np.arange(samples, dtype=float)
+    place += np.mod(0.5 * (math.sqrt(5.0) - 1.0) * place, 1.0)
+    marks = begin + 1 + np.floor(place * ((end - begin) / samples)).astype(np.int64)
+    return np.unique(np.append(marks[marks <= end], end))
+
+
+def chart_of(method: Integrator) -> tuple[str, FixedStep]:
+    """The smallest chart in which a method has a compiled loop of fixed steps, and the loop."""
+    for chart in ("axis", "angles", "attitude"):
+        found = inside(method.solvers[chart]) if chart in method.solvers else None
+        if found is not None:
+            return chart, found
+    raise SymtopError(f"{method.name} has no compiled loop of fixed steps, so that it cannot be run in stretches")
+
+
+def watch(where: Scene, method: Integrator, h: float) -> Gauge:
+    """Relative changes of energy, modified energy and momenta since the start, and theta, of any samples of a run.
+
+    The oscillation that the modified energy leaves is fitted on the first `FIRST` steps (`shadow`), which are run here.
+    """
+    chart, solver = chart_of(method)
+    par, rule, state = solver.setup(where.top, where.start, h)
+    assert isinstance(solver.loop, Loop)  # noqa: S101
+    scale, unit, start = energy_scale(where), momentum_scale(where), where.top.momenta(where.start)
+
+    def shown(states: Array) -> Array:
+        return states if solver.present is None else solver.present(par, np.zeros(len(states)), states)
+
+    first = shown(solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES)).states)
+    first = first[np.isfinite(first).all(axis=1)]  # a run may fail in its first steps
+    seen = shown(solver.loop(par, rule, state, h, np.array([0])).states)
+    first = first if len(first) else seen
+    energy_start = float(shadow.energy(where, chart, seen)[0])
+    curve = shadow.oscillation(
+        *shadow.section(chart, first), shadow.modified_energy(where, method.name, chart, first, h)
+    )
+
+    def gauge(states: Array, momenta: Array) -> dict[str, Array]:
+        states = shown(states)
+        modified = shadow.modified_energy(where, method.name, chart, states, h)
+        return {
+            "energy": (shadow.energy(where, chart, states) - energy_start) / scale,
+            "modified_energy": curve.rest(*shadow.section(chart, states), modified) / scale,
+            "p_phi": (momenta[:, 0] - start.p_phi) / unit,
+            "p_psi": (momenta[:, 1] - start.p_psi) / unit,
+            "theta": states[:, 0] if chart == "angles" else charts.theta_from_axis(states[:, :3]),
+        }
+
+    return gauge
+
+
+def long_run(
+    scene: "str | Scene",
+    integrator_: "str | Integrator",
+    *,
+    steps: int,
+    step_size: float,
+    checkpoint: "str | Path | bool" = False,
+    compensated: bool = True,
+    quiet: bool = False,
+) -> xr.Dataset:
+    """Run a fixed-step method for any number of steps and return what it did, window by window.
+
+    Dimension ``window``; ``steps`` is where each ends. For each of energy, modified_energy, p_phi, p_psi (relative
+    changes since the start) and theta (rad): ``NAME_least``, ``NAME_largest``, ``NAME_mean``. `checkpoint` is a file
+    that is written as the run goes on and removed at its end, or True for one in symtop's cache: an interrupted run
+    resumes from it.
+    ``compensated=False`` sums increments plainly, to compare.
+
+    Raises SymtopError for a method without a compiled loop and for a checkpoint of another run.
+    """
+    where, method = find_scene(scene), integrator(integrator_)
+    count, h = whole("steps", steps, 1), positive("step_size", step_size)
+    if count > MOST_STEPS:
+        raise SymtopError(f"steps must be at most {MOST_STEPS}, not {count}")
+    _, solver = chart_of(method)
+    assert isinstance(solver.loop, Loop)  # noqa: S101
+    loop = solver.loop if compensated else solver.loop.plain()
+    par, rule, state = solver.setup(where.top, where.start, h)
+    book = _Book(checkpoint, _identity(where, method, h, count, compensated))
+    at, rows = book.resumed(loop.begun(par, rule, state, h))
+    ends, outcome, reached = windows(count), OK, at.k
+    gauge = watch(where, method, h) if len(rows) < len(ends) else None
+    with (
+        book.kept(),
+        tqdm(total=count, initial=at.k, desc=f"{method.name} on {where.name}", unit="step", unit_scale=True,
+             disable=quiet or None, leave=False) as bar,
+    ):  # fmt: skip
+        while gauge is not None and len(rows) < len(ends) and outcome == OK:
+            done, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))
+            outcome, reached = done.outcome, after.k
+            if outcome == OK:
+                rows.append(_summary(gauge(done.states, done.momenta)))
+                bar.update(after.k - at.k)
+                at = after
+                book.note(at, rows)
+    book.close()
+    columns = np.array(rows).reshape(len(rows), len(QUANTITIES), 3)
+    found: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
+    for i, name in enumerate(QUANTITIES):
+        for m, part in enumerate(("least", "largest", "mean")):
+            found[f"{name}_{part}"] = ("window", columns[:, i, m])
+    return datasets.describe(
+        xr.Dataset(found),
+        title=f"{method.name} on {where.name}, {count} steps",
+        integrator=method.name,
+        scene=where.name,
+        step_size=h,
+        horizon=count * h,
+        compensated=str(compensated).lower(),
+        outcome=OUTCOMES[outcome],
+        outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h),
+        reached_time=reached * h,
+    )
+
+
+def _summary(values: dict[str, Array]) -> list[float]:
+    """Least, largest and mean of each quantity, in their order."""
+    return [
+        float(part) for name in QUANTITIES for part in (values[name].min(), values[name].max(), values[name].mean())
+    ]
+
+
+# ---- checkpoints -----------------------------------------------------------------------------------------------------
+
+
+def _identity(where: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
+    """A hash of all that decides the bits of a run; one name may stand for other coefficients or code next time."""
+    top, start = where.top, where.start
+    numbers = [[getattr(record, name) for name in record.__slots__] for record in (top, start)]
+    made = Ingredients()
+    made.add(method)
+    content = json.dumps([made.values, numbers, h, steps, compensated, source_digest()])
+    return hashlib.sha256(content.encode()).hexdigest()[:20]
+
+
+def leaves(carry: Any) -> list[float]:
+    """The floats in a kernel's carry: tuples of tuples, or one array."""
+    if isinstance(carry, np.ndarray):
+        return [float(value) for value in carry.ravel()]
+    if isinstance(carry, tuple):
+        return [value for part in carry for value in leaves(part)]
+    return [float(carry)]
+
+
+def regrown(carry: Any, values: Iterator[float]) -> Any:
+    """A carry of the same form with other values in it."""
+    if isinstance(carry, np.ndarray):
+        return np.array([next(values) for _ in range(carry.size)]).reshape(carry.shape)
+    if isinstance(carry, tuple):
+        return tuple(regrown(part, values) for part in carry)
+    return next(values)
+
+
+class _Book:
+    """The checkpoint of one run: what was done so far, on disk from time to time."""
+
+    def __init__(self, file: "str | Path | bool", identity: str) -> None:
+        own = cache_root() / "runs" / f"{identity}.nc"
+        self.file = own if file is True else Path(file) if file else None
+        self.identity = identity
+        self.saved = time.monotonic()
+        self.latest: tuple[Position, list[list[float]]] | None = None
+
+    def resumed(self, start: Position) -> tuple[Position, list[list[float]]]:
+        """The position and the windows to go on from: those on disk, or the start."""
+        if self.file is None or not self.file.is_file():
+            return start, []
+        data = datasets.read(self.file)
+        if data.attrs.get("identity") != self.identity:
+            raise SymtopError(
+                f"checkpoint {self.file} belongs to another run or version; remove it or name another file"
+            )
+        values = iter([float(value) for value in data["position"].values])
+        state, low = (tuple(next(values) for _ in start.state) for _ in range(2))
+        at = Position(state, low, regrown(start.carry, values), int(data.attrs["steps_done"]))
+        return at, [[float(value) for value in row] for row in data["rows"].values]
+
+    def note(self, at: Position, rows: list[list[float]]) -> None:
+        """After a window: write it down if the last time was a while ago."""
+        self.latest = (at, list(rows))  # a copy: an interrupt may fall between a window and its note
+        if time.monotonic() - self.saved > SAVE:
+            self.save()
+
+    def save(self) -> None:
+        """Write what is not yet on disk."""
+        if self.file is None or self.latest is None:
+            return
+        at, rows = self.latest
+        numbers = [*at.state, *at.low, *leaves(at.carry)]
+        data = xr.Dataset({"position": ("number", numbers), "rows": (("window", "part"), rows)})
+        data.attrs.update(steps_done=at.k, identity=self.identity)
+        datasets.write(data, self.file)
+        self.saved, self.latest = time.monotonic(), None
+
+    @contextlib.contextmanager
+    def kept(self) -> Iterator[None]:
+        """Whatever ends the run early, an interrupt or a polite kill, leaves a checkpoint."""
+        with _ending_on_sigterm():
+            try:
+                yield
+            except BaseException:
+                self.save()
+                raise
+
+    def close(self) -> None:
+        """The run is done."""
+        if self.file is not None:
+            self.file.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _ending_on_sigterm() -> Iterator[None]:
+    """A polite kill ends a run as an interrupt does; only where nobody else listens."""
+
+    def stop(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+        raise SystemExit(128 + number)
+
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def long_windows(where: Scene, method: Integrator, steps: int, per_nutation: float) -> xr.Dataset:
+    """The windows of one long run, resumed if it was begun before: ``window_steps``, ``window_energy_least``, ..."""
+    h = where.nutation_period / per_nutation
+    run = long_run(where, method, steps=steps, step_size=h, checkpoint=True, quiet=True)
+    return run.rename({name: f"window_{name}" for name in run.data_vars}).drop_attrs()

@@ -1,0 +1,288 @@
+"""simulate(): one scene, one integrator, one step or tolerance -> one dataset.
+
+Samples never bend the step: a fixed-step run has h = T/N exactly and is sampled at whole steps, t = k h. Samples
+are uniform unless they would fall on the same few phases of the nutation again and again (an energy error
+that is sampled at multiples of the nutation period reads 1e5 times too small); then they are dithered by the
+golden ratio, and the dataset says so.
+"""
+
+import math
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.base import datasets
+from symtop.base.validate import SymtopError, SymtopWarning, one_of, positive, whole
+from symtop.methods.outcomes import OUTCOMES, sentence
+from symtop.methods.registry import Integrator, Plan, Run, integrator
+from symtop.model import charts
+from symtop.model.scenes import OBSERVABLES, Scene, closed_form, scene
+from symtop.model.top import Angles, SymmetricTop
+from symtop.run.guard import warning
+
+MOST_STEPS = 20_000_000_000  # ten minutes of the fastest kernel
+MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
+WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
+
+_PREFERENCE = {
+    "nutation": ("angles", "axis", "attitude"),
+    "axis": ("axis", "angles", "attitude"),
+    "attitude": ("angles", "attitude"),
+}
+
+
+def choose_chart(method: Integrator, observe: str) -> str:
+    """The smallest chart of the integrator that shows what is observed."""
+    for chart in _PREFERENCE[observe]:
+        if chart in method.solvers:
+            return chart
+    raise SymtopError(f"{method.name} works in {', '.join(method.solvers)} and cannot show the {observe}")
+
+
+def _unseen(times: Any, period: float) -> float:
+    """The widest stretch of nutation phases, as a fraction of a period, in which no sample falls."""
+    phases = np.sort(np.mod(times / period, 1.0))
+    return float(np.max(np.diff(phases, append=phases[0] + 1.0)))
+
+
+def sample_times(horizon: float, samples: int, period: float, steps: int | None = None) -> tuple[Any, Any, bool]:
+    """Times and step marks of the samples, and whether they had to be dithered.
+
+    With `steps`, times are whole multiples of horizon/steps; the first sample is 0 and the last the horizon.
+    """
+    last = samples - 1
+    for dithered in (False, True):
+        place: Any = np.arange(samples, dtype=float)
+        if dithered:
+            golden = 0.5 * (math.sqrt(5.0) - 1.0)
+            place[1:last] += np.mod(golden * place[1:last], 1.0) - 0.5
+        if steps is None:
+            marks, times = np.empty(0, dtype=np.int64), horizon * (place / last)
+        else:
+            marks = np.unique(np.rint(steps * (place / last)).astype(np.int64))
+            times = marks * (horizon / steps)
+        long_enough = math.isfinite(period) and horizon > 2.0 * period
+        if not long_enough or _unseen(times, period) < WIDEST_GAP or (steps is not None and marks.size > steps):
+            return times, marks, dithered
+    return times, marks, True
+
+
+def make_plan(
+    scene: Scene,
+    method: Integrator,
+    step_size: object,
+    tolerance: object,
+    horizon: float,
+    samples: int,
+    budget: float | None = None,
+) -> tuple[Plan, bool]:
+    """Check the knobs against the integrator and the budget, and lay out steps and samples."""
+    period = scene.nutation_period
+    if method.knob == "step_size":
+        if tolerance is not None:
+            raise SymtopError(f"{method.name} has a fixed step: give step_size, not tolerance = {tolerance!r}")
+        if step_size is None:
+            raise SymtopError(f"{method.name} has a fixed step and needs step_size")
+        step = positive("step_size", step_size)
+        if step > horizon:
+            raise SymtopError(f"step_size must be at most the horizon {horizon!r}, not {step!r}")
+        most = MOST_STEPS if budget is None else budget
+        if horizon / step > most:
+            raise SymtopError(
+                f"step_size {step!r} asks for {horizon / step:.3g} steps; the limit is {most:.3g} (see budget)"
+            )
+        steps = max(1, round(horizon / step))
+        times, marks, dithered = sample_times(horizon, samples, period, steps)
+        return Plan(times, horizon, horizon / steps, marks, math.nan), dithered
+    if step_size is not None:
+        raise SymtopError(f"{method.name} chooses its own steps: give tolerance, not step_size = {step_size!r}")
+    if method.knob is None and tolerance is not None:
+        raise SymtopError(f"{method.name} has nothing to tune: leave tolerance out, not {tolerance!r}")
+    bound = math.nan if method.knob is None else method.check_tolerance(tolerance)
+    swings = horizon * max(1.0 / period, math.sqrt(abs(scene.top.mgl) / scene.top.I1) / (2.0 * math.pi))
+    if method.knob is not None and swings > MOST_SWINGS:
+        raise SymtopError(
+            f"horizon {horizon!r} is {swings:.3g} swings of the top; an adaptive method may take {MOST_SWINGS:.3g}"
+        )
+    times, marks, dithered = sample_times(horizon, samples, period)
+    return Plan(times, horizon, math.nan, marks, bound, budget), dithered
+
+
+def simulate(
+    scene: "str | Scene",
+    integrator: "str | Integrator",
+    *,
+    step_size: float | None = None,
+    tolerance: float | None = None,
+    horizon: float | None = None,
+    samples: int = 501,
+    observe: str | None = None,
+    guard: bool | Callable[[str], object] = True,
+    budget: float | None = None,
+) -> xr.Dataset:
+    """Run one integrator on one scene and return what it did.
+
+    Dimension ``time`` (elapsed) and ``component`` (x, y, z). Variables ``theta``, ``phi``, ``psi`` (unwrapped; absent
+    where the chart does not show them), ``axis(time, component)``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, and
+    ``quaternion`` where the chart has one. Samples after a failure are NaN; ``outcome``, ``outcome_message`` and
+    ``reached_time`` say what happened, ``guard`` what was expected to. `observe` ("nutation", "axis", "attitude";
+    default: what the scene is watched for) picks the smallest chart of the integrator that shows it. A run of fewer
+    steps than `samples` shows every step.
+
+    Before the run the `guard` (`symtop.guard`) forecasts what it will be worth and warns (`SymtopWarning`) in one
+    sentence with a remedy if that is little; the run is the same either way. Give a function to be handed the sentence
+    instead, or False for silence where failures are what is looked for. `budget` is the most steps of a fixed-step run
+    (`MOST_STEPS` by default; more are refused) and the most force evaluations, or Taylor steps, of an adaptive one,
+    which then ends `out_of_budget` (by default after one or two minutes).
+
+    Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
+    """
+    chosen, method = _scene(scene), _integrator(integrator)
+    end = chosen.horizon if horizon is None else positive("horizon", horizon)
+    watched = chosen.observes if observe is None else one_of("observe", observe, OBSERVABLES)
+    count = whole("samples", samples, 2)
+    if count > MOST_SAMPLES:
+        raise SymtopError(f"samples must be at most {MOST_SAMPLES}, not {count}")
+    chart = choose_chart(method, watched)
+    limit = None if budget is None else positive("budget", budget)
+    plan, dithered = make_plan(chosen, method, step_size, tolerance, end, count, limit)
+    said = warning(chosen, method, chart, plan) if guard is not False else "off"
+    if guard is not False and said:
+        if callable(guard):
+            guard(said)
+        else:
+            warnings.warn(said, SymtopWarning, stacklevel=2)
+    run = solve_plan(method, chart, chosen.top, chosen.start, plan, f" on {chosen.name}")
+    return datasets.describe(
+        as_dataset(chosen, chart, plan, run),
+        title=f"{method.name} on {chosen.name}",
+        integrator=method.name,
+        scene=chosen.name,
+        chart=chart,
+        tier=method.tier,
+        horizon=end,
+        step_size=plan.step_size,
+        tolerance=plan.tolerance,
+        steps=run.steps,
+        force_evaluations=run.force_evaluations,
+        newton_iterations=run.newton_iterations,
+        outcome=run.outcome,
+        outcome_message=sentence(run.outcome, run.reached, end),
+        reached_time=run.reached,
+        guard=said,
+        sampling="dithered" if dithered else "uniform",
+        top={"I1": chosen.top.I1, "I3": chosen.top.I3, "mgl": chosen.top.mgl},
+        start={name: getattr(chosen.start, name) for name in chosen.start.__slots__},
+    )
+
+
+DIMENSIONS = {"angles": 4, "axis": 6, "attitude": 7}
+MOST_SAMPLES = 10_000_000
+
+
+def solve_plan(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan, where: str = "") -> Run:
+    """What a solver makes of a plan, checked; SymtopError if it breaks or returns something else."""
+    try:
+        return _checked(method, chart, plan, method.solvers[chart](top, start, plan))
+    except SymtopError:
+        raise
+    except Exception as error:
+        said = " ".join(str(error).split())
+        raise SymtopError(f"integrator {method.name} failed{where}: {type(error).__name__}: {said}") from error
+
+
+def _checked(method: Integrator, chart: str, plan: Plan, run: object) -> Run:
+    """What a solver returned, if it is what a solver returns; NaN before the end is an outcome of its own."""
+    shape = (plan.times.size, DIMENSIONS[chart])
+    if not isinstance(run, Run) or np.shape(run.states) != shape or np.iscomplexobj(run.states):
+        found = np.shape(run.states) if isinstance(run, Run) else type(run).__name__
+        raise SymtopError(f"integrator {method.name} must return a Run with real states of shape {shape}, not {found}")
+    if np.shape(run.p_phi) != shape[:1] or np.shape(run.p_psi) != shape[:1] or run.outcome not in OUTCOMES:
+        known = ", ".join(OUTCOMES)
+        raise SymtopError(
+            f"integrator {method.name} must return p_phi and p_psi of shape {shape[:1]} and an outcome of {known}"
+        )
+    whole: Any = np.isfinite(run.states).all(axis=1)
+    if run.outcome == "ok" and not whole.all():
+        reached = float(plan.times[int(np.argmin(whole)) - 1]) if whole[0] else 0.0
+        return run._replace(outcome="not_finite", reached=reached)
+    return run
+
+
+_scene, _integrator = scene, integrator  # the public argument names shadow these
+
+
+def as_dataset(scene: Scene, chart: str, plan: Plan, run: Run) -> xr.Dataset:
+    """The observables of a run, whatever chart it was computed in."""
+    with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up, and that is a result
+        columns = {"angles": _from_angles, "axis": _from_axis, "attitude": _from_attitude}[chart](scene, plan, run)
+    components = {"axis": "component", "quaternion": "part"}
+    variables = {
+        name: (("time", components[name]) if name in components else "time", values) for name, values in columns.items()
+    }
+    coordinates = {"time": plan.times, "component": ["x", "y", "z"]}
+    if "quaternion" in columns:
+        coordinates["part"] = ["w", "x", "y", "z"]
+    return xr.Dataset(variables, coords=coordinates)
+
+
+def _from_angles(scene: Scene, plan: Plan, run: Run) -> dict[str, Any]:  # noqa: ARG001
+    theta, p_theta, phi, psi = run.states.T
+    return {
+        "theta": theta,
+        "phi": phi,
+        "psi": psi,
+        "axis": charts.axis_from_angles(theta, phi),
+        "energy": scene.top.reduced_energy(theta, p_theta, run.p_phi, run.p_psi),
+        "p_theta": p_theta,
+        "p_phi": run.p_phi,
+        "p_psi": run.p_psi,
+    }
+
+
+def space_energy(top: SymmetricTop, axis: Any, momentum: Any, p_psi: Any) -> Any:
+    """Energy of space-frame states: |L|^2/2 I1 + p_psi^2 (1/I3 - 1/I1)/2 + mgl e_z."""
+    return (
+        np.sum(momentum * momentum, axis=-1) / (2.0 * top.I1)
+        + 0.5 * p_psi**2 * (1.0 / top.I3 - 1.0 / top.I1)
+        + top.mgl * axis[..., 2]
+    )
+
+
+def _from_axis(scene: Scene, plan: Plan, run: Run) -> dict[str, Any]:
+    axis, momentum = run.states[:, :3], run.states[:, 3:]
+    phi = charts.phi_from_axis(axis)
+    node = momentum[:, 0] * np.cos(phi) + momentum[:, 1] * np.sin(phi)
+    truth = closed_form(scene)(plan.times)
+    return {
+        "theta": charts.theta_from_axis(axis),
+        "phi": charts.unwrapped(phi, truth.phi),
+        "axis": axis,
+        "energy": space_energy(scene.top, axis, momentum, run.p_psi),
+        "p_theta": node,
+        "p_phi": run.p_phi,
+        "p_psi": run.p_psi,
+    }
+
+
+def _from_attitude(scene: Scene, plan: Plan, run: Run) -> dict[str, Any]:
+    quaternion, momentum = run.states[:, :4], run.states[:, 4:]
+    theta, phi, psi = charts.angles_from_quaternion(quaternion)
+    node = momentum[:, 0] * np.cos(phi) + momentum[:, 1] * np.sin(phi)  # before phi grows and loses digits
+    truth = closed_form(scene)(plan.times)
+    phi, psi = charts.unwrapped(phi, truth.phi), charts.unwrapped(psi, truth.psi)
+    axis = charts.axis_from_quaternion(quaternion)
+    return {
+        "theta": theta,
+        "phi": phi,
+        "psi": psi,
+        "axis": axis,
+        "quaternion": quaternion,
+        "energy": space_energy(scene.top, axis, momentum, run.p_psi),
+        "p_theta": node,
+        "p_phi": run.p_phi,
+        "p_psi": run.p_psi,
+    }

@@ -1,0 +1,110 @@
+"""Are stored results what this version computes? Cases are computed again in a folder of their own and compared.
+
+All but the measured times must agree to the last bit: nothing here is random and no file holds a date. `CLOCKED` names
+the variables that are times or made from them.
+"""
+
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.base import datasets
+from symtop.runner import plugins, store
+from symtop.runner.execute import execute
+from symtop.runner.pools import Workers
+from symtop.runner.run import Round
+from symtop.runner.scripts import file_of
+from symtop.runner.study import Case, Study
+from symtop.runner.work import Result, Task
+
+SAMPLE = 5  # cases of each study
+# in the name of a variable that holds measured times
+CLOCKED = ("seconds", "reliable", "spread", "first_call", "foreseen")
+
+
+class Checked(NamedTuple):
+    """What came of checking one study."""
+
+    study: str
+    stored: int  # cases that are up to date on disk
+    compared: int
+    differences: list[str]
+
+    def verdict(self) -> str:
+        """In words."""
+        return f"{len(self.differences)} differences" if self.differences else "the same to the last bit, times aside"
+
+
+def is_clocked(name: str) -> bool:
+    """Does a variable hold measured times?"""
+    return any(word in name for word in CLOCKED)
+
+
+def differences(stored: xr.Dataset, again: xr.Dataset) -> list[str]:
+    """In what two datasets differ besides measured times and where they were made."""
+    ours, theirs = set(map(str, stored.variables)), set(map(str, again.variables))
+    found = [f"{name} is in one of them only" for name in sorted(ours ^ theirs)]
+    for name in sorted(ours & theirs):
+        one, other = stored[name], again[name]
+        if one.dims != other.dims or one.shape != other.shape:
+            found.append(f"{name} has another shape: {dict(one.sizes)} and {dict(other.sizes)}")
+        elif not is_clocked(name) and not _same(one, other):
+            found.append(f"{name} differs{_how_much(one, other)}")
+    kept = sorted((set(stored.attrs) | set(again.attrs)) - set(datasets.provenance()) - {"content"})
+    pairs = [(key, stored.attrs.get(key), again.attrs.get(key)) for key in kept]
+    return [*found, *(f"attribute {key} differs: {one!r} and {other!r}" for key, one, other in pairs if one != other)]
+
+
+def _same(one: xr.DataArray, other: xr.DataArray) -> bool:
+    """To the last bit, for numbers."""
+    if one.dtype.kind == "f" and one.dtype == other.dtype:
+        return one.values.tobytes() == other.values.tobytes()
+    return one.equals(other)
+
+
+def _how_much(one: xr.DataArray, other: xr.DataArray) -> str:
+    if one.dtype.kind != "f" or other.dtype.kind != "f":
+        return ""
+    with np.errstate(all="ignore"):
+        gap = np.abs(one.values - other.values)
+    return f" by up to {np.nanmax(gap):.3g}" if np.isfinite(gap).any() else " in what is known at all"
+
+
+def check(
+    study: Study, results: Path, workers: Workers, *, quick: bool = False, full: bool = False, everything: bool = False
+) -> Checked:
+    """Compute `SAMPLE` stored cases again, or every one, and compare; likewise the dataset that they make together."""
+    known = Round(study, results.resolve())
+    if not known.add(study.grid(quick=quick, full=full), fresh=False) and study.follow_up is not None:
+        known.add(study.follow_up(known.combined()), fresh=False)
+    stored = dict(sorted(known.done.items(), key=lambda item: store.digest_of(item[0])))  # in no particular order
+    chosen = dict(list(stored.items())[: None if everything else SAMPLE])
+    with tempfile.TemporaryDirectory(prefix="symtop-check-") as elsewhere:
+        again = {Path(elsewhere) / path.name: (path, case) for path, (case, _) in chosen.items()}
+        found = _recompute(study, {path: case for path, (_, case) in again.items()}, workers)
+        for path, (original, case) in again.items():
+            data = store.load_case(path)
+            if data is not None:
+                where = f"{case.integrator} on {case.scene}"
+                found += [f"{where}: {said}" for said in differences(chosen[original][1], data)]
+    whole = results / f"{study.name}.nc"
+    if whole.is_file() and len(stored) == len(known.paths):
+        kept = datasets.read(whole).drop_attrs()
+        found += [f"{whole.name}: {said}" for said in differences(kept, known.combined().drop_attrs())]
+    return Checked(study.name, len(stored), len(chosen), found)
+
+
+def _recompute(study: Study, cases: dict[Path, Case], workers: Workers) -> list[str]:
+    script = str(file_of(study.name))
+    tasks = [Task(script, case, str(path), tuple(plugins.loaded()), study.limit) for path, case in cases.items()]
+    failures: list[str] = []
+
+    def heard(_: Task, result: Result) -> None:
+        if result.state == "failed":
+            failures.append(result.message)
+
+    execute(study, tasks, workers, heard)
+    return failures

@@ -1,0 +1,137 @@
+"""Gets a study's missing cases computed, whatever happens to those who compute them.
+
+The first case of every integrator goes first and the integrator's others follow it, so that its kernels are compiled by
+one worker and found on disk by the rest. A case that another run is computing is left to it, and looked for again at
+the end. If a worker is killed, what it and its neighbours had begun is computed again, each by itself, so that a case
+that kills its process can be told from one that was standing by.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from pathlib import Path
+
+from symtop.base.validate import SymtopError
+from symtop.runner import plugins, store, work
+from symtop.runner.pools import CLUSTER, HERE, Workers
+from symtop.runner.study import Study
+from symtop.runner.work import Result, Task
+
+WORTH_A_POOL = 8  # cases; starting a worker costs two seconds
+MOST_FRUITLESS = 3  # pools that may break without having begun anything
+
+Heard = Callable[[Task, Result], None]
+
+
+def execute(study: Study, tasks: Iterable[Task], workers: Workers, heard: Heard) -> None:
+    """Compute all tasks and call `heard` with each as it ends, in any order; timed ones last, one at a time.
+
+    Raises SymtopError if the results cannot be written or the workers cannot work.
+    """
+    chosen = list(tasks)
+    for timed in (False, True):
+        group = [task for task in chosen if study.is_timed(task.case) == timed]
+        if group:
+            _see_through(study, group, workers, size_for(group, workers, timed=timed), heard, timed=timed)
+
+
+def size_for(tasks: list[Task], workers: Workers, *, timed: bool) -> int:
+    """How many processes: none for few cases and for what only this process knows.
+
+    Many timed cases are handed over one at a time, to workers that have their kernels already if there are any.
+    """
+    ours = {name for task in tasks for name in (task.case.scene, task.case.integrator)}
+    if any(plugins.is_local(name) for name in ours):
+        return HERE
+    if workers.scheduler and not timed:
+        return CLUSTER
+    if len(tasks) < WORTH_A_POOL:
+        return HERE
+    return workers.hired() or 1 if timed else min(workers.jobs, len(tasks))
+
+
+def _see_through(study: Study, tasks: list[Task], workers: Workers, size: int, heard: Heard, *, timed: bool) -> None:
+    left = {task.path: task for task in tasks}
+    doubted: list[Task] = []
+    fruitless = 0
+
+    def note(task: Task, result: Result) -> None:
+        left.pop(task.path)
+        heard(task, result)
+
+    while left:
+        suspect = next((task for task in doubted if task.path in left), None)
+        now = size if suspect is None else 1
+        try:
+            _drain(study, list(left.values()) if suspect is None else [suspect], workers, now, note, timed=timed)
+        except BrokenExecutor:
+            workers.drop(now)
+            begun = [task for task in left.values() if store.was_begun(Path(task.path))]
+            fruitless = 0 if begun else fruitless + 1
+            if fruitless == MOST_FRUITLESS:
+                raise SymtopError(
+                    "the worker processes end before they begin; try --jobs 1 or look at the memory that is left"
+                ) from None
+            for task in begun:
+                _judge(task, note, doubted, alone=task is suspect)
+
+
+def _judge(task: Task, note: Heard, doubted: list[Task], *, alone: bool) -> None:
+    """What became of a case whose process has ended: it hung, it ended its process, or it has to be tried alone."""
+    trace = work.trace_path(Path(task.path))
+    said = trace.read_text() if trace.is_file() else ""
+    trace.unlink(missing_ok=True)
+    if said:
+        _fail(task, f"it was not done after {task.limit:g} s and did not answer", said, note)
+    elif alone:
+        _fail(task, "its process was ended, by the system (memory) or by the method itself", "", note)
+    else:
+        doubted.append(task)
+
+
+def _fail(task: Task, reason: str, trace: str, note: Heard) -> None:
+    message = work.sentence(task.case, reason)
+    store.save_failure(Path(task.path), task.case, message, trace)
+    note(task, Result("failed", message))
+
+
+def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, note: Heard, *, timed: bool) -> None:
+    """Hand over all tasks, the first of each integrator before its others."""
+    pool, width = workers.pool(size), 1 if timed else workers.width(size)
+    known = study if size == HERE else None  # other processes load it by name
+    followers: dict[str, list[Task]] = {}
+    for task in tasks:
+        followers.setdefault(task.case.integrator, []).append(task)
+    ready = deque(group.pop(0) for group in followers.values())
+    futures: dict[Future[Result], Task] = {}
+    elsewhere: list[Task] = []
+    patient = False
+    while ready or futures or elsewhere:
+        if not ready and not futures:
+            ready, elsewhere, patient = deque(elsewhere), [], True
+        while ready and len(futures) < width:
+            task = ready.popleft()
+            futures[pool.submit(work.compute, task, known, wait=patient)] = task
+        for future in wait(futures, return_when=FIRST_COMPLETED).done:
+            task = futures.pop(future)
+            result = _result(future, task, workers, note)
+            ready.extend(followers.pop(task.case.integrator, ()))
+            if result is not None and result.state == "busy":
+                elsewhere.append(task)
+            elif result is not None:
+                note(task, result)
+
+
+def _result(future: "Future[Result]", task: Task, workers: Workers, note: Heard) -> Result | None:
+    """What a worker says; None if it said nothing and the case has failed."""
+    try:
+        return future.result()
+    except (SymtopError, BrokenExecutor):
+        raise
+    except CancelledError as error:
+        raise SymtopError(f"the cluster at {workers.scheduler} has gone away") from error
+    except Exception as error:
+        if not workers.scheduler:
+            raise
+        _fail(task, f"the cluster gave it up: {type(error).__name__}: {error}", "", note)
+        return None

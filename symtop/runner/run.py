@@ -1,0 +1,217 @@
+"""The runner: measures the cases that are missing, combines them, draws, and writes down what it found.
+
+A case is computed only if no file holds its digest, so that an interrupted study resumes and an unchanged one
+ends in seconds. Untimed cases share all cores; timed ones run alone. A study may have a second round of cases, made
+from what the first one found. Two runs may share one folder: each case is computed by one of them.
+"""
+
+import contextlib
+import hashlib
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+from tqdm import tqdm
+
+from symtop.base import datasets
+from symtop.base.validate import SymtopError, positive
+from symtop.runner import depends, plugins, store
+from symtop.runner.execute import execute
+from symtop.runner.pools import Workers
+from symtop.runner.scripts import file_of, folder, load, names
+from symtop.runner.study import Case, Picture, Study
+from symtop.runner.work import Result, Task
+
+__all__ = ["folder", "load", "names", "run", "status"]
+
+DONE, FAILED, STALE, MISSING = STATES = ("done", "failed", "stale", "missing")
+
+
+@dataclass
+class Round:
+    """Cases of a study, what is known of them, and what computing them has brought."""
+
+    study: Study
+    results: Path
+    done: dict[Path, tuple[Case, xr.Dataset]] = field(default_factory=dict)
+    paths: dict[Path, Case] = field(default_factory=dict)
+    failures: list[str] = field(default_factory=list)
+    computed: int = 0
+
+    def add(self, cases: Iterable[Case], *, fresh: bool) -> dict[Path, Case]:
+        """Take cases in; returns those that have to be computed."""
+        new = {store.case_path(self.results, self.study, case): case for case in cases}
+        self.paths |= new
+        if not fresh:
+            self._look(new)
+        return {path: case for path, case in new.items() if path not in self.done}
+
+    def _look(self, paths: dict[Path, Case]) -> None:
+        found = {path: data for path in paths if (data := store.load_case(path)) is not None}
+        self.done |= {path: (paths[path], data) for path, data in found.items()}
+
+    def compute(self, missing: dict[Path, Case], workers: Workers, limit: float, *, fresh: bool, quiet: bool) -> None:
+        """Have cases computed, with a progress bar where somebody is watching."""
+        script = str(file_of(self.study.name))
+        tasks = [Task(script, case, str(path), tuple(plugins.loaded()), limit, fresh) for path, case in missing.items()]
+        with _bar(self.study.name, len(tasks), quiet=quiet) as bar:
+
+            def heard(_: Task, result: Result) -> None:
+                if result.state == "failed":
+                    self.failures.append(result.message)
+                    bar.set_postfix_str(f"{len(self.failures)} failed", refresh=False)
+                self.computed += result.state == "computed"
+                bar.update()
+
+            execute(self.study, tasks, workers, heard)
+        self._look(missing)
+
+    def in_order(self) -> list[tuple[Case, xr.Dataset]]:
+        """Cases and what they measured, in the order of the grid."""
+        return [self.done[path] for path in self.paths if path in self.done]
+
+    def combined(self) -> xr.Dataset:
+        """One dataset of all that was measured."""
+        if not self.done:
+            why = self.failures[0] if self.failures else "the grid is empty"
+            raise SymtopError(f"study {self.study.name}: no case could be measured; {why}")
+        return store.combine(self.in_order())
+
+
+def _bar(name: str, total: int, *, quiet: bool) -> Any:
+    unseen = quiet or sys.stderr is None or not sys.stderr.isatty() or total == 0
+    return tqdm(total=total, desc=name, unit="case", disable=unseen, leave=False)
+
+
+def _stamp(study: Study, digests: Iterable[str]) -> str:
+    """Hash of what the findings depend on: the cases, the script and the code that it draws and judges with."""
+    digest = hashlib.sha256("".join(digests).encode())
+    if study.follow_up is not None:  # its cases are timed
+        digest.update(datasets.provenance()["processor"].encode())
+    digest.update(depends.script_digest(file_of(study.name)).encode())
+    return digest.hexdigest()[:20]
+
+
+def _drawn(study: Study, results: Path, stamp: str) -> dict[str, Any] | None:
+    """The findings of an earlier run, if they and all their pictures are still good."""
+    before = store.read_json(results / f"{study.name}.json")
+    if not isinstance(before, dict) or before.get("stamp") != stamp:
+        return None
+    try:
+        pictures = [results / "figures" / picture["file"] for picture in before["pictures"]]
+    except (KeyError, TypeError):
+        return None
+    return before if all(file.is_file() for file in [*pictures, results / f"{study.name}.nc"]) else None
+
+
+@contextlib.contextmanager
+def _hired(workers: Workers | None, jobs: int | None, results: Path, study: Study) -> Iterator[Workers]:
+    """Those workers, or some of our own for as long as it takes; an early end leaves nothing lying about."""
+    hired = workers or Workers(jobs)
+    try:
+        yield hired
+    except BaseException:
+        hired.close()
+        store.tidy(results, study)
+        raise
+    if workers is None:
+        hired.close()
+
+
+def run(study: Study, results: Path, *, quick: bool = False, full: bool = False, fresh: bool = False,
+        jobs: int | None = None, quiet: bool = False, workers: Workers | None = None,
+        limit: float | None = None) -> dict[str, Any]:  # fmt: skip
+    """Bring a study's dataset, figures and findings up to date; returns the findings.
+
+    `quick` is the coarse grid, `full` the longest one of a study that has it; `limit` is the time a case may take, in
+    seconds (the study's own by default). Cases that fail are named in ``failures``, recorded beside the others with
+    their traceback, and tried again the next time.
+    Raises SymtopError if the results cannot be written or nothing could be measured.
+    """
+    began = time.monotonic()
+    results = results.resolve()
+    seconds = study.limit if limit is None else positive("limit", limit)
+    store.prepare(results, study)
+    known = Round(study, results)
+    missing = known.add(study.grid(quick=quick, full=full), fresh=fresh)
+    stamp = _stamp(study, sorted(path.name for path in known.paths))
+    before = _drawn(study, results, stamp)
+    if before is not None and not missing:
+        return {**before, "computed": 0, "seconds": time.monotonic() - began}
+    with _hired(workers, jobs, results, study) as hired:
+        known.compute(missing, hired, seconds, fresh=fresh, quiet=quiet)
+        if study.follow_up is not None:
+            later = known.add(study.follow_up(known.combined()), fresh=fresh)
+            known.compute(later, hired, seconds, fresh=fresh, quiet=quiet)
+    with store.claim(results / f"{study.name}.nc", wait=True):
+        findings = _conclude(known, stamp, quick=quick)
+    return {**findings, "computed": known.computed, "seconds": time.monotonic() - began}
+
+
+def _conclude(known: Round, stamp: str, *, quick: bool) -> dict[str, Any]:
+    """Combine, draw, judge and write."""
+    study, results = known.study, known.results
+    for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
+        datasets.sweep(file)
+    combined = datasets.describe(known.combined(), study.title, question=study.question)
+    datasets.write(combined, results / f"{study.name}.nc")
+    store.forget(results, study, known.paths)
+    findings = findings_of(study, combined, results, failures=known.failures, cases=len(known.paths))
+    findings |= {"quick": quick, "stamp": stamp if not known.failures else ""}
+    store.write_json(results / f"{study.name}.json", findings)
+    return findings
+
+
+def findings_of(study: Study, data: xr.Dataset, results: Path, *, failures: list[str], cases: int) -> dict[str, Any]:
+    """Draw a dataset and say what it shows, as the report wants it."""
+    opening = None if study.opening is None else study.opening(data)
+    return {
+        "study": study.name,
+        "title": study.title,
+        "question": study.question,
+        "how_to_read": study.how_to_read,
+        "verdict": study.verdict(data),
+        "tables": [table._asdict() for table in study.tables(data)],
+        "charts": [chart._asdict() for chart in study.charts(data)],
+        "opening": None if opening is None else {**opening._asdict(), "table": opening.table._asdict()},
+        "pictures": [_save(results, study, picture) for picture in study.pictures(data)],
+        "failures": failures,
+        "cases": cases,
+        "quick": False,
+        "provenance": datasets.provenance(),
+    }
+
+
+def status(study: Study, results: Path, *, quick: bool = False, full: bool = False) -> list[dict[str, str]]:
+    """What is known of every case: ``done``, ``failed``, ``stale`` (its sources have changed) or ``missing``.
+
+    The second round of a study is known only when its first is done.
+    """
+    known = Round(study, results.resolve())
+    missing = known.add(study.grid(quick=quick, full=full), fresh=False)
+    if study.follow_up is not None and not missing:
+        known.add(study.follow_up(known.combined()), fresh=False)
+    older = {store.label_of(path) for path in store.superseded(known.results, study, known.paths)}
+    rows = []
+    for path, case in known.paths.items():
+        record = store.read_json(store.failure_path(path))
+        state, message = STALE if store.label_of(path) in older else MISSING, ""
+        if path in known.done:
+            state = DONE
+        elif isinstance(record, dict):
+            state, message = FAILED, str(record.get("message", ""))
+        rows.append({"scene": case.scene, "integrator": case.integrator, "state": state, "message": message})
+    return rows
+
+
+def _save(results: Path, study: Study, picture: Picture) -> dict[str, str]:
+    from symtop.report import style
+
+    suffix = getattr(picture.figure, "suffix", "png")  # a film is a GIF
+    file = f"{study.name}-{picture.name}.{suffix}"
+    style.save(picture.figure, results / "figures" / file)
+    return {"name": picture.name, "file": file, "caption": picture.caption, "alt": picture.alt}

@@ -1,0 +1,268 @@
+"""Where a study's results live: one file a case, one dataset a study, written whole or not at all.
+
+results/cases/STUDY/SCENE--INTEGRATOR--DIGEST.nc             what one case measured
+results/cases/STUDY/SCENE--INTEGRATOR--DIGEST.failed.json    or how it failed, with its traceback
+results/cases/STUDY/.SCENE--INTEGRATOR--DIGEST.lock          while it is being computed
+results/STUDY.nc                                             all of them, with labelled dimensions
+results/STUDY.json                                           verdict, tables and captions for the report
+results/figures/STUDY-NAME.png
+
+A case's file holds the digest of what it was made from and a hash of its values: a truncated, damaged or foreign file
+counts as none. The lock is the operating system's, so that it ends with the process that holds it, however that ends.
+"""
+
+import contextlib
+import json
+import math
+import os
+import tempfile
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.base import datasets
+from symtop.base.validate import SymtopError
+from symtop.runner.study import Case, Study
+
+try:
+    import fcntl
+except ImportError:  # no such locks here: two runs may then compute a case twice, and write the same file
+    fcntl = None  # type: ignore[assignment]
+
+SEED = 0  # of the order in which batches are timed; nothing else here is random
+
+
+def case_path(results: Path, study: Study, case: Case) -> Path:
+    """The file of a case; its name holds the digest of everything the numbers depend on."""
+    return results / "cases" / study.name / f"{case.label}--{study.digest(case)}.nc"
+
+
+def digest_of(path: Path) -> str:
+    """The digest in the name of a case's file."""
+    return path.name.partition(".nc")[0].rpartition("--")[2]
+
+
+def label_of(path: Path) -> str:
+    """The scene and integrator in the name of a case's file."""
+    return path.name.rpartition("--")[0]
+
+
+def prepare(results: Path, study: Study) -> None:
+    """Make the folders of a study and see that they can be written to, before hours are spent on computing."""
+    for folder in (results / "cases" / study.name, results / "figures"):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder) as trial:
+                trial.write(b"symtop")
+        except OSError as error:
+            raise SymtopError(f"cannot write into {folder}: {error.strerror or error}") from error
+    for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
+        if file.is_dir():
+            raise SymtopError(f"cannot write {file}: it is a folder")
+
+
+def save_case(data: xr.Dataset, path: Path, study: Study, case: Case) -> None:
+    """Store what a case measured, with what it was made from."""
+    described = datasets.describe(
+        data,
+        f"{study.name}: {case.integrator} on {case.scene}",
+        study=study.name,
+        settings=dict(case.settings),
+        sources=digest_of(path),
+        seed=SEED,
+        content=datasets.fingerprint(data),
+    )
+    datasets.write(described, path)
+    failure_path(path).unlink(missing_ok=True)
+
+
+def load_case(path: Path) -> xr.Dataset | None:
+    """The dataset of a finished case, or None if there is none or it is damaged (then it is computed again)."""
+    if not path.is_file():
+        return None
+    try:
+        data = datasets.read(path)
+    except SymtopError:
+        return None
+    whole = data.attrs.get("sources") == digest_of(path) and data.attrs.get("content") == datasets.fingerprint(data)
+    return data if whole else None
+
+
+def failure_path(path: Path) -> Path:
+    """Where the failure of a case is recorded."""
+    return path.with_name(f"{path.name.removesuffix('.nc')}.failed.json")
+
+
+def save_failure(path: Path, case: Case, message: str, trace: str) -> None:
+    """Record how a case failed; a file that an earlier run may have left is no longer its result."""
+    write_json(
+        failure_path(path),
+        {
+            "scene": case.scene,
+            "integrator": case.integrator,
+            "settings": dict(case.settings),
+            "message": message,
+            "traceback": trace.splitlines(),
+        },
+    )
+    path.unlink(missing_ok=True)
+
+
+def lock_path(path: Path) -> Path:
+    """The lock of a case, or of a study's dataset."""
+    return path.with_name(f".{path.name.removesuffix('.nc')}.lock")
+
+
+@contextlib.contextmanager
+def claim(path: Path, *, wait: bool) -> Iterator[bool]:
+    """Hold a file's lock, so that nobody else computes it; yields False if somebody else holds it and `wait` is false.
+
+    The lock's file is there while it is held, and afterwards if its holder was killed (see `was_begun`).
+    """
+    if fcntl is None:
+        yield True
+        return
+    lock = lock_path(path)
+    while True:
+        try:
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            handle = os.open(lock, os.O_CREAT | os.O_RDWR, 0o644)
+        except OSError as error:
+            raise SymtopError(f"cannot write {lock}: {error.strerror or error}") from error
+        try:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            except BlockingIOError:
+                yield False
+                return
+            if not _is_file(handle, lock):  # its holder removed it while we waited
+                continue
+            os.utime(handle)  # since when it is held
+            try:
+                yield True
+            finally:
+                lock.unlink(missing_ok=True)
+            return
+        finally:
+            os.close(handle)
+
+
+def _is_file(handle: int, path: Path) -> bool:
+    try:
+        return os.fstat(handle).st_ino == path.stat().st_ino
+    except FileNotFoundError:
+        return False
+
+
+def was_begun(path: Path) -> bool:
+    """Did somebody begin to compute a case, and end before it was done?"""
+    if fcntl is None or not lock_path(path).is_file():
+        return False
+    with claim(path, wait=False) as ours:
+        return ours
+
+
+def combine(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
+    """One dataset over scene and integrator; a cell nobody measured is NaN (a byte 255, a string empty)."""
+    cases = [one for case, data in cases for one in _apart(case, data)]
+    scenes = list(dict.fromkeys(case.scene for case, _ in cases))
+    methods = list(dict.fromkeys(case.integrator for case, _ in cases))
+    sizes: dict[str, int] = {}
+    coordinates: dict[str, Any] = {"scene": scenes, "integrator": methods}
+    for case, data in cases:
+        for name, size in data.sizes.items():
+            if name in data.coords and name in coordinates and data[name].dtype.kind == "f":
+                shared = min(size, sizes[str(name)])
+                if not np.array_equal(data[name].values[:shared], coordinates[str(name)].values[:shared]):
+                    raise SymtopError(f"the coordinate {name} of {case.label} differs from that of the other cases")
+            if size > sizes.get(str(name), 0):
+                sizes[str(name)] = size
+                if name in data.coords:
+                    coordinates[str(name)] = data[name]
+    filled: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {}
+    for case, data in cases:
+        place = scenes.index(case.scene), methods.index(case.integrator)
+        for name, variable in data.data_vars.items():
+            dims = tuple(str(dim) for dim in variable.dims)
+            if str(name) not in filled:
+                shape = (len(scenes), len(methods), *(sizes[dim] for dim in dims))
+                blank = np.full(shape, *_blank(variable.dtype))
+                filled[str(name)] = (("scene", "integrator", *dims), blank, dict(variable.attrs))
+            corner = tuple(slice(0, size) for size in variable.shape)
+            filled[str(name)][1][(*place, *corner)] = variable.values
+    variables = {
+        name: (dims, values.astype(str) if values.dtype == object else values, attrs)
+        for name, (dims, values, attrs) in filled.items()
+    }
+    return xr.Dataset(variables, coords=coordinates)
+
+
+def _apart(case: Case, data: xr.Dataset) -> list[tuple[Case, xr.Dataset]]:
+    """A case that measured several integrators, as one case for each of them."""
+    if "integrator" not in data.dims:
+        return [(case, data)]
+    names = [str(name) for name in data["integrator"].values]
+    return [(replace(case, integrator=name), data.sel(integrator=name, drop=True)) for name in names]
+
+
+def _blank(kind: "np.dtype[Any]") -> tuple[Any, Any]:
+    """What stands for nothing in an array of that type, and the type that can hold it."""
+    if kind.kind in "OUT":
+        return "", object
+    return (np.iinfo(kind).max, kind) if kind.kind == "u" else (math.nan, float)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Replace a small text file in one move."""
+    with datasets.replacing(path) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Replace a JSON file in one move."""
+    write_text(path, json.dumps(content, indent=1, ensure_ascii=False, default=str) + "\n")
+
+
+def read_json(path: Path) -> Any:
+    """The content of a JSON file, or None if there is none or it is damaged."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def superseded(results: Path, study: Study, keep: Iterable[Path]) -> list[Path]:
+    """Files of the same scene and integrator with another digest; cases that were not asked for are none of them."""
+    wanted = {path.name for path in keep}
+    labels = {label_of(path) for path in keep}
+    found = sorted((results / "cases" / study.name).glob("[!.]*.nc"))
+    return [path for path in found if path.name not in wanted and label_of(path) in labels]
+
+
+def forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
+    """Remove what newer files replace, and what killed writers left."""
+    keep = list(keep)
+    for path in superseded(results, study, keep):
+        path.unlink(missing_ok=True)
+        failure_path(path).unlink(missing_ok=True)
+    wanted = {failure_path(path).name for path in keep}
+    labels = {label_of(path) for path in keep}
+    cases = results / "cases" / study.name
+    for path in cases.glob("[!.]*.failed.json"):
+        if path.name not in wanted and label_of(path) in labels:
+            path.unlink(missing_ok=True)
+    tidy(results, study)
+
+
+def tidy(results: Path, study: Study) -> None:
+    """Remove what processes that were killed have left beside the cases of a study, and nobody holds any more."""
+    for lock in (results / "cases" / study.name).glob(".*.lock"):
+        path = lock.with_name(f"{lock.name[1:].removesuffix('.lock')}.nc")
+        with claim(path, wait=False) as ours:
+            if ours:
+                datasets.sweep(path)
+                path.with_name(f".{path.name.removesuffix('.nc')}.trace").unlink(missing_ok=True)

@@ -1,0 +1,136 @@
+"""The command line: what it prints, its exit codes, and that it starts fast."""
+
+import json
+import subprocess
+import sys
+import time
+
+import pytest
+from click.testing import CliRunner
+
+from symtop.base import datasets
+from symtop.cli.main import main
+
+
+def call(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def test_run_prints_the_errors_and_writes_the_dataset(tmp_path):
+    path = tmp_path / "run.nc"
+    done = call("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", path)
+    assert done.exit_code == 0, done.output
+    assert "angle between axes" in done.output
+    assert datasets.read(path).attrs["integrator"] == "midpoint"
+
+
+def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
+    path = tmp_path / "run.nc"
+    done = call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path)
+    assert done.exit_code == 3, done.output
+    assert "theta left (0, pi)" in done.output
+    assert datasets.read(path).attrs["outcome"] == "left_chart"
+
+
+def test_tables_are_complete_and_json_is_json():
+    assert {row["name"] for row in json.loads(call("integrators", "--json").output)} >= {
+        "midpoint", "trapezoidal", "stormer-verlet", "rk45", "taylor",
+    }  # fmt: skip
+    assert "spheroid" in call("scenes").output
+    assert call("integrators", "--markdown").output.startswith("| name |")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["run", "sferoid", "midpoint", "--step-size", "0.1"], "did you mean spheroid"),
+        (["run", "spheroid", "midpont", "--step-size", "0.1"], "did you mean midpoint"),
+        (["run", "spheroid", "midpoint"], "needs step_size"),
+        (["run", "spheroid", "midpoint", "--step-size", "0"], "step_size must be above zero"),
+        (["run", "spheroid", "midpoint", "--step-size", "nan"], "step_size must be a finite number"),
+        (["run", "spheroid", "midpoint", "--step-size", "-1"], "step_size must be above zero"),
+        (["run", "spheroid", "midpoint", "--step-size", "1e-300"], "the limit is"),
+        (["study", "convergence", "--status", "--limit", "-5"], "limit must be"),
+        (["run", "spheroid", "midpoint", "--step-size", "99"], "at most the horizon"),
+        (["run", "spheroid", "midpoint", "--step-size", "x"], "not a valid float"),
+        (["run", "spheroid", "midpoint", "--step-size", "0.1", "--tolerance", "1e-3"], "not tolerance"),
+        (["run", "spheroid", "rk45", "--step-size", "0.1"], "give tolerance"),
+        (["run", "spheroid", "rk45"], "needs a tolerance"),
+        (["run", "spheroid", "rk45", "--tolerance", "1e-20"], "must be at least"),
+        (["run", "spheroid", "rk45", "--tolerance", "inf"], "tolerance must be a finite number"),
+        (["run", "spheroid", "taylor", "--horizon", "-3"], "horizon must be above zero"),
+        (["run", "spheroid", "taylor", "--horizon", "nan"], "horizon must be a finite number"),
+        (["run", "spheroid", "taylor", "--samples", "0"], "samples must be a whole number"),
+        (["run", "spheroid", "taylor", "--observe", "psi"], "observe 'psi' is unknown"),
+        (["run", "spheroid", "taylor", "--plugin", "no-such-file.py"], "plugin must be a Python file"),
+        (["study", "convergense"], "did you mean convergence"),
+        (["study"], "name a study or use --all"),
+        (["study", "convergence", "--jobs", "0"], "not in the range"),
+        (["report", "--results", "nothing-here"], "no study has left findings"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_code_2(arguments, says):
+    done = call(*arguments)
+    assert done.exit_code == 2, done.output
+    assert says in done.output
+    assert "Traceback" not in done.output
+
+
+def test_a_plugin_that_raises_is_named(tmp_path):
+    plugin = tmp_path / "broken.py"
+    plugin.write_text("1 / 0\n")
+    done = call("integrators", "--plugin", plugin)
+    assert done.exit_code == 2
+    assert "plugin broken.py failed: ZeroDivisionError" in done.output
+
+
+def test_help_starts_fast():
+    """At most three times what importing click costs, in one run."""
+
+    def best(*command):
+        times = []
+        for _ in range(5):
+            start = time.perf_counter()
+            subprocess.run(command, check=True, capture_output=True)
+            times.append(time.perf_counter() - start)
+        return min(times)
+
+    bare = best(sys.executable, "-c", "import click")
+    assert best(sys.executable, "-m", "symtop.cli", "--help") < 3.0 * bare + 0.05
+
+
+def test_a_run_is_drawn_and_printed_as_json(tmp_path):
+    picture = tmp_path / "deeper" / "run.png"
+    command = ["run", "spheroid", "midpoint", "--step-size", "0.01", "--figure", str(picture), "--json"]
+    result = CliRunner().invoke(main, command)
+    assert result.exit_code == 0
+    found = json.loads(result.output)
+    assert found["steps"] == 800
+    assert 1e-3 < found["errors"]["axis"]["largest"] < 2e-2
+    assert found["errors"]["p_psi"]["largest"] < 1e-14
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("begun", "offered"),
+    [("symtop run sph", "spheroid"), ("symtop run spheroid midp", "midpoint"), ("symtop study cl", "claims")],
+)
+def test_the_shell_completes_names(begun, offered):
+    words = begun.split()
+    told = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": begun, "COMP_CWORD": str(len(words) - 1)}
+    done = CliRunner().invoke(main, prog_name="symtop", env=told)
+    assert f"plain,{offered}" in done.output
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("run spheroid midpoint --step-size 0.01 --figure run.txt", "figure must be"),
+        ("long spheroid midpoint --steps nan", "steps must be"),
+        ("long spheroid midpoint --steps 1.5", "steps must be"),
+    ],
+)
+def test_what_cannot_be_written_or_counted_is_refused(words, said):
+    done = CliRunner().invoke(main, words.split())
+    assert done.exit_code == 2
+    assert said in done.output

@@ -1,0 +1,181 @@
+"""The measures themselves, on data whose answer is known: orders, trends, scales, verdicts, counts, ladders."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import symtop
+from symtop.measure import verdicts
+from symtop.measure.accuracy import error_table, ladder
+from symtop.measure.conservation import trend
+from symtop.measure.errors import errors
+from symtop.measure.growth import growth
+from symtop.measure.order import order
+from symtop.measure.timing import Timing, timings
+from symtop.run.reference import reference
+from symtop.run.simulation import sample_times
+from symtop.runner import store
+from symtop.runner.study import Case
+
+STEPS = 0.1 / 1.5 ** np.arange(16)
+
+
+def test_an_exact_power_is_found_and_points_near_the_bound_are_left_out():
+    fit = order(STEPS, 3.0 * STEPS**2, 1e-16, 1.0)
+    assert fit.slope == pytest.approx(2.0, abs=1e-12)
+    assert fit.constant == pytest.approx(3.0, rel=1e-12)
+    floor = 1e-7
+    noisy = 3.0 * STEPS**2 + floor * np.array([0.9, -0.9] * 8)  # an error of the reference's own size
+    masked = order(STEPS, noisy, floor, 1.0)
+    assert masked.slope == pytest.approx(2.0, abs=0.03)
+    assert np.all(noisy[masked.used] > 10.0 * floor)
+    assert not masked.used[-1]
+
+
+def test_a_curve_that_bends_is_fitted_where_it_is_straight():
+    bent = 0.5 * STEPS**2 * (1.0 + 40.0 * STEPS**2)
+    fit = order(STEPS, bent, 1e-16, 1.0)
+    assert fit.slope == pytest.approx(2.0, abs=0.02)
+    assert not fit.used[0]
+
+
+def test_one_stray_point_does_not_take_the_finer_ones_with_it():
+    error = 0.1 * STEPS**2
+    error[5] *= 0.2
+    fit = order(STEPS, error, 1e-16, 1.0)
+    assert fit.slope == pytest.approx(2.0, abs=0.1)
+    assert fit.used[6:].all()
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (np.full(16, 3e-3), "does not fall"),
+        (np.full(16, 0.5), "does not fall"),
+        (1e-4 + STEPS**2, "does not fall"),
+        (np.full(16, np.nan), "every run failed"),
+        (np.full(16, 3e-15), "fewer than five points"),
+    ],
+)
+def test_what_is_not_a_power_of_the_step_is_not_judged_and_says_why(error, reason):
+    fit = order(STEPS, error, 1e-15, 1.0)
+    assert math.isnan(fit.slope)
+    assert reason in fit.reason
+
+
+@pytest.mark.parametrize("power", [0.0, 0.5, 1.0, 2.0])
+def test_growth_finds_the_exponent_and_ignores_the_start(power):
+    t = np.linspace(0.0, 1000.0, 4001)
+    residual = 1e-6 * t**power * np.abs(np.cos(7.3 * t)) * np.minimum(1.0, t / 2.0) ** 3
+    assert growth(t, residual).slope == pytest.approx(power, abs=0.05)
+
+
+def test_false_alarms_of_the_trend_are_as_rare_as_it_says():
+    rng, t = np.random.default_rng(3), np.linspace(0.0, 1000.0, 2001)
+    noise = [trend(t, rng.normal(size=t.size)).significant for _ in range(200)]
+    walks = [trend(t, np.cumsum(rng.normal(size=t.size))).significant for _ in range(200)]
+    waves = [trend(t, np.sin(0.0314 * k * t)).significant for k in range(1, 60)]
+    assert np.mean(noise) < 0.09
+    assert np.mean(walks) < 0.45
+    assert np.mean(waves) < 0.05
+    assert trend(t, rng.normal(size=t.size) + 0.005 * t).significant
+
+
+def test_errors_are_scaled_by_what_they_say():
+    where = symtop.scene("goldstein")
+    run = symtop.simulate(where, "exact", samples=5)
+    truth = reference(where, run["time"].values, "closed-form")
+    found = errors(where, run.assign(p_phi=run["p_phi"] + 0.5, energy=run["energy"] + 0.16), truth)
+    assert found["p_phi"].values == pytest.approx(0.5 / 5.0, rel=1e-12)  # the larger momentum is p_psi = 5
+    assert found["energy"].values == pytest.approx(0.16 / (where.top.energy(where.start) + 2.0), rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("name", "evaluations"),
+    [("stormer-verlet", 1), ("strang", 1), ("chin-4a", 2), ("srkn-14-6", 14), ("rk4", 4)],
+)
+def test_force_evaluations_are_counted(name, evaluations):
+    run = symtop.simulate("goldstein", name, step_size=0.05, horizon=5.0)
+    assert run.attrs["force_evaluations"] == 100 * evaluations
+
+
+def test_a_node_at_the_start_of_a_step_is_counted_once_a_step():
+    run = symtop.simulate("goldstein", "trapezoidal", step_size=0.05, horizon=5.0)
+    assert run.attrs["force_evaluations"] == run.attrs["newton_iterations"] + 100
+
+
+@pytest.mark.parametrize("fraction", [1.0, 0.5, 1.0 / 3.0])
+def test_samples_at_fractions_of_a_period_are_dithered(fraction):
+    times, _, dithered = sample_times(100.0 * fraction, 101, 1.0)
+    assert dithered
+    assert times[0] == 0.0
+    assert times[-1] == 100.0 * fraction
+
+
+def test_verdicts_tell_the_fates_apart():
+    where = symtop.scene("spheroid")
+    good = symtop.simulate(where, "exact", samples=101)
+    nothing = np.zeros(101)
+    assert verdicts.verdict(where, good, nothing) == "accurate"
+    assert verdicts.verdict(where, good, nothing + 0.5) == "bounded_but_wrong"
+    tilted = good.assign(theta=good["theta"] + 1.0)
+    assert verdicts.verdict(where, tilted, nothing + 0.5) == "wrong_regime"
+    losing = good.assign(energy=good["energy"] * (1.0 - 0.1 * good["time"] / 8.0))
+    assert verdicts.verdict(where, losing, nothing + 0.5) == "drifting"
+    assert verdicts.verdict(where, good.assign_attrs(outcome="left_chart"), nothing) == "left_chart"
+
+
+def test_accurate_means_something_on_a_top_that_nutates_by_a_hair():
+    """`fast` nutates over 4e-4 rad: half a thousandth of a radian is not accurate there."""
+    where = symtop.scene("fast")
+    run = symtop.simulate(where, "exact", samples=101)
+    assert verdicts.verdict(where, run, np.full(101, 1e-5)) == "accurate"
+    assert verdicts.verdict(where, run, np.full(101, 5e-4)) != "accurate"
+
+
+def test_a_table_stops_for_good_once_a_run_took_too_much_work():
+    where = symtop.scene("spheroid")
+    method = symtop.integrator("rk45")
+    table = error_table(where, method, [1e-3, 1e-12, 1e-13, 1e-4], 12.0)
+    assert list(table["outcome"].values) == ["ok", "ok", "not_run", "not_run"]
+
+
+def test_ladders_end_where_they_are_told():
+    where = symtop.scene("spheroid")
+    for name in ("midpoint", "kahan-li-8", "gauss-12"):
+        steps = ladder(symtop.integrator(name), where, 8.0, 6, most=1e4)
+        assert len(steps) == 6
+        assert all(np.diff(steps) < 0.0)
+        assert 8.0 / steps[-1] <= 1.001e4
+    tolerances = ladder(symtop.integrator("rk45"), where, 8.0, 6)
+    assert tolerances[-1] >= symtop.integrator("rk45").least_tolerance
+
+
+def test_two_starts_of_one_top_do_not_share_a_cached_reference():
+    top = symtop.SymmetricTop(2.0, 1.0, 3.0)
+    ends = [
+        float(reference(symtop.Scene("x", top, symtop.Angles(theta=theta, psi_dot=5.0), 1.0), [1.0])["theta"][0])
+        for theta in (0.7, 0.8)
+    ]
+    assert ends[0] != pytest.approx(ends[1], abs=1e-3)
+
+
+def test_combining_refuses_cases_with_different_coordinates():
+    def case(name, horizons):
+        data = xr.Dataset({"error": ("horizon", np.zeros(len(horizons)))}, coords={"horizon": horizons})
+        return Case("spheroid", name), data
+
+    joined = store.combine([case("a", [8.0, 100.0]), case("b", [8.0, 100.0, 1000.0])])
+    assert np.isnan(joined["error"].sel(integrator="a", horizon=1000.0))
+    with pytest.raises(symtop.SymtopError, match="coordinate horizon of spheroid--b differs"):
+        store.combine([case("a", [8.0, 100.0]), case("b", [8.0, 1000.0])])
+
+
+def test_timings_know_when_they_are_noisy():
+    assert Timing((1.0, 1.01, 1.02), 1.0).reliable
+    assert not Timing((1.0, 1.9, 2.0), 1.0).reliable
+    quick, slow = timings([lambda: sum(range(100)), lambda: sum(range(20_000))], batches=3, batch=0.002)
+    assert slow.best > 20.0 * quick.best
+    assert len(quick.samples) == 3

@@ -1,0 +1,209 @@
+"""The Galerkin integrator of order 4 against an independent solution of its own discrete Lagrangian."""
+
+import numpy as np
+import pytest
+from scipy.optimize import root
+
+import symtop
+from symtop.measure.conservation import trend
+from symtop.measure.errors import momentum_scale
+from symtop.measure.step_map import StepMap, angles_at, one_step, return_miss, symplectic_defect
+from symtop.methods import galerkin as kernel
+from symtop.methods.angles import reduced
+from symtop.model.top import effective_force, effective_stiffness
+from tests.conftest import random_scenes
+from tests.methods.test_integrators import fitted
+
+SCENES = ("spheroid", "goldstein")
+NAME = "galerkin-simpson"
+SIMPSON = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+
+
+def point_of(where):
+    """(theta, phi, psi, p_theta, p_phi, p_psi) at a scene's start."""
+    at, momenta = where.start, where.top.momenta(where.start)
+    return np.array([at.theta, at.phi, at.psi, where.top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi])
+
+
+def derivatives(top, theta, rate):
+    """dL/dq' and dL/dq of the Lagrangian in three angles."""
+    s, c = np.sin(theta), np.cos(theta)
+    spin = top.I3 * (rate[2] + rate[1] * c)
+    momentum = np.array([top.I1 * rate[0], top.I1 * rate[1] * s * s + spin * c, spin])
+    force = np.array([s * (top.I1 * rate[1] ** 2 * c - spin * rate[1] + top.mgl), 0.0, 0.0])
+    return momentum, force
+
+
+def independent_step(top, point, h, weights=SIMPSON):
+    """One step from the stationary parabola itself: six equations in (qm, q1), nothing eliminated, SciPy's solver."""
+    q0, p0 = point[:3], point[3:]
+    # rates at the nodes are linear in q0, qm, q1: these are their coefficients, times h
+    shape = np.array([[-3.0, 4.0, -1.0], [-1.0, 0.0, 1.0], [1.0, -4.0, 3.0]])
+
+    def slopes(unknown):
+        q = np.stack([q0, unknown[:3], unknown[3:]])
+        parts = [derivatives(top, q[i, 0], shape[i] @ q / h) for i in range(3)]
+        return [
+            h * weights[j] * parts[j][1] + sum(weights[i] * shape[i, j] * parts[i][0] for i in range(3))
+            for j in range(3)
+        ]
+
+    def equations(unknown):
+        first, middle, _ = slopes(unknown)
+        return np.concatenate([p0 + first, middle])
+
+    at = angles_at(top, point)
+    rate = np.array([at.theta_dot, at.phi_dot, at.psi_dot])
+    found = root(equations, np.concatenate([q0 + 0.5 * h * rate, q0 + h * rate]), tol=1e-14)
+    assert np.max(np.abs(found.fun)) < 1e-12
+    return np.concatenate([found.x[3:], slopes(found.x)[2]])
+
+
+@pytest.mark.parametrize("quantity", ["attitude", "theta", "energy"])
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_order_four_on_the_nonlinear_top(scene_name, quantity):
+    fit = fitted(scene_name, NAME, quantity)
+    assert fit.used.sum() >= 5
+    assert abs(fit.slope - 4.0) + fit.interval < 0.05
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_the_same_quadrature_on_a_straight_line_has_order_two(scene_name):
+    """The negative control: Simpson's rule alone does not make a method of order 4."""
+    fit = fitted(scene_name, "simpson-linear")
+    assert not abs(fit.slope - 4.0) + fit.interval < 0.05
+    assert fit.slope == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.parametrize("where", random_scenes(8, seed=21), ids=lambda s: s.name)
+def test_one_step_is_the_stationary_parabola(where):
+    """The reduction to two unknowns, and all six results of a step, against six equations solved as they stand."""
+    method, point = symtop.integrator(NAME), point_of(where)
+    for h in (0.1, 0.02):
+        found = StepMap(method, "angles", where.top, 1.0, h).image(point)
+        assert np.max(np.abs(found - independent_step(where.top, point, h))) < 2e-12
+
+
+def test_other_weights_are_another_method():
+    where = random_scenes(1, seed=21)[0]
+    point = point_of(where)
+    found = StepMap(symtop.integrator(NAME), "angles", where.top, 1.0, 0.1).image(point)
+    wrong = independent_step(where.top, point, 0.1, weights=(0.17, 0.66, 0.17))
+    assert not np.max(np.abs(found - wrong)) < 2e-12
+
+
+@pytest.mark.parametrize("where", random_scenes(6, seed=22), ids=lambda s: s.name)
+def test_the_six_dimensional_step_map_is_symplectic(where):
+    defect = symplectic_defect(one_step(symtop.integrator(NAME), "angles", where, 0.02), where.start)
+    assert defect.size < 2e-10
+    assert defect.raw[-1] < defect.raw[0] / 100.0  # what is left is the differencing, which falls as its square
+
+
+@pytest.mark.parametrize("where", random_scenes(8, seed=23), ids=lambda s: s.name)
+def test_a_step_and_its_reverse_return_to_the_start(where):
+    assert return_miss(one_step(symtop.integrator(NAME), "angles", where, 0.02), where.start) < 2e-14
+
+
+def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
+    """The negative control of both: p_theta moved by the forces of the first two nodes only."""
+    good = symtop.integrator(NAME)
+
+    def solve(top, start, plan):
+        run = good.solvers["angles"](top, start, plan)
+        states = run.states.copy()
+        states[:, 1] += plan.step_size / 6.0 * top.potential_slope(states[:, 0], top.momenta(start))
+        return run._replace(states=states)
+
+    wrong = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
+    where = random_scenes(1, seed=22)[0]
+    assert symplectic_defect(one_step(wrong, "angles", where, 0.02), where.start).size > 1e-5
+    assert return_miss(one_step(wrong, "angles", where, 0.02), where.start) > 1e-5
+
+
+@pytest.mark.parametrize("where", random_scenes(4, seed=24), ids=lambda s: s.name)
+def test_slopes_at_a_node_are_those_of_the_effective_potential(where):
+    """V' and V'' as the model has them, and the derivatives by the momenta by differences (V' is quadratic in them)."""
+    par, (theta, *_) = reduced(where.top, where.start)
+    south, north, e = par.south, par.north, 0.5
+
+    def V(south, north):
+        return effective_force(theta, north, south, par.I1, par.mgl)[0]
+
+    pull = kernel._pull(par, kernel._node(par, theta), south, north)
+    assert pull.slope == pytest.approx(V(south, north), rel=1e-13)
+    assert pull.stiffness == pytest.approx(effective_stiffness(theta, north, south, par.I1, par.mgl), rel=1e-12)
+    assert pull.south == pytest.approx((V(south + e, north) - V(south - e, north)) / (2 * e), rel=1e-12)
+    assert pull.north == pytest.approx((V(south, north + e) - V(south, north - e)) / (2 * e), rel=1e-12)
+
+
+@pytest.mark.parametrize("where", random_scenes(4, seed=25), ids=lambda s: s.name)
+def test_every_derivative_of_a_trial_is_right(where):
+    """The analytic Jacobian against central differences; one that is off by a thousandth is seen."""
+    par, (theta, *_) = reduced(where.top, where.start)
+    start, m, d, e = kernel._node(par, theta), 0.03, 0.07, 1e-5
+
+    def trial(shift_m, shift_1):
+        return kernel._evaluate(par, start, theta + m + shift_m, theta + d + shift_1)
+
+    def agree(factor):
+        here = trial(0.0, 0.0)
+        by_m = [(a.value - b.value) / (2 * e) for a, b in zip(trial(e, 0.0), trial(-e, 0.0), strict=True)]
+        by_1 = [(a.value - b.value) / (2 * e) for a, b in zip(trial(0.0, e), trial(0.0, -e), strict=True)]
+        pairs = [(jet.by_m, value) for jet, value in zip(here, by_m, strict=True)]
+        pairs += [(jet.by_1, value) for jet, value in zip(here, by_1, strict=True)]
+        scale = max(abs(value) for _, value in pairs)
+        return max(abs(factor * exact - value) for exact, value in pairs) < 1e-6 * scale
+
+    assert agree(1.0)
+    assert not agree(1.001)
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_recomputed_momenta_stay_for_a_million_steps(scene_name):
+    where = symtop.scene(scene_name)
+    run = symtop.simulate(where, NAME, step_size=0.01, horizon=1e4, samples=1001)
+    for name in ("p_phi", "p_psi"):
+        change = (run[name] - run[name][0]).values / momentum_scale(where)
+        assert np.max(np.abs(change)) < 1e-13
+        assert abs(trend(run["time"], change).rise) < 1e-14
+    energy = trend(run["time"], (run["energy"] - run["energy"][0]).values)
+    assert not energy.significant
+
+
+def test_the_recomputed_momenta_see_a_wrong_increment():
+    """The negative control of the last test: a phi that moved 1e-10 too far shows in p_phi."""
+    where = symtop.scene("spheroid")
+    par, state = reduced(where.top, where.start)
+    carry = kernel.begin(par, kernel.Iteration(), state, 0.01)
+    step, *_ = kernel.increment(par, kernel.Iteration(), state, carry, 0.01)
+    right = kernel.observe(par, kernel.Iteration(), state, step, 0.01)
+    assert right == pytest.approx(where.top.momenta(where.start)[:2], rel=1e-14)
+    moved = (step[0], step[1], step[2] + 1e-10, step[3])
+    assert abs(kernel.observe(par, kernel.Iteration(), state, moved, 0.01)[0] - right[0]) > 1e-9
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_the_iteration_ends_soon(scene_name):
+    """At 200 steps a nutation the cubic predictor leaves two iterations; at 2000, one."""
+    where = symtop.scene(scene_name)
+    for resolution, most in ((200.0, 2.1), (2000.0, 1.3)):
+        run = symtop.simulate(where, NAME, step_size=where.nutation_period / resolution)
+        assert run.attrs["newton_iterations"] / run.attrs["steps"] < most
+
+
+def test_near_a_pole_nothing_cancels():
+    """theta swings through 1e-4 of the pole: the momenta of every step are still those of the start."""
+    top = symtop.SymmetricTop(1.0, 1.0, 1.0)
+    point = (1e-4, 0.0, 0.0, 1e-4, 1.0 + 1e-8, 1.0)
+    where = symtop.Scene("grazing", top, angles_at(top, point), 1.0)
+    run = symtop.simulate(where, NAME, step_size=0.01, samples=101)
+    assert run.attrs["outcome"] == "ok"
+    momenta = top.momenta(where.start)
+    drift = np.abs((run["p_phi"] - run["p_psi"]).values - momenta.north)
+    assert np.max(drift) < 4e-16
+
+
+def test_a_step_too_large_ends_in_a_sentence():
+    run = symtop.simulate("spheroid", NAME, step_size=1.1, horizon=100.0, guard=False)
+    assert run.attrs["outcome"] in ("left_chart", "not_converged")
+    assert "stopped at t =" in run.attrs["outcome_message"]

@@ -1,0 +1,171 @@
+"""Gauss methods: orders, the four constants at once, symmetry, and what they are not."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.measure.conservation import residuals, trend
+from symtop.measure.growth import growth
+from symtop.measure.step_map import one_step as map_of
+from symtop.measure.step_map import symplectic_defect
+from symtop.methods.fixed_step import fixed_step
+from symtop.methods.gauss import STAGES, gauss_rule, march_axis, march_frame
+from symtop.methods.registry import integrator
+from symtop.methods.space import field_axis, frame_to_attitude, on_axis, on_frame
+from symtop.model import charts
+from tests.slopes import assert_order
+
+ONE = np.array([1])
+
+
+def with_rule(stages, **changes):
+    """The Gauss method of so many stages with other numbers in its table."""
+    rule = gauss_rule(stages)._replace(**changes)
+    entry = integrator(f"gauss-{2 * stages}")
+    return dataclasses.replace(
+        entry, name="wrong", solvers={"axis": fixed_step(march_axis, rule, on_axis, stages, implicit=True)}
+    )
+
+
+def nudged(stages, by, mirrored):
+    """mu with one entry moved; `mirrored` keeps mu + mu^T = 1."""
+    mu = gauss_rule(stages).mu.copy()
+    mu[1, 0] += by
+    if mirrored:
+        mu[0, 1] -= by
+    return with_rule(stages, mu=mu)
+
+
+def one_step(stages, state, par, h):
+    return march_axis(par, gauss_rule(stages), tuple(state), h, ONE).states[0]
+
+
+# steps a nutation between which the error is asymptotic and above rounding
+WINDOWS = {2: (60, 2000), 4: (40, 400), 6: (25, 130), 8: (18, 50), 10: (8, 26), 12: (5, 16)}
+
+
+@pytest.mark.parametrize("scene", ["spheroid", "goldstein"])
+@pytest.mark.parametrize("order", WINDOWS)
+def test_order(scene, order):
+    assert_order(scene, integrator(f"gauss-{order}"), order, 0.05 if order <= 6 else 0.3, WINDOWS[order])
+
+
+@pytest.mark.parametrize("order", [4, 8])
+def test_order_of_the_attitude(order):
+    assert_order(
+        "spheroid", integrator(f"gauss-{order}"), order, 0.05 if order <= 6 else 0.3, WINDOWS[order], "attitude"
+    )
+
+
+def test_a_wrong_table_loses_the_order():
+    with pytest.raises(AssertionError, match="order"):
+        assert_order("spheroid", nudged(3, 1e-3, mirrored=True), 6, 0.05, WINDOWS[6])
+
+
+@pytest.mark.parametrize("stages", STAGES)
+def test_the_table(stages):
+    mu, b, _ = gauss_rule(stages)
+    assert np.all(mu + mu.T == 1.0)  # to the last bit: this is what conserves
+    c = mu @ b
+    for k in range(1, 2 * stages + 1):
+        assert abs(np.sum(b * c ** (k - 1)) - 1.0 / k) < 4e-16
+    assert abs(np.sum(b * c ** (2 * stages)) - 1.0 / (2 * stages + 1)) > 1e-8  # no quadrature does better
+    if stages == 2:
+        np.testing.assert_allclose(mu[1, 0], 0.5 + 1.0 / np.sqrt(3.0), rtol=2e-16)
+
+
+def test_one_stage_is_the_midpoint_rule():
+    scene = symtop.scene("spheroid")
+    par, state = on_axis(scene.top, scene.start)
+    before = np.array(state)
+    after = one_step(1, state, par, 0.02)
+    slope = np.array(field_axis(par, tuple(0.5 * (before + after))))
+    np.testing.assert_allclose(after, before + 0.02 * slope, rtol=0, atol=4e-15)
+
+
+def assert_keeps_everything(method, scene, observe, nutation_steps, limit=1e-13):
+    """|e|, L.e, L_z and the energy together, over 1e5 steps, relative."""
+    h = symtop.scene(scene).nutation_period / nutation_steps
+    run = symtop.simulate(scene, method, step_size=h, horizon=1e5 * h, samples=501, observe=observe, guard=False)
+    assert run.attrs["outcome"] == "ok"
+    for name in ("energy", "p_phi", "p_psi"):
+        assert np.max(np.abs(run[name] / run[name][0] - 1.0)) < limit, name
+    assert np.max(np.abs(np.linalg.norm(run["axis"], axis=1) - 1.0)) < limit, "length"
+
+
+@pytest.mark.parametrize("stages", STAGES)
+def test_everything_is_kept(stages):
+    assert_keeps_everything(integrator(f"gauss-{2 * stages}"), "spheroid", "axis", 30.3)
+
+
+@pytest.mark.parametrize("observe", ["axis", "attitude"])
+def test_everything_is_kept_in_both_charts(observe):
+    assert_keeps_everything(integrator("gauss-6"), "goldstein", observe, 30.3)
+
+
+def test_a_table_that_is_not_antisymmetric_keeps_nothing():
+    # 1e-12 is 4500 rounding units of one coefficient
+    with pytest.raises(AssertionError, match=r"energy|p_psi"):
+        assert_keeps_everything(nudged(3, 1e-12, mirrored=False), "spheroid", "axis", 30.3)
+    # the order is lost but not the constants: they need only mu + mu^T = 1
+    assert_keeps_everything(nudged(3, 1e-3, mirrored=True), "spheroid", "axis", 30.3)
+
+
+def test_energy_does_not_drift_where_rk4s_does():
+    scene = symtop.scene("spheroid")
+    period = scene.nutation_period
+    run = symtop.simulate(scene, "gauss-4", step_size=period / 40.3, horizon=2000 * period, samples=4001, guard=False)
+    residual = residuals(scene, run)["energy"]
+    assert abs(trend(run["time"], residual).rise) < 1e-14  # rk4: 6e-3
+    assert growth(run["time"], residual).slope < 0.7  # a random walk has 1/2, rk4 has 1
+
+
+@pytest.mark.parametrize("stages", STAGES)
+def test_steps_are_reversible(stages):
+    scene = symtop.scene("spheroid")
+    par, state = on_axis(scene.top, scene.start)
+    back = one_step(stages, one_step(stages, state, par, 0.05), par, -0.05)
+    np.testing.assert_allclose(back, state, rtol=0, atol=2e-14)
+
+
+def test_gauss_methods_are_not_poisson():
+    """Why `symplectic` is false: the bracket is missed by the method's own local error, of order 2s + 1."""
+    scene = symtop.scene("spheroid")
+
+    def defect(order, h):
+        return symplectic_defect(map_of(integrator(f"gauss-{order}"), "axis", scene, h), scene.start).size
+
+    for order, h in ((2, 0.05), (4, 0.1)):
+        coarse, fine = defect(order, h), defect(order, h / 2.0)
+        assert abs(np.log2(coarse / fine) - (order + 1)) < 0.5, (order, coarse, fine)
+    assert defect(12, 0.2) < 1e-9  # the exact map, as far as differences see
+
+
+def test_a_step_that_is_too_large_is_reported():
+    run = symtop.simulate("spheroid", "gauss-2", step_size=0.5, observe="axis", guard=False)
+    assert run.attrs["outcome"] == "not_converged"
+    assert np.isnan(run["theta"][-1])
+    assert np.isfinite(run["theta"][0])
+
+
+@pytest.mark.parametrize("theta", [1e-9, 0.4, np.pi / 2, np.pi - 1e-9])
+def test_frames_are_attitudes(theta):
+    # half-turns about every axis are where three of the four rows of q q^T vanish
+    phi, psi = (values.ravel() for values in np.meshgrid(np.linspace(-3, 3, 7), np.linspace(0, 6, 7)))
+    quaternion = charts.quaternion_from_angles(theta, phi, psi)
+    axis, across = charts.axis_from_quaternion(quaternion), charts.transverse_from_quaternion(quaternion)
+    again = charts.quaternion_from_frame(axis, across)
+    assert np.max(charts.attitude_distance(again, quaternion)) < 2e-15
+
+
+def test_the_frame_turns_with_the_body():
+    """A free top: the frame is carried, and the twist about the axis is exact."""
+    top, start = symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(theta=0.7, psi_dot=3.0, phi_dot=0.4)
+    par, state = on_frame(top, start)
+    h, marks = 0.01, np.array([0, 500, 1000])
+    states = march_frame(par, gauss_rule(6), state, h, marks).states
+    attitude = frame_to_attitude(par, h * marks, states)
+    exact = symtop.ClosedForm(top, start).quaternion(h * marks)
+    assert np.max(charts.attitude_distance(attitude[:, :4], exact)) < 1e-13

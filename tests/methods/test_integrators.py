@@ -1,0 +1,279 @@
+"""The five required integrators: exact values, orders, structure, failures; a wrong twin beside each right one."""
+
+import math
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.measure.accuracy import error_table
+from symtop.measure.order import order
+from symtop.measure.step_map import one_step, return_miss, symplectic_defect
+from symtop.methods import discrete_lagrangian as family
+from symtop.methods.angles import reduced
+from symtop.methods.discrete_lagrangian import Quadrature, march
+from symtop.methods.fixed_step import fixed_step
+from symtop.methods.loop import driver
+from symtop.methods.registry import Integrator
+from tests.conftest import random_scenes
+
+DISCRETE = ("midpoint", "trapezoidal", "stormer-verlet")
+
+
+def fitted(scene_name, method, quantity="attitude", column=None, horizon=8.0):
+    """The fitted order over eight steps, the finest of which is 1e-4 of a nutation."""
+    where = symtop.scene(scene_name)
+    steps = [where.nutation_period / (60.37 * 10 ** (2.2 * k / 9)) for k in range(10)]
+    table = error_table(where, symtop.integrator(method), steps, horizon, observe="attitude")
+    omega = 2 * math.pi / where.nutation_period
+    return order(table["step_size"], table[column or quantity], table[f"{quantity}_bound"], omega)
+
+
+@pytest.mark.parametrize("scene_name", ["spheroid", "goldstein"])
+@pytest.mark.parametrize("name", DISCRETE)
+@pytest.mark.parametrize("quantity", ["attitude", "theta", "energy"])
+def test_order_two_with_its_interval_on_the_nonlinear_top(scene_name, name, quantity):
+    fit = fitted(scene_name, name, quantity)
+    assert fit.used.sum() >= 5
+    assert abs(fit.slope - 2.0) + fit.interval < 0.05
+
+
+@pytest.mark.parametrize(("name", "constant"), [("stormer-verlet", 35.3), ("midpoint", 137.3), ("trapezoidal", 127.9)])
+def test_error_constants_are_the_known_ones(name, constant):
+    """Attitude error C h^2 at t = 8 on spheroid, to 3 %."""
+    fit = fitted("spheroid", name, column="attitude_end")
+    assert fit.constant == pytest.approx(constant, rel=0.03)
+
+
+def test_starting_from_q0_plus_h_v0_costs_an_order():
+    """The negative control of every order test: the start that a public package uses."""
+
+    def begun_wrongly(top, start):
+        par, state = reduced(top, start)
+        rule = Quadrature((0.5,), (1.0,))
+        h = begun_wrongly.h
+        # p1 = D2 Ld(q0, q0 + h v0) moved back by a step is the momentum that this start amounts to
+        d = h * start.theta_dot
+        sums = family._node_sums(rule, start.theta, d, 0.0, 0.0)
+        force = family._forces(par, sums)
+        return par, (state[0], par.I1 * d / h + h * force.W0, *state[2:])
+
+    def solve(top, start, plan):
+        begun_wrongly.h = plan.step_size
+        return fixed_step(march, Quadrature((0.5,), (1.0,)), begun_wrongly, 1, implicit=True)(top, start, plan)
+
+    wrong = Integrator(name="badly-started-midpoint", family="other", summary="", solvers={"angles": solve})
+    where = symtop.scene("goldstein")
+    steps = [where.nutation_period / (200.37 * 10 ** (2.2 * k / 9)) for k in range(10)]
+    table = error_table(where, wrong, steps, 8.0, observe="attitude")
+    fit = order(table["step_size"], table["attitude"], table["attitude_bound"], 2 * math.pi / where.nutation_period)
+    assert fit.slope == pytest.approx(1.0, abs=0.06)
+
+
+@pytest.mark.parametrize("quantity", ["theta", "phi"])
+@pytest.mark.parametrize(
+    ("scene_name", "entry"), [("spheroid", "spheroid_ieee"), ("goldstein", "goldstein_at_rest_ieee")]
+)
+def test_taylor_agrees_with_thirty_digits(truth, scene_name, entry, quantity):
+    run = symtop.simulate(scene_name, "taylor", horizon=8.0, samples=2)
+    assert float(run[quantity][-1]) == pytest.approx(float(truth[entry]["state"][quantity]), abs=1e-13)
+
+
+@pytest.mark.parametrize("where", random_scenes(6, seed=3), ids=lambda s: s.name)
+@pytest.mark.parametrize("name", DISCRETE)
+def test_the_step_map_is_symplectic(name, where):
+    defect = symplectic_defect(one_step(symtop.integrator(name), "angles", where, 0.02), where.start)
+    assert defect.size < 2e-10
+    assert defect.raw[-1] < defect.raw[0] / 100.0  # what is left is the differencing, which falls as its square
+
+
+def explicit_euler(top, start, plan):
+    """Order 1, not symplectic, not symmetric: what the structure tests must catch."""
+    par, (theta, p, phi, psi) = reduced(top, start)
+    from symtop.methods.registry import Run
+    from symtop.model.top import effective_force
+
+    h = plan.step_size
+    for _ in range(int(plan.marks[-1])):
+        slope, rate, cosine = effective_force(theta, par.north, par.south, par.I1, par.mgl)
+        theta, p, phi, psi = (
+            theta + h * p / par.I1,
+            p - h * slope,
+            phi + h * rate,
+            psi + h * (par.p_psi / par.I3 - rate * cosine),
+        )
+    momenta = top.momenta(start)
+    return Run(np.array([[theta, p, phi, psi]]), np.array([momenta.p_phi]), np.array([momenta.p_psi]), 1, 1, 0, "ok", h)
+
+
+@pytest.mark.parametrize("where", random_scenes(4, seed=4), ids=lambda s: s.name)
+def test_a_method_that_is_not_symplectic_is_seen(where):
+    euler = Integrator(name="euler", family="other", summary="", solvers={"angles": explicit_euler})
+    assert symplectic_defect(one_step(euler, "angles", where, 0.02), where.start).size > 1e-6
+    assert return_miss(one_step(euler, "angles", where, 0.02), where.start) > 1e-6
+
+
+@pytest.mark.parametrize("where", random_scenes(8, seed=5), ids=lambda s: s.name)
+@pytest.mark.parametrize("name", DISCRETE)
+def test_a_step_and_its_reverse_return_to_the_start(name, where):
+    assert return_miss(one_step(symtop.integrator(name), "angles", where, 0.02), where.start) < 2e-14
+
+
+def test_a_rule_that_is_not_symmetric_misses_the_start():
+    lopsided = symtop.discrete_lagrangian("left", (0.0, 2.0 / 3.0), (0.25, 0.75))
+    assert lopsided.symmetric is False
+    where = random_scenes(1, seed=5)[0]
+    assert return_miss(one_step(lopsided, "angles", where, 0.02), where.start) > 5e-9  # of the largest coordinate
+
+
+def test_midpoint_is_the_implicit_midpoint_rule_of_the_reduced_hamiltonian():
+    """theta1 - theta0 = h p_mid/I1, p1 - p0 = -h V'(theta_mid): reduction and discretisation commute."""
+    where = symtop.scene("spheroid")
+    run = symtop.simulate(where, "midpoint", step_size=0.01, horizon=0.05, samples=6)
+    momenta = where.top.momenta(where.start)
+    theta, p = run["theta"].values, run["p_theta"].values
+    middle = 0.5 * (theta[1:] + theta[:-1])
+    assert np.diff(theta) == pytest.approx(0.01 * 0.5 * (p[1:] + p[:-1]) / where.top.I1, abs=5e-16)
+    assert np.diff(p) == pytest.approx(-0.01 * where.top.potential_slope(middle, momenta), abs=2e-14)
+
+
+def test_trapezoidal_is_not_stormer_verlet():
+    """They share their nodes and nothing else; the difference is of second order."""
+    gaps, pair = [], ("trapezoidal", "stormer-verlet")
+    for h in (0.01, 0.005):
+        ends = [symtop.simulate("spheroid", name, step_size=h, horizon=1.0)["theta"].values[-1] for name in pair]
+        gaps.append(abs(ends[0] - ends[1]))
+    assert gaps[0] > 1e-4
+    assert gaps[0] / gaps[1] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "nodes", "weights"), [("midpoint", (0.5,), (1.0,)), ("trapezoidal", (0.0, 1.0), (0.5, 0.5))]
+)
+def test_discrete_momenta_are_those_of_the_discrete_lagrangian(name, nodes, weights):
+    """-D1 Ld and D2 Ld by numerical differentiation of the discrete Lagrangian itself, written out independently."""
+    where = symtop.scene("spheroid")
+    top, h = where.top, 0.01
+    run = symtop.simulate(where, name, step_size=h, horizon=0.03, samples=4, observe="attitude")
+    q = np.stack([run["theta"], run["phi"], run["psi"]], axis=1)
+
+    def discrete(q0, q1):
+        v = (q1 - q0) / h
+        total = 0.0
+        for a, w in zip(nodes, weights, strict=True):
+            theta = (q0 + a * (q1 - q0))[0]
+            across = v[0] ** 2 + (v[1] * np.sin(theta)) ** 2
+            along = v[2] + v[1] * np.cos(theta)
+            total += w * (0.5 * top.I1 * across + 0.5 * top.I3 * along**2 - top.mgl * np.cos(theta))
+        return h * total
+
+    def slope(k, which, q0, q1):
+        e = np.zeros(3)
+        e[k] = 1e-5
+        moved = [(q0 + e, q1), (q0 - e, q1)] if which == 1 else [(q0, q1 + e), (q0, q1 - e)]
+        return (discrete(*moved[0]) - discrete(*moved[1])) / 2e-5
+
+    for j in (1, 2):
+        for k, momentum in enumerate((run["p_theta"].values[j], run["p_phi"].values[j], run["p_psi"].values[j])):
+            assert slope(k, 2, q[j - 1], q[j]) == pytest.approx(momentum, abs=2e-8)
+            assert -slope(k, 1, q[j], q[j + 1]) == pytest.approx(momentum, abs=2e-8)
+
+
+def test_rk45_is_scipys_to_the_bit():
+    from scipy.integrate import solve_ivp
+
+    from symtop.methods.scipy_ivp import EulerLagrange
+
+    where = symtop.scene("spheroid")
+    run = symtop.simulate(where, "rk45", tolerance=1e-7, samples=81)
+    y0 = [getattr(where.start, key) for key in ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")]
+    times = run["time"].values
+    done = solve_ivp(EulerLagrange(where.top), (0.0, 8.0), y0, t_eval=times, rtol=1e-7, atol=1e-7)
+    assert np.array_equal(done.y[0], run["theta"].values)
+    assert np.array_equal(done.y[1], run["phi"].values)
+    assert done.nfev == run.attrs["force_evaluations"]
+
+
+def test_compensated_sums_keep_a_million_small_increments():
+    """A kernel that adds 0.1 a million times: the loop's sum is exact to rounding, the naive one is not."""
+
+    def begin(par, rule, state, h):
+        return (0.0,)
+
+    def increment(par, rule, state, carry, h):
+        return (h,), carry, 1, 0
+
+    def observe(par, rule, before, dstate, h):
+        return 0.0, 0.0
+
+    run = driver(begin, increment, observe)
+    done = run((1.0,), (1.0,), (0.0,), 0.1, np.array([0, 10, 1_000_000]))
+    assert done.states[-1, 0] == 0.1 * 1_000_000
+    naive = 0.0
+    for _ in range(1_000_000):
+        naive += 0.1
+    assert abs(naive - 100_000.0) > 1e-7
+    assert done.steps == done.work == 1_000_000
+
+
+def test_one_newton_iteration_is_not_enough_and_round_off_is_reached_with_more():
+    """A loose stop rule shows as an error of the implicit equation; the default leaves rounding only."""
+    where = symtop.scene("spheroid")
+    par, state = reduced(where.top, where.start)
+    h, marks = 0.02, np.arange(0, 40)
+
+    def residual(tolerance):
+        done = march(par, Quadrature((0.5,), (1.0,), tolerance), state, h, marks)
+        theta, p = done.states[:, 0], done.states[:, 1]
+        momenta = where.top.momenta(where.start)
+        return np.max(np.abs(np.diff(p) + h * where.top.potential_slope(0.5 * (theta[1:] + theta[:-1]), momenta)))
+
+    assert residual(1e-8) < 5e-14
+    assert residual(1e3) > 1e-9
+
+
+@pytest.mark.parametrize("name", DISCRETE)
+def test_a_step_that_leaves_the_chart_is_a_failure_with_a_sentence(name):
+    run = symtop.simulate("spheroid", name, step_size=1.1, horizon=100.0, guard=False)
+    assert run.attrs["outcome"] in ("left_chart", "not_converged")
+    assert "stopped at t =" in run.attrs["outcome_message"]
+    assert run.attrs["reached_time"] < 100.0
+    gone = run["time"].values > run.attrs["reached_time"]
+    assert gone.any()
+    assert np.isnan(run["theta"].values[gone]).all()
+    assert np.isfinite(run["theta"].values[~gone]).all()
+
+
+def test_a_user_makes_a_method_from_two_tuples():
+    simpson = symtop.discrete_lagrangian("simpson-by-a-user", (0.0, 0.5, 1.0), (1 / 6, 2 / 3, 1 / 6), order=2)
+    assert simpson.symmetric is True
+    fit_table = error_table(symtop.scene("goldstein"), simpson, [0.05, 0.025, 0.0125, 0.00625, 0.003125, 0.0015], 8.0)
+    fit = order(fit_table["step_size"], fit_table["attitude"], fit_table["attitude_bound"], 2.1)
+    assert fit.slope == pytest.approx(2.0, abs=0.05)
+    outer = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
+    drift = (outer, 1 - 2 * outer, outer)
+    kick = (outer / 2, (1 - outer) / 2, (1 - outer) / 2, outer / 2)
+    fourth = symtop.composition("yoshida-by-a-user", drift, kick)
+    table = error_table(symtop.scene("goldstein"), fourth, [0.1 / 1.4**k for k in range(10)], 8.0)
+    fit = order(table["step_size"], table["attitude"], table["attitude_bound"], 2.1)
+    assert fit.slope == pytest.approx(4.0, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("build", "says"),
+    [
+        (lambda: symtop.discrete_lagrangian("x", (0.5,), (0.9,)), "weights must sum to 1"),
+        (lambda: symtop.discrete_lagrangian("x", (0.5, 1.5), (0.5, 0.5)), "nodes must lie in"),
+        (lambda: symtop.discrete_lagrangian("x", (), ()), "nodes and weights must be equally many"),
+        (lambda: symtop.composition("x", (1.0,), (0.5,)), "kick must have one coefficient more"),
+        (lambda: symtop.composition("x", (0.9,), (0.5, 0.5)), "drift coefficients must sum to 1"),
+        (lambda: symtop.register(symtop.integrator("midpoint")), "already registered"),
+        (lambda: symtop.register("midpoint"), "register needs an Integrator"),
+        (lambda: Integrator(name="", family="other", summary="", solvers={}), "name must be 1 to 64 letters"),
+        (lambda: Integrator(name="x", family="odd", summary="", solvers={}), "family 'odd' is unknown"),
+        (lambda: Integrator(name="x", family="other", summary="", solvers={}), "solvers must map"),
+    ],
+)
+def test_bad_methods_are_refused_in_one_sentence(build, says):
+    with pytest.raises(symtop.SymtopError, match=says):
+        build()

@@ -1,0 +1,262 @@
+"""Explicit Runge-Kutta methods, the compiled Dormand-Prince pair, SciPy's and heyoka's solvers."""
+
+import math
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.measure.conservation import residuals, trend
+from symtop.measure.errors import errors
+from symtop.measure.growth import growth
+from symtop.methods import dormand_prince
+from symtop.methods.euler_lagrange import unreduced
+from symtop.methods.outcomes import OUTCOMES
+from symtop.methods.registry import integrator
+from symtop.methods.runge_kutta import Tableau, march_angles, runge_kutta
+from symtop.methods.scipy_ivp import EulerLagrange
+from symtop.run.simulation import make_plan
+from tests.slopes import assert_order
+
+KUTTA_A = ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0))
+KUTTA_B = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
+# the row sum stays, so that only the conditions of order 3 and higher break
+PERTURBED_A = ((), (0.5,), (-0.02, 0.52), (0.0, 0.0, 1.0))
+# falling through the pole exactly: without rotation theta' only changes sign in the angles chart
+POLE = symtop.Scene(
+    "pole", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0, theta_dot=-2.0), 5.0, observes="axis"
+)
+
+
+@pytest.mark.parametrize("scene", ["spheroid", "goldstein"])
+@pytest.mark.parametrize("chart", ["axis", "attitude"])
+def test_rk4_has_order_four(scene, chart):
+    assert_order(scene, integrator("rk4"), 4.0, 0.05, (80, 800), chart)
+
+
+def test_a_perturbed_tableau_is_caught():
+    wrong = runge_kutta("wrong", PERTURBED_A, KUTTA_B, order=4)
+    with pytest.raises(AssertionError, match="order"):
+        assert_order("spheroid", wrong, 4.0, 0.05, (80, 800))
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "order"),
+    [
+        (((),), (1.0,), 1),
+        (((0.0, 0.0), (0.5, 0.0)), (0.0, 1.0), 2),
+        (((), (1 / 3,), (0.0, 2 / 3)), (1 / 4, 0.0, 3 / 4), 3),
+    ],
+)
+def test_a_users_tableau_has_its_order(a, b, order):
+    # Euler's errors are large: it needs small steps before its slope can be read
+    steps = (2e4, 2e5) if order == 1 else (200, 2000)
+    assert_order("goldstein", runge_kutta("mine", a, b), order, 0.05, steps)
+
+
+def test_one_step_is_the_definition():
+    scene = symtop.scene("spheroid")
+    par, state = unreduced(scene.top, scene.start)
+    h, y, f = 0.01, np.array(state), EulerLagrange(scene.top)
+    k1 = np.array(f(0.0, y))
+    k2 = np.array(f(0.0, y + h / 2 * k1))
+    k3 = np.array(f(0.0, y + h / 2 * k2))
+    k4 = np.array(f(0.0, y + h * k3))
+    rule = Tableau((0.5, 0.0, 0.5, 0.0, 0.0, 1.0), KUTTA_B)
+    found = march_angles(par, rule, state, h, np.array([1])).states[0]
+    np.testing.assert_allclose(found, y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), rtol=2e-15)
+
+
+def test_rk4_loses_energy_linearly():
+    scene = symtop.scene("spheroid")
+    period = scene.nutation_period
+    run = symtop.simulate(
+        scene, "rk4", step_size=period / 40.3, horizon=2000 * period, samples=4001, observe="axis", guard=False
+    )
+    residual = residuals(scene, run)["energy"]
+    drift, power = trend(run["time"], residual), growth(run["time"], residual)
+    assert drift.significant
+    assert abs(drift.rise) > 1e-3
+    assert abs(power.slope - 1.0) < 0.05
+    assert np.all(run["p_phi"] == run["p_phi"][0])  # linear in (e, L): every Runge-Kutta method keeps it
+
+
+def test_rk4_is_not_reversible():
+    scene = symtop.scene("spheroid")
+    par, state = unreduced(scene.top, scene.start)
+    rule, one, h = Tableau((0.5, 0.0, 0.5, 0.0, 0.0, 1.0), KUTTA_B), np.array([1]), 0.02
+    there = march_angles(par, rule, state, h, one).states[0]
+    back = march_angles(par, rule, tuple(there), -h, one).states[0]
+    assert np.max(np.abs(back - state)) > 1e-8
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "c", "words"),
+    [
+        (KUTTA_A, (1 / 6, 1 / 3, 1 / 3, 1 / 3), None, "b must sum to 1"),
+        (KUTTA_A, KUTTA_B, (0.0, 0.5, 0.5, 0.9), "c must be the row sums"),
+        (KUTTA_A[:3], KUTTA_B, None, "a must have one row for each"),
+        (((0.5,),), (1.0,), None, "row 1 of a"),
+        (((), (0.5, 0.1, 0.0), (0.0, 0.5, 0.5)), (0.2, 0.3, 0.5), None, "row 2 of a"),
+        (((),), (math.nan,), None, "an entry of b"),
+        ((), (), None, "at least one"),
+    ],
+)
+def test_bad_tableaux_are_refused(a, b, c, words):
+    with pytest.raises(symtop.SymtopError, match=words):
+        runge_kutta("bad", a, b, c)
+
+
+# --- Dormand-Prince -------------------------------------------------------------------------------------------------
+
+
+def _walk(scene, tolerance, horizon, pair=dormand_prince.DORMAND_PRINCE):
+    plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon, 301)
+    return plan, dormand_prince.walk(scene.top, scene.start, plan, pair, record=100_000)
+
+
+def _assert_same_steps(scene, tolerance, horizon, close, pair=dormand_prince.DORMAND_PRINCE):
+    """SciPy's steps, counts and samples."""
+    from scipy.integrate import solve_ivp
+
+    plan, mine = _walk(scene, tolerance, horizon, pair)
+    _, start = unreduced(scene.top, scene.start)
+    rhs, knobs = EulerLagrange(scene.top), {"rtol": tolerance, "atol": tolerance}
+    theirs = solve_ivp(rhs, (0.0, horizon), start, **knobs)
+    assert mine.steps == theirs.t.size - 1
+    assert mine.evaluations == theirs.nfev
+    np.testing.assert_allclose(np.diff(mine.ends, prepend=0.0), np.diff(theirs.t), rtol=close)
+    sampled = solve_ivp(rhs, (0.0, horizon), start, t_eval=plan.times, **knobs)
+    np.testing.assert_allclose(mine.found, sampled.y.T, atol=1e-9)
+
+
+def test_the_tableau_is_scipys():
+    from scipy.integrate import RK45
+
+    pair = dormand_prince.DORMAND_PRINCE
+    np.testing.assert_array_equal(pair.a, RK45.A[1:][np.tril_indices(5)])
+    np.testing.assert_array_equal(pair.b, RK45.B)
+    np.testing.assert_array_equal(pair.error, RK45.E)
+    np.testing.assert_array_equal(pair.dense, RK45.P)
+
+
+def test_compiled_rk45_takes_scipys_steps():
+    # 10505 steps; the error estimate is a difference, and tighter tolerances leave more of its rounding in the step
+    _assert_same_steps(symtop.scene("spheroid"), 1e-6, 400.0, 1e-9)
+    _assert_same_steps(symtop.scene("goldstein"), 1e-4, 100.0, 1e-7)
+
+
+def test_a_wrong_error_estimate_is_caught():
+    pair = dormand_prince.DORMAND_PRINCE
+    wrong = pair._replace(error=(*pair.error[:-1], 1 / 39))
+    with pytest.raises(AssertionError):
+        _assert_same_steps(symtop.scene("spheroid"), 1e-6, 20.0, 1e-9, wrong)
+
+
+def test_both_rk45_are_one_method():
+    first, second = (symtop.simulate("spheroid", name, tolerance=1e-7) for name in ("rk45", "rk45-compiled"))
+    assert first.attrs["steps"] == second.attrs["steps"]
+    assert first.attrs["force_evaluations"] == second.attrs["force_evaluations"]
+    for name in ("theta", "phi", "psi", "energy", "p_phi", "p_psi"):
+        np.testing.assert_allclose(second[name], first[name], atol=1e-10)
+
+
+def test_adaptive_outcomes(monkeypatch):
+    scene, pair = symtop.scene("spheroid"), dormand_prince.DORMAND_PRINCE
+    for error in (math.inf, math.nan):
+        hopeless = _walk(scene, 1e-6, 8.0, pair._replace(error=(error,) * 7))[1]
+        assert (hopeless.outcome, hopeless.steps) == ("step_too_small", 0)
+    assert _walk(POLE, 1e-2, 5.0)[1].outcome == "left_chart"
+    monkeypatch.setattr(dormand_prince, "BLOCK", 500)
+    monkeypatch.setattr(dormand_prince, "EVALUATIONS", 1000)
+    plan, run = _walk(scene, 1e-9, 8.0)
+    assert run.outcome == "out_of_budget"
+    assert 0.0 < run.reached < 8.0
+    assert np.array_equal(np.isfinite(run.found[:, 0]), plan.times <= run.reached)
+
+
+def test_blocks_do_not_show(monkeypatch):
+    scene = symtop.scene("spheroid")
+    whole = _walk(scene, 1e-7, 8.0)[1]
+    monkeypatch.setattr(dormand_prince, "BLOCK", 100)
+    parts = _walk(scene, 1e-7, 8.0)[1]
+    np.testing.assert_array_equal(parts.found, whole.found)
+    np.testing.assert_array_equal(parts.ends, whole.ends)
+    assert parts.evaluations == whole.evaluations
+
+
+# --- libraries ------------------------------------------------------------------------------------------------------
+
+
+def _error(name, tolerance, quantity="axis", **knobs):
+    scene = symtop.scene("spheroid")
+    run = symtop.simulate(scene, name, tolerance=tolerance, **knobs)
+    assert run.attrs["outcome"] == "ok"
+    truth = symtop.reference(scene, run["time"].values, precision="closed-form")
+    return run, float(errors(scene, run, truth)[quantity].max())
+
+
+@pytest.mark.parametrize("name", ["rk45", "dop853", "lsoda", "radau"])
+def test_scipys_solvers_follow_their_tolerance(name):
+    coarse, fine = _error(name, 1e-6)[1], _error(name, 1e-9)[1]
+    assert fine < 1e-6
+    assert fine < coarse / 100.0
+
+
+@pytest.mark.parametrize("name", ["rk45", "dop853", "lsoda", "radau"])
+def test_scipys_solvers_are_solve_ivp(name):
+    from scipy.integrate import solve_ivp
+
+    scene = symtop.scene("spheroid")
+    run = symtop.simulate(scene, name, tolerance=1e-6, horizon=2.0, samples=41)
+    rhs = EulerLagrange(scene.top)
+    method = integrator(name).summary.split()[1]
+    done = solve_ivp(
+        rhs, (0.0, 2.0), unreduced(scene.top, scene.start)[1], method, run["time"].values, rtol=1e-6, atol=1e-6
+    )
+    np.testing.assert_array_equal(run["theta"], done.y[0])
+    assert run.attrs["force_evaluations"] == rhs.calls  # more than nfev where a Jacobian is made of differences
+    assert rhs.calls >= done.nfev
+
+
+@pytest.mark.parametrize("name", ["rk45", "rk45-compiled", "dop853", "lsoda", "radau"])
+def test_hopeless_tolerances_end_as_outcomes(name):
+    # in this scene DOP853 leaves a step whose interpolant meets an infinity
+    run = symtop.simulate("spheroid", name, tolerance=0.5, horizon=5.0, guard=False)
+    assert run.attrs["outcome"] in OUTCOMES
+    assert np.array_equal(np.isfinite(run["theta"]), np.isfinite(run["p_phi"]))
+
+
+def test_taylor_in_three_precisions():
+    pytest.importorskip("heyoka")
+    found = {}
+    for name in ("taylor", "taylor-longdouble", "taylor-quad"):
+        run, found[name] = _error(name, None, "attitude", horizon=4.0)
+        assert run.attrs["chart"] == "attitude"
+        assert run["quaternion"].dtype == np.float64
+    # beyond double what is left is the rounding of the samples and of the closed form
+    assert found["taylor"] < 5e-14
+    assert max(found["taylor-longdouble"], found["taylor-quad"]) < 5e-15
+    loose = _error("taylor-quad", 1e-8, horizon=4.0)[1]
+    assert loose > 1e-12  # the tolerance reaches heyoka
+
+
+def test_extended_precision_is_not_lost_on_the_way():
+    hy = pytest.importorskip("heyoka")
+    from symtop.methods.taylor import propagate, space_momenta
+
+    scene = symtop.scene("spheroid")
+    flight = propagate("axis", "quad", 1e-35, scene.top, scene.start, np.array([0.0, 4.0]))
+    assert flight.states.dtype == np.dtype(hy.real128)
+    p_phi, p_psi = space_momenta("axis", flight.states)
+    length = np.sum(flight.states[:, :3] * flight.states[:, :3], axis=-1)
+    for constant in (p_phi, p_psi, length):
+        assert abs(float(constant[1] - constant[0])) < 1e-30
+
+
+def test_tolerances_stop_at_the_arithmetic():
+    pytest.importorskip("heyoka")
+    integrator("taylor-quad").check_tolerance(1e-36)
+    for name, tolerance in (("taylor", 1e-20), ("taylor-quad", 1e-40), ("rk45-compiled", 1e-15), ("radau", 1e-15)):
+        with pytest.raises(symtop.SymtopError, match="tolerance"):
+            integrator(name).check_tolerance(tolerance)

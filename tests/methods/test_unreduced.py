@@ -1,0 +1,215 @@
+"""The unreduced kernels: the same map as the reduced ones, with momenta that nothing holds in place."""
+
+import numpy as np
+import pytest
+from symtop_studies.reduction.tables import TWIN, twin_cost, twin_history, twins
+
+import symtop
+from symtop.measure.conservation import trend
+from symtop.measure.step_map import one_step, return_miss, symplectic_defect
+from symtop.methods import unreduced as kernel
+from symtop.methods.discrete_lagrangian import RULES, Quadrature
+from symtop.methods.loop import driver
+from symtop.methods.unreduced import march, unreduced, whole
+from tests.conftest import random_scenes
+from tests.methods.test_integrators import fitted
+
+PAIRS = ("midpoint", "trapezoidal")
+SCENES = ("spheroid", "goldstein")
+
+
+def largest_gap(scene_name, first, second, steps=10_000):
+    """Largest difference of any angle between two methods over a run of the scene."""
+    where = symtop.scene(scene_name)
+    runs = [symtop.simulate(where, name, step_size=where.horizon / steps, samples=401) for name in (first, second)]
+    return max(float(np.max(np.abs(runs[0][angle] - runs[1][angle]))) for angle in ("theta", "phi", "psi"))
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+@pytest.mark.parametrize("name", PAIRS)
+def test_the_reduced_kernel_assumed_nothing(scene_name, name):
+    """Ten thousand steps: rounding grows as n^1.5 and stays below 1e-11 rad (measured 7e-13)."""
+    assert largest_gap(scene_name, name, name + TWIN) < 1e-11
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_another_rule_is_another_trajectory(scene_name):
+    """The negative control: two methods of order 2 are nowhere near each other on that scale."""
+    assert largest_gap(scene_name, "midpoint", "trapezoidal" + TWIN) > 1e-7
+
+
+def test_every_twin_is_of_a_registered_method_and_its_history_is_rounding():
+    assert set(PAIRS) <= set(twins())
+    where = symtop.scene("goldstein")
+    history = twin_history(where, "midpoint", where.nutation_period, 500, samples=51)
+    assert float(history["psi_gap"].max()) < 1e-12
+    assert float(history["p_phi_drift"].max()) < 1e-13
+
+
+@pytest.mark.parametrize("quantity", ["attitude", "theta", "energy"])
+@pytest.mark.parametrize("scene_name", SCENES)
+@pytest.mark.parametrize("name", [*(name + TWIN for name in PAIRS), "simpson-linear"])
+def test_order_two_on_the_nonlinear_top(scene_name, name, quantity):
+    fit = fitted(scene_name, name, quantity)
+    assert abs(fit.slope - 2.0) + fit.interval < 0.05
+
+
+@pytest.mark.parametrize("where", random_scenes(6, seed=11), ids=lambda s: s.name)
+@pytest.mark.parametrize("name", [name + TWIN for name in PAIRS])
+def test_the_six_dimensional_step_map_is_symplectic(name, where):
+    defect = symplectic_defect(one_step(symtop.integrator(name), "angles", where, 0.02), where.start)
+    assert defect.size < 2e-10
+    assert defect.raw[-1] < defect.raw[0] / 100.0  # what is left is the differencing, which falls as its square
+
+
+def test_a_map_that_invents_its_momenta_is_not_symplectic():
+    """The negative control: a p_phi moved by 1e-4 sin(theta) after an otherwise right step is seen."""
+    good = symtop.integrator("midpoint" + TWIN)
+
+    def solve(top, start, plan):
+        run = good.solvers["angles"](top, start, plan)
+        return run._replace(p_phi=run.p_phi + 1e-4 * np.sin(run.states[:, 0]))
+
+    wrong = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
+    where = random_scenes(1, seed=11)[0]
+    step = one_step(wrong, "angles", where, 0.02)
+    assert symplectic_defect(step, where.start).size * step.unit > 1e-5
+
+
+@pytest.mark.parametrize("where", random_scenes(6, seed=12), ids=lambda s: s.name)
+@pytest.mark.parametrize("name", [name + TWIN for name in PAIRS])
+def test_a_step_and_its_reverse_return_to_the_start(name, where):
+    assert return_miss(one_step(symtop.integrator(name), "angles", where, 0.02), where.start) < 1e-13
+
+
+def test_a_lopsided_rule_misses_the_start():
+    lopsided = unreduced("left", (0.3,), (1.0,))
+    assert lopsided.symmetric is False
+    where = random_scenes(1, seed=12)[0]
+    assert return_miss(one_step(lopsided, "angles", where, 0.02), where.start) > 1e-7
+
+
+def momentum_walk(scene_name, loop, steps=1_000_000):
+    """Largest relative change of p_phi and p_psi, and the larger of their trends, with the midpoint rule."""
+    where = symtop.scene(scene_name)
+    par, state = whole(where.top, where.start)
+    marks = np.arange(0, steps + 1, 997)
+    done = loop(par, Quadrature((0.5,), (1.0,)), state, 0.01, marks)
+    scale = max(abs(state[4]), abs(state[5]))
+    changes = [(done.momenta[1:, k] - state[4 + k]) / scale for k in (0, 1)]
+    return max(np.abs(c).max() for c in changes), max(abs(trend(marks[1:], c).rise) for c in changes)
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_momenta_that_nothing_holds_stay_for_a_million_steps(scene_name):
+    """Within 1e-11, and without a trend: a bias of a hundredth of an ulp a step would rise by 2e-12."""
+    largest, rise = momentum_walk(scene_name, march)
+    assert largest < 1e-11
+    assert rise < 2e-12
+
+
+def one_iteration(par, rule, state, carry, h):
+    """A step with a single Newton iteration from the last rates: the equations are solved to O(h^2) only."""
+    w, v, u = carry[0]
+    sums = kernel._node_sums(par, rule, state[0], (w, v, u), h)
+    dw, dv, du = kernel._correction(kernel._inertia, par, sums, (w, v, u), state[3:], h)
+    w, v, u = w + dw, v + dv, u + du
+    sums = kernel._node_sums(par, rule, state[0], (w, v, u), h)
+    p_theta, p_phi, p_psi = par.I1 * w + h * sums.after, sums.across * v + sums.mixed * u, sums.mixed * v + par.I3 * u
+    step = (h * w, h * v, h * u, p_theta - state[3], p_phi - state[4], p_psi - state[5])
+    return step, ((w, v, u), carry[0], carry[1]), 1, 0
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_one_iteration_a_step_lets_the_momenta_go(scene_name):
+    """The negative control: equations that are not solved show in p_phi, which no parameter holds."""
+    largest, _ = momentum_walk(scene_name, driver(kernel.begin, one_iteration, kernel.observe), steps=50_000)
+    assert not largest < 1e-11
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_newtons_jacobian_is_that_of_the_discrete_legendre_transform(rule):
+    """A correction misses the root by the square of the distance to it; with one wrong entry, by the distance."""
+    where, h = random_scenes(1, seed=13)[0], 0.05
+    par, state = whole(where.top, where.start)
+    table = Quadrature(*RULES[rule][:2])
+    root = np.array(kernel._rates(par, state))
+
+    def left_momenta(rate):
+        sums = kernel._node_sums(par, table, state[0], rate, h)
+        return (
+            par.I1 * rate[0] - h * sums.before,
+            sums.across * rate[1] + sums.mixed * rate[2],
+            sums.mixed * rate[1] + par.I3 * rate[2],
+        )
+
+    def miss(distance, spoil):
+        rate = root + distance * np.array([1.0, -0.7, 0.4])
+        sums = kernel._node_sums(par, table, state[0], tuple(rate), h)
+        sums = sums._replace(**{name: value + 0.01 for name, value in sums._asdict().items() if name == spoil})
+        return np.max(
+            np.abs(
+                rate + kernel._correction(kernel._inertia, par, sums, tuple(rate), left_momenta(tuple(root)), h) - root
+            )
+        )
+
+    assert miss(1e-3, "") / miss(5e-4, "") == pytest.approx(4.0, rel=0.02)
+    for entry in ("stiffness", "before_v", "before_u", "after_v", "after_u"):
+        assert miss(1e-3, entry) / miss(5e-4, entry) == pytest.approx(2.0, rel=0.3)
+
+
+def test_the_three_by_three_solver_is_exact():
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        matrix = rng.normal(size=(3, 3)) + 4.0 * np.eye(3)
+        right = rng.normal(size=3)
+        found = kernel._solve(*(tuple(row) for row in matrix), tuple(right))
+        assert np.array(found) == pytest.approx(np.linalg.solve(matrix, right), rel=1e-12, abs=1e-14)
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_the_iteration_ends_within_a_handful(scene_name):
+    where = symtop.scene(scene_name)
+    cost = twin_cost(where, "midpoint", [where.nutation_period / 300.0], batches=1)
+    assert (cost["iterations_per_step"] < 5.0).all()
+    assert (cost["iterations_per_step"] >= 1.0).all()
+
+
+def test_long_horizons_do_not_slow_it_down():
+    """phi beyond 1e4 rad has an ulp of 2e-12: a stop rule on the angle itself would run into its limit."""
+    where = symtop.scene("spheroid")
+    short, long = (
+        symtop.simulate(where, "midpoint-unreduced", step_size=0.01, horizon=T, samples=11, guard=False)
+        for T in (10.0, 2000.0)
+    )
+    assert abs(float(long["phi"][-1])) > 5e3
+    per_step = [run.attrs["newton_iterations"] / run.attrs["steps"] for run in (short, long)]
+    assert per_step[1] == pytest.approx(per_step[0], rel=0.05)
+
+
+@pytest.mark.parametrize("name", [name + TWIN for name in PAIRS])
+def test_a_step_too_large_ends_in_a_sentence(name):
+    run = symtop.simulate("spheroid", name, step_size=1.1, horizon=100.0, guard=False)
+    assert run.attrs["outcome"] in ("left_chart", "not_converged", "not_finite")
+    assert "stopped at t =" in run.attrs["outcome_message"]
+
+
+@pytest.mark.parametrize(
+    ("build", "says"),
+    [
+        (lambda: unreduced("x", (0.5,), (0.9,)), "weights must sum to 1"),
+        (lambda: unreduced("x", (0.5, 1.5), (0.5, 0.5)), "nodes must lie in"),
+        (lambda: unreduced("x", (0.5,), (0.5, 0.5)), "nodes and weights must be equally many"),
+        (
+            lambda: symtop.simulate(
+                symtop.Scene("pole", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(0.0, psi_dot=1.0), 1.0),
+                "midpoint-unreduced",
+                step_size=0.1,
+            ),
+            "theta must lie inside",
+        ),
+    ],
+)
+def test_bad_arguments_are_refused_in_one_sentence(build, says):
+    with pytest.raises(symtop.SymtopError, match=says):
+        build()

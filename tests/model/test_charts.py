@@ -1,0 +1,111 @@
+"""The three charts: maps both ways, the poles, and distances that are honest when small."""
+
+import math
+
+import numpy as np
+import pytest
+
+from symtop import Angles, SymmetricTop
+from symtop.model import charts
+from tests.conftest import random_scenes
+
+
+def turn(angle):
+    return math.remainder(angle, 2.0 * math.pi)
+
+
+@pytest.mark.parametrize("where", random_scenes(40, seed=7), ids=lambda s: s.name)
+def test_attitude_and_back(where):
+    state = charts.space_state("attitude", where.top, where.start)
+    back = charts.angles_from_attitude(where.top, state)
+    assert back.theta == pytest.approx(where.start.theta, abs=4e-16)
+    assert turn(back.phi - where.start.phi) == pytest.approx(0.0, abs=1e-15)
+    assert turn(back.psi - where.start.psi) == pytest.approx(0.0, abs=1e-15)
+    for rate in ("theta_dot", "phi_dot", "psi_dot"):
+        assert getattr(back, rate) == pytest.approx(getattr(where.start, rate), rel=1e-13, abs=1e-13)
+
+
+@pytest.mark.parametrize("where", random_scenes(40, seed=8), ids=lambda s: s.name)
+def test_space_frame_constants_are_those_of_the_angles(where):
+    state = charts.space_state("axis", where.top, where.start)
+    axis, momentum, momenta = state[:3], state[3:], where.top.momenta(where.start)
+    assert momentum[2] == pytest.approx(momenta.p_phi, rel=1e-14, abs=1e-14)
+    assert axis @ momentum == pytest.approx(momenta.p_psi, rel=1e-14, abs=1e-14)
+    node = np.array([math.cos(where.start.phi), math.sin(where.start.phi), 0.0])
+    assert momentum @ node == pytest.approx(where.top.I1 * where.start.theta_dot, abs=1e-14)
+    energy = momentum @ momentum / (2 * where.top.I1) + where.top.mgl * axis[2]
+    energy += 0.5 * momenta.p_psi**2 * (1 / where.top.I3 - 1 / where.top.I1)
+    assert energy == pytest.approx(where.top.energy(where.start), rel=1e-14)
+
+
+@pytest.mark.parametrize("theta", [1e-3, 1e-6, 1e-9, math.pi - 1e-3, math.pi - 1e-6])
+def test_close_to_a_pole_the_attitude_keeps_theta_and_the_sum_or_difference(theta):
+    top = SymmetricTop(2.0, 1.0, 3.0)
+    start = Angles(theta=theta, phi=0.7, psi=-1.9, theta_dot=0.2, phi_dot=1.5, psi_dot=4.0)
+    back = charts.angles_from_attitude(top, charts.space_state("attitude", top, start))
+    assert back.theta == pytest.approx(theta, rel=1e-15)
+    assert turn(back.phi - start.phi) == pytest.approx(0.0, abs=1e-15)
+    assert turn(back.psi - start.psi) == pytest.approx(0.0, abs=1e-15)
+    assert back.theta_dot == pytest.approx(0.2, rel=1e-13)
+    assert back.phi_dot == pytest.approx(1.5, rel=1e-14 / math.sin(theta))  # L through a lever
+
+
+def test_at_a_pole_the_attitude_is_still_right():
+    top = SymmetricTop(2.0, 1.0, 3.0)
+    state = charts.space_state("attitude", top, Angles(theta=0.0, phi=0.4, psi=0.3, psi_dot=2.0))
+    assert state == pytest.approx([math.cos(0.35), 0.0, 0.0, math.sin(0.35), 0.0, 0.0, 2.0], abs=1e-16)
+
+
+def test_axis_of_the_quaternion_is_the_axis_of_the_angles():
+    rng = np.random.default_rng(5)
+    theta, phi, psi = rng.uniform(0, math.pi, 200), rng.uniform(-9, 9, 200), rng.uniform(-9, 9, 200)
+    quaternion = charts.quaternion_from_angles(theta, phi, psi)
+    assert np.allclose(charts.axis_from_quaternion(quaternion), charts.axis_from_angles(theta, phi), atol=5e-16, rtol=0)
+    assert np.allclose(np.linalg.norm(quaternion, axis=1), 1.0, atol=4e-16, rtol=0)
+
+
+def test_quaternion_is_the_product_of_its_three_rotations():
+    """z-x-z: turn by psi about z, by theta about x, by phi about z."""
+
+    def about(axis, angle):
+        q = np.zeros(4)
+        q[0], q[1 + "xyz".index(axis)] = math.cos(angle / 2), math.sin(angle / 2)
+        return q
+
+    def times(a, b):
+        return np.array([
+            a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])),
+        ])  # fmt: skip
+
+    product = times(times(about("z", 0.7), about("x", 1.1)), about("z", -2.3))
+    assert charts.quaternion_from_angles(1.1, 0.7, -2.3) == pytest.approx(product, abs=4e-16)
+
+
+@pytest.mark.parametrize("size", [1e-15, 1e-12, 1e-8, 1e-3, 1.0, 3.0])
+def test_distances_measure_small_and_large_angles(size):
+    first = charts.axis_from_angles(1.0, 0.3)
+    assert charts.axis_distance(first, charts.axis_from_angles(1.0 + size, 0.3)) == pytest.approx(
+        min(size, 2 * math.pi - size), rel=1e-12, abs=3e-16
+    )
+    base = charts.quaternion_from_angles(1.0, 0.3, 0.2)
+    turned = charts.quaternion_from_angles(1.0, 0.3, 0.2 + size)
+    assert charts.attitude_distance(base, turned) == pytest.approx(size, rel=1e-12, abs=5e-16)
+    assert charts.attitude_distance(base, -turned) == pytest.approx(size, rel=1e-12, abs=5e-16)
+
+
+def test_the_usual_formula_for_the_distance_has_a_floor_that_ours_has_not():
+    base, turned = charts.quaternion_from_angles(1.0, 0.3, 0.2), charts.quaternion_from_angles(1.0, 0.3, 0.2 + 1e-10)
+    usual = 2.0 * math.acos(min(1.0, float(base @ turned)))
+    assert abs(usual - 1e-10) > 1e-11
+    assert charts.attitude_distance(base, turned) == pytest.approx(1e-10, rel=1e-5)
+
+
+def test_unwrapping_follows_an_error_of_many_turns():
+    """The guide supplies the turns between samples, and nothing of the error: it may lag by more than half a turn."""
+    t = np.linspace(0.0, 40.0, 60)
+    guide, angle = 0.3 + 11.0 * t, 0.3 + 10.2 * t  # lags by 32 rad in the end
+    wrapped = np.remainder(angle + np.pi, 2 * np.pi) - np.pi
+    assert charts.unwrapped(wrapped, guide) == pytest.approx(angle, abs=1e-12)
+    assert (
+        np.abs(wrapped + 2 * np.pi * np.rint((guide - wrapped) / (2 * np.pi)) - angle).max() > 6.0
+    )  # snapping would not

@@ -1,0 +1,589 @@
+"""The closed form against itself in 50 digits, published digits, an elementary solution and the equations of motion."""
+
+import dataclasses
+import json
+import math
+import subprocess
+import sys
+from decimal import Decimal
+from pathlib import Path
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from symtop.base.validate import SymtopError
+from symtop.model.charts import (
+    attitude_distance,
+    axis_from_angles,
+    axis_from_quaternion,
+    momentum_from_angles,
+    quaternion_from_angles,
+)
+from symtop.model.closed_form import ClosedForm
+from symtop.model.precise_form import PreciseForm
+from symtop.model.top import Angles, SymmetricTop
+
+EPS = float(np.finfo(float).eps)
+TRUTH = json.loads((Path(__file__).parents[1] / "data" / "truth.json").read_text())
+del TRUTH["_note"]
+SPHEROID = (SymmetricTop(2.0, 1.0, 26.8657914456284), Angles(0.4, 0.1, 0.1, 0.1, 10.0, 0.1))
+
+
+@pytest.fixture(autouse=True)
+def _digits():
+    with mp.workdps(60):
+        yield
+
+
+# ------------------------------------------------------------------------------------------------ published digits
+
+
+def _agrees_as_printed(value, printed):
+    """Within one unit of the last printed digit."""
+    exponent = Decimal(printed).as_tuple().exponent
+    return abs(mp.mpf(value) - mp.mpf(printed)) <= mp.mpf(10) ** exponent
+
+
+CONSTANTS = {
+    "E": "energy",
+    "p_phi": "p_phi",
+    "p_psi": "p_psi",
+    "a": "a",
+    "b": "b",
+    "alpha": "alpha",
+    "beta": "beta",
+    "m": "m",
+    "Omega": "Omega",
+    "K": "K",
+    "nutation_period": "nutation_period",
+    "dphi_per_period": "phi_per_period",
+    "dpsi_per_period": "psi_per_period",
+}
+
+
+@pytest.mark.parametrize("name", TRUTH)
+def test_thirty_digits_of_the_published_states(name):
+    entry = TRUTH[name]
+    form = PreciseForm([entry[k] for k in ("I1", "I3", "mgl")], [*entry["q0_theta_phi_psi"], *entry["v0"]], digits=40)
+    pairs = list(zip(form(entry["t"]), entry["state"].values(), strict=True))
+    pairs += [(getattr(form, ours), entry[theirs]) for theirs, ours in CONSTANTS.items() if theirs in entry]
+    pairs += zip(form.roots, entry["roots"], strict=True)
+    pairs += [(mp.degrees(x), y) for x, y in zip(form.theta_range, entry["theta_range_deg"], strict=True)]
+    if "axis_xyz" in entry:
+        pairs += zip(form.axis(entry["t"]), entry["axis_xyz"], strict=True)
+        pairs += zip(form.quaternion(entry["t"]), entry["quaternion_wxyz"], strict=True)
+    printed = [(x, y) for x, y in pairs if len(y) > 20]
+    assert len(printed) >= 9
+    assert all(_agrees_as_printed(x, y) for x, y in printed)
+    assert all(abs(x - mp.mpf(y)) < 1e-12 for x, y in pairs)
+
+
+@pytest.mark.parametrize("name", [name for name in TRUTH if name.endswith("_ieee")])
+def test_double_precision_reproduces_the_states_of_exact_doubles(name):
+    entry = TRUTH[name]
+    top = SymmetricTop(*(float(entry[k]) for k in ("I1", "I3", "mgl")))
+    form = ClosedForm(top, Angles(*map(float, [*entry["q0_theta_phi_psi"], *entry["v0"]])))
+    for ours, printed in zip(form(float(entry["t"])), entry["state"].values(), strict=True):
+        assert abs(ours - float(printed)) <= 8 * EPS * max(1.0, abs(float(printed)))
+
+
+# ----------------------------------------------------------------------------------------- double against 50 digits
+
+
+class Draw:
+    """A generic top and start, with the random numbers that a regime needs to change it."""
+
+    def __init__(self, random):
+        self.uniform = lambda low, high: float(random.uniform(low, high))
+        self.pick = lambda *values: float(random.choice(values))
+        self.spread = lambda low, high: math.exp(self.uniform(math.log(low), math.log(high)))
+        self.sign = self.pick(-1.0, 1.0)
+        self.I1, self.mgl = self.spread(0.1, 10.0), self.spread(0.05, 50.0)
+        self.I3 = self.I1 * self.uniform(0.02, 2.0)
+        self.theta, self.phi, self.psi = self.uniform(0.02, 3.12), self.uniform(-3.0, 3.0), self.uniform(-3.0, 3.0)
+        self.rates = self.uniform(-3.0, 3.0), self.uniform(-3.0, 3.0), self.uniform(-5.0, 5.0)
+
+    def change(self, theta=None, rates=None, I3=None, mgl=None):
+        top = SymmetricTop(self.I1, I3 or self.I3, self.mgl if mgl is None else mgl)
+        return top, Angles(self.theta if theta is None else theta, self.phi, self.psi, *(rates or self.rates))
+
+
+def _grazing(d, side):
+    """b - a (side 1) or b + a (side -1) is a small gap."""
+    precession, cosine, gap = d.rates[1], math.cos(d.theta), d.pick(1e-2, 1e-4, 1e-6, 1e-8, 1e-12)
+    spin = side * (precession * (d.I1 + side * (d.I1 - d.I3) * cosine) - gap) / d.I3
+    return d.change(rates=(2.0 * d.sign * d.uniform(1.0, 4.0) * math.sqrt(d.mgl / d.I1), precession, spin))
+
+
+def _nearly_steady(d):
+    """I3 w3 phi' = I1 phi'^2 cos theta + mgl, but for a gap."""
+    precession, cosine = d.sign * d.spread(0.3, 30.0), math.cos(d.theta)
+    spin = (d.I1 * precession**2 * cosine + d.mgl) / (d.I3 * precession) - precession * cosine
+    gap = d.pick(0.0, 1e-14, 1e-10, 1e-6)
+    return d.change(rates=(d.pick(0.0, 1e-14, 1e-10, 1e-6), precession, spin * (1.0 + gap)))
+
+
+def _near_separatrix(d):
+    """At a turning point with b = a and alpha = beta, but for gaps."""
+    theta = d.uniform(0.2, 3.0)
+    precession = math.sqrt(2.0 * d.mgl / d.I1 / (1.0 + math.cos(theta))) * (1.0 + d.pick(0.0, 1e-14, -1e-11, 1e-8))
+    spin = precession * (d.I1 + (d.I1 - d.I3) * math.cos(theta)) / d.I3 * (1.0 + d.pick(0.0, 1e-14, -1e-11, 1e-8))
+    return d.change(theta, (0.0, precession, spin))
+
+
+def _pendulum_to_the_top(d):
+    rate = d.sign * math.sqrt(2.0 * d.mgl / d.I1 * (1.0 - math.cos(d.theta)))
+    return d.change(rates=(rate * (1.0 + d.pick(0.0, 1e-15, -1e-15, 1e-10)), 0.0, 0.0))
+
+
+def _threshold_of_sleep(d):
+    theta, near = d.spread(1e-9, 0.1), 1.0 + d.pick(0.0, 1e-12, -1e-12, 1e-6)
+    w3 = near * 2.0 * math.sqrt(d.I1 * d.mgl) / d.I3
+    precession = w3 * d.I3 / (2.0 * d.I1)
+    return d.change(theta, (theta * d.uniform(-1.0, 1.0), precession, w3 - precession))
+
+
+MAKE = {
+    "generic": lambda d: d.change(),
+    "fast": lambda d: d.change(rates=(*d.rates[:2], d.sign * d.spread(30.0, 3e4))),
+    "slow": lambda d: d.change(rates=tuple(1e-3 * rate for rate in d.rates)),
+    "retrograde": lambda d: d.change(rates=(d.rates[0], -5.0 * abs(d.rates[1]), 5.0 * abs(d.rates[2]))),
+    "turning point": lambda d: d.change(rates=(0.0, *d.rates[1:])),
+    "cusp": lambda d: d.change(rates=(0.0, 0.0, d.sign * d.spread(0.1, 100.0))),
+    "plane pendulum": lambda d: d.change(rates=(d.sign * d.spread(0.01, 30.0), 0.0, 0.0)),
+    "spherical pendulum": lambda d: d.change(rates=(*d.rates[:2], -d.rates[1] * math.cos(d.theta))),
+    "grazes the top": lambda d: _grazing(d, 1.0),
+    "grazes the bottom": lambda d: _grazing(d, -1.0),
+    "through the top": lambda d: d.change(I3=d.I1, rates=(3.0 * d.rates[0], d.rates[1], d.rates[1])),
+    "through the bottom": lambda d: d.change(I3=d.I1, rates=(3.0 * d.rates[0], d.rates[1], -d.rates[1])),
+    "flat body": lambda d: d.change(I3=2.0 * d.I1 * (1.0 - d.pick(0.0, 1e-15, 1e-8, 1e-3))),
+    "thin body": lambda d: d.change(I3=d.I1 * d.spread(1e-8, 1e-2)),
+    "nearly steady": _nearly_steady,
+    "near the separatrix": _near_separatrix,
+    "pendulum to the top": _pendulum_to_the_top,
+    "nearly free": lambda d: d.change(mgl=d.sign * d.pick(1e-3, 1e-6, 1e-10, 1e-14)),
+    "free": lambda d: d.change(mgl=0.0),
+    "heavy": lambda d: d.change(mgl=d.sign * 1e6 * d.uniform(0.5, 2.0)),
+    "hanging": lambda d: d.change(mgl=-d.mgl),
+    "from the top": lambda d: d.change(d.pick(0.0, 1e-20, 1e-9, 1e-4), mgl=d.sign * d.mgl),
+    "from the bottom": lambda d: d.change(math.pi - d.pick(0.0, 4.5e-16, 1e-9, 1e-4), mgl=d.sign * d.mgl),
+    "asleep": lambda d: d.change(
+        d.pick(0.0, 1e-12, 1e-6), (0.0, d.rates[1], 10.0 * d.rates[2]), mgl=d.pick(-1.0, 1.0) * d.mgl
+    ),
+    "asleep below": lambda d: d.change(
+        math.pi - d.pick(0.0, 1e-12, 1e-6), (0.0, d.rates[1], 10.0 * d.rates[2]), mgl=d.pick(-1.0, 1.0) * d.mgl
+    ),
+    "threshold of sleep": _threshold_of_sleep,
+}
+REGIMES = tuple(MAKE)
+
+
+def _random_top(kind, random):
+    """A top and a start of one regime."""
+    return MAKE[kind](Draw(random))
+
+
+def _times(form, random):
+    """The start, next to a turning point, within two periods, up to 1000, and about -+1e6."""
+    period = form.nutation_period if math.isfinite(form.nutation_period) else 1.0
+    precise_phase = float(form.tau0 / form.K) if form.Omega else 0.0
+    turning = (random.integers(0, 40) - precise_phase + 10.0 ** random.uniform(-12, 0)) * float(period) / 2.0
+    return np.array([0.0, turning, random.uniform(0.0, 2.0) * float(period), random.uniform(0.0, 1e3),
+                     random.choice([-1e6, 1e6]) * random.uniform(0.5, 1.0)])  # fmt: skip
+
+
+def _excess(top, start, precise, times):
+    """Largest error over its allowance, of theta, phi, psi, quaternion, axis."""
+    form = ClosedForm(top, start)
+    motion, attitude, axis = form(times), form.quaternion(times), form.axis(times)
+    worst = np.zeros(5)
+    for i, time in enumerate(times):
+        true = precise(time)
+        theta, phi, psi = (abs(ours[i] - exact) for ours, exact in zip(motion[:3], true[:3], strict=True))
+        worst = np.maximum(worst, [
+            float(theta) / (1e-15 if true.theta < 2.0 else 2.0 * math.ulp(math.pi)),
+            float(phi / (EPS * abs(true.phi) + 1e-15)),
+            float(psi / (EPS * abs(true.psi) + 1e-15)),
+            float(max(abs(x - y) for x, y in zip(attitude[i], precise.quaternion(time), strict=True))) / 1e-15,
+            float(max(abs(x - y) for x, y in zip(axis[i], precise.axis(time), strict=True))) / 1e-15,
+        ])  # fmt: skip
+    return worst
+
+
+def _check_regime(kind, count, seed):
+    random = np.random.default_rng([seed, REGIMES.index(kind)])
+    for _ in range(count):
+        top, start = _random_top(kind, random)
+        precise = PreciseForm(top, start, digits=50)
+        excess = _excess(top, start, precise, _times(precise, random))
+        assert (excess <= 1.0).all(), (top, start, excess)
+
+
+@pytest.mark.parametrize("kind", REGIMES)
+def test_double_precision_agrees_with_fifty_digits(kind):
+    _check_regime(kind, 2, seed=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", REGIMES)
+def test_double_precision_agrees_with_fifty_digits_on_many_tops(kind):
+    _check_regime(kind, 40, seed=2)
+
+
+@pytest.mark.parametrize("field", ["I1", "I3", "mgl"])
+def test_a_parameter_wrong_in_the_thirteenth_digit_is_seen(field):
+    top, start = SPHEROID
+    precise, times = PreciseForm(top, start, digits=50), np.array([900.0])
+    values = {name: getattr(top, name) for name in ("I1", "I3", "mgl")}
+    values[field] *= 1.0 + 1e-13
+    assert (_excess(top, start, precise, times) <= 1.0).all()
+    assert _excess(SymmetricTop(**values), start, precise, times).max() > 20.0
+
+
+@pytest.mark.parametrize("kind", REGIMES)
+def test_theta_functions_and_elliptic_integrals_give_the_same_attitude(kind):
+    random = np.random.default_rng([3, REGIMES.index(kind)])
+    top, start = _random_top(kind, random)
+    form = PreciseForm(top, start, digits=50)
+    for time in _times(form, random)[[1, 3, 4]]:
+        gap = max(abs(x - y) for x, y in zip(form.quaternion(time), form.theta_quaternion(time), strict=True))
+        assert gap < mp.mpf(10) ** -50
+    backwards = PreciseForm(top, dataclasses.replace(start, theta_dot=-start.theta_dot))
+    if form.curve.swing > 1e-3 and start.theta_dot:
+        gap = max(abs(x - y) for x, y in zip(form.quaternion(1.7), backwards.theta_quaternion(1.7), strict=True))
+        assert gap > 1e-10
+
+
+@pytest.mark.parametrize("kind", REGIMES)
+def test_digits_are_right_in_every_regime(kind):
+    random = np.random.default_rng([4, REGIMES.index(kind)])
+    top, start = _random_top(kind, random)
+    time = float(random.uniform(0.0, 1e3))
+    short, long = PreciseForm(top, start, digits=30)(time), PreciseForm(top, start, digits=90)(time)
+    with mp.workdps(110):
+        assert all(abs(x - y) <= mp.mpf(10) ** -30 * max(1, abs(y)) for x, y in zip(short, long, strict=True))
+
+
+# ----------------------------------------------------------------------------------------- the equations of motion
+
+
+@pytest.mark.parametrize("kind", ["generic", "fast", "grazes the top", "near the separatrix", "free", "hanging"])
+def test_motion_satisfies_the_equations_of_motion(kind):
+    """Against five-point differences: step 1e-13, so that their own error is some 1e-52 times the fifth derivative."""
+    top, start = _random_top(kind, np.random.default_rng([5, REGIMES.index(kind)]))
+    form, step, now = PreciseForm(top, start, digits=60), mp.mpf("1e-13"), mp.mpf("0.37")
+    with mp.workdps(80):
+        around = [form(now + k * step) for k in (-2, -1, 1, 2)]
+        at = form(now)
+        theta_dot, phi_dot, psi_dot, theta_ddot = (
+            (before2 - 8 * before + 8 * after - after2) / (12 * step)
+            for before2, before, after, after2 in (
+                [getattr(m, name) for m in around] for name in ("theta", "phi", "psi", "theta_dot")
+            )
+        )
+        sine, cosine, phi_rate = mp.sin(at.theta), mp.cos(at.theta), at.phi_dot
+        spin = at.psi_dot + phi_rate * cosine
+        torque = sine * (phi_rate * (top.I1 * phi_rate * cosine - top.I3 * spin) + top.mgl)
+        scale = 1 + abs(phi_rate) + abs(spin) + abs(torque)
+        assert abs(theta_dot - at.theta_dot) < 1e-25 * scale
+        assert abs(phi_dot - phi_rate) < 1e-25 * scale
+        assert abs(psi_dot - at.psi_dot) < 1e-25 * scale
+        assert abs(top.I1 * theta_ddot - torque) < 1e-25 * scale
+        assert abs(top.I1 * theta_ddot + torque) > 1e-6 * abs(torque)
+        assert abs(top.I1 * phi_rate * sine**2 + top.I3 * spin * cosine - form.p_phi) < 1e-50 * scale
+
+
+def _momentum(top, start):
+    return momentum_from_angles(top, *dataclasses.astuple(start)[:2], *dataclasses.astuple(start)[3:])
+
+
+def _integrate(top, start, times):
+    """heyoka on (q, L): q' = q-product of L/I1 and the spin about the body axis, L' = mgl z x e."""
+    hy = pytest.importorskip("heyoka")
+    w, x, y, z, lx, ly, lz = hy.make_vars("w", "x", "y", "z", "lx", "ly", "lz")
+    twist = top.I3 * start.spin * (1.0 / top.I3 - 1.0 / top.I1)
+    wx, wy, wz = lx / top.I1, ly / top.I1, lz / top.I1
+    system = [
+        (w, 0.5 * (-wx * x - wy * y - wz * z - twist * z)),
+        (x, 0.5 * (wx * w + wy * z - wz * y + twist * y)),
+        (y, 0.5 * (wy * w + wz * x - wx * z - twist * x)),
+        (z, 0.5 * (wz * w + wx * y - wy * x + twist * w)),
+        (lx, -2.0 * top.mgl * (y * z - w * x)),
+        (ly, 2.0 * top.mgl * (x * z + w * y)),
+        (lz, hy.expression(0.0)),
+    ]
+    first = [*quaternion_from_angles(start.theta, start.phi, start.psi), *_momentum(top, start)]
+    stepper = hy.taylor_adaptive(system, first, tol=1e-18)
+    return stepper.propagate_grid(np.concatenate([[0.0], times]))[-1][1:]
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["generic", "turning point", "cusp", "plane pendulum", "grazes the top", "grazes the bottom", "through the top",
+     "through the bottom", "flat body", "free", "hanging", "from the top", "asleep below", "nearly steady"],
+)  # fmt: skip
+def test_an_integration_of_the_attitude_ends_where_the_closed_form_says(kind):
+    top, start = _random_top(kind, np.random.default_rng([6, REGIMES.index(kind)]))
+    times = np.linspace(0.1, 5.0, 21)
+    form, states = ClosedForm(top, start), _integrate(top, start, times)
+    reach = 1.0 + np.abs(states[:, 4:]).max()
+    assert attitude_distance(form.quaternion(times), states[:, :4]).max() < 3e-13 * reach
+    assert np.abs(form.momentum(times) - states[:, 4:]).max() < 3e-13 * reach
+    late = attitude_distance(form.quaternion(times + 1e-9), states[:, :4]).max()
+    assert late > 1e-10
+
+
+# --------------------------------------------------------------------------------------------- particular solutions
+
+
+def _woodhouse(I1, I3, mgl):
+    """Released at 60 degrees onto the separatrix; Woodhouse, Introduction to Analytical Dynamics, problem 5.3."""
+    g = mp.sqrt(mp.mpf(mgl) / I1)
+    return g, (mp.pi / 3, 0, 0, 0, 2 * g / mp.sqrt(3), (3 * mp.mpf(I1) - I3) * g / (I3 * mp.sqrt(3)))
+
+
+@pytest.mark.parametrize("body", [(2, 1, 2), (1, 2, 5), (3, 3, "0.7")])
+def test_elementary_separatrix(body):
+    """u = 1/(1 + sech gt); a start rounded in the 150th digit leaves it as exp(gt) times that."""
+    with mp.workdps(150):
+        I1, I3, mgl = map(mp.mpf, body)
+        g, start = _woodhouse(I1, I3, mgl)
+        form = PreciseForm((I1, I3, mgl), start, digits=60)
+        assert form.m < 1 < form.m + mp.mpf(10) ** -100
+        for gt in (mp.mpf("0.5"), 3, 20):
+            true_phi = mp.sqrt(3) / 2 * gt + mp.atan(mp.tanh(mp.mpf(gt) / 2) / mp.sqrt(3))
+            at = form(gt / g)
+            assert abs(mp.cos(at.theta) - 1 / (1 + mp.sech(gt))) < mp.mpf(10) ** -60
+            assert abs(at.phi - true_phi) < mp.mpf(10) ** -58
+            assert abs(at.psi - (mp.sqrt(3) * gt * (I1 / I3 - 1) + true_phi)) < mp.mpf(10) ** -58
+            assert abs(at.phi - true_phi - mp.mpf(10) ** -50) > mp.mpf(10) ** -51
+
+
+def test_separatrix_in_double_precision():
+    """Rounding the start to double makes it another motion, whose own closed form it follows for 20/g."""
+    _, start = _woodhouse(2, 1, 2)
+    top, rounded = SymmetricTop(2.0, 1.0, 2.0), Angles(*map(float, start))
+    form, precise = ClosedForm(top, rounded), PreciseForm(top, rounded, digits=50)
+    assert 0 < 1 - precise.m < 1e-15
+    for time in (1.0, 10.0, 20.0, 40.0):
+        ours, true = form(time), precise(time)
+        assert all(abs(x - y) < 1e-13 for x, y in zip(ours[:3], true[:3], strict=True))
+    assert (_excess(top, rounded, precise, np.array([20.0, 500.0, 1e5])) <= 1.0).all()
+    elementary = 2.0 * math.asin(math.sqrt(0.5 / (1.0 + math.cosh(20.0))))
+    assert abs(form(20.0).theta - elementary) > 1e-12
+
+
+def test_steady_precession_keeps_its_angles():
+    top = SymmetricTop(1.0, 1.0, 8.0)  # I1 = I3 and mgl = I3 phi' psi': steady in exact arithmetic, at any inclination
+    start = Angles(1.1, 0.3, 0.2, 0.0, 2.0, 4.0)
+    form, times = ClosedForm(top, start), np.array([0.0, 1.0, 77.7])
+    motion = form(times)
+    assert form.theta_range[0] == form.theta_range[1] == motion.theta[2] == 1.1
+    np.testing.assert_allclose(motion.phi, 0.3 + 2.0 * times, rtol=2 * EPS)
+    np.testing.assert_allclose(motion.psi, 0.2 + 4.0 * times, rtol=2 * EPS)
+    assert not motion.theta_dot.any()
+    limit = ClosedForm(top, Angles(1.1, 0.3, 0.2, 1e-7, 2.0, 4.0)).nutation_period
+    assert form.nutation_period == pytest.approx(limit, rel=1e-13)
+    omega = math.sqrt(top.potential_curvature(1.1, top.momenta(start)) / top.I1)
+    assert form.nutation_period == pytest.approx(2.0 * math.pi / omega, rel=1e-14)
+    low, high = ClosedForm(top, Angles(1.1, 0.3, 0.2, 0.0, 2.0, 4.0 + 1e-12)).theta_range
+    assert high - low > 1e-14
+
+
+@pytest.mark.parametrize("gap", [1e-6, 1e-10, 1e-14])
+def test_nearly_steady_precession_nutates_by_the_gap(gap):
+    top = SymmetricTop(1.0, 1.0, 8.0)
+    form = ClosedForm(top, Angles(1.1, 0.0, 0.0, 0.0, 2.0, 4.0 + gap))
+    frequency2 = top.potential_curvature(1.1, top.momenta(form.start)) / top.I1
+    push = math.sin(1.1) * (form.start.phi_dot * (form.start.psi_dot * top.I3) - top.mgl) / top.I1
+    swing = 2.0 * abs(push) / frequency2 * math.sin(1.1)
+    assert float(PreciseForm(top, form.start).curve.swing) == pytest.approx(swing, rel=1e-5 if gap > 1e-13 else 0.2)
+
+
+@pytest.mark.parametrize(("w3", "stable"), [(2.5, True), (1.5, False), (2.0, False)])
+def test_sleeping_top_stands_and_its_period_is_that_of_its_neighbours(w3, stable):
+    top = SymmetricTop(1.0, 1.0, 1.0)  # threshold I3 w3 = 2 sqrt(I1 mgl) = 2
+    form, times = ClosedForm(top, Angles(0.0, 0.2, 0.1, 0.0, 0.7, w3 - 0.7)), np.array([0.0, 3.0, 1e4])
+    motion = form(times)
+    assert not motion.theta.any()
+    np.testing.assert_allclose(motion.phi + motion.psi, 0.3 + w3 * times, rtol=2 * EPS)
+    np.testing.assert_allclose(form.axis(times), [[0.0, 0.0, 1.0]] * 3, atol=0)
+    nearby = ClosedForm(top, Angles(1e-6, 0.2, 0.1, 0.0, 0.5 * w3, 0.5 * w3))
+    if stable:
+        assert form.nutation_period == pytest.approx(math.pi / math.sqrt(w3**2 / 4.0 - 1.0), rel=1e-14)
+        assert nearby.nutation_period == pytest.approx(form.nutation_period, rel=1e-9)
+        assert nearby.theta_range[1] < 2e-6
+    else:
+        assert form.nutation_period == math.inf
+        assert form.phi_per_period == form.psi_per_period == math.inf
+        assert nearby.theta_range[1] > (0.5 if w3 < 2.0 else 9e-7)
+
+
+@pytest.mark.parametrize("mgl", [1.0, 0.0, -1.0])
+@pytest.mark.parametrize("theta", [0.0, math.pi, 1.0])
+def test_a_top_without_motion(mgl, theta):
+    """On the upper pole, or free, it stays where it is; pi in double is 1.2e-16 away from the lower one."""
+    form, start = ClosedForm(SymmetricTop(1.0, 0.5, mgl), Angles(theta, 0.3, 0.2)), [theta, 0.3, 0.2, 0.0, 0.0, 0.0]
+    motion = np.array(form([0.0, 1.0]))
+    np.testing.assert_allclose(motion[:, 0], start, atol=2 * EPS)
+    if mgl == 0.0 or theta == 0.0:
+        np.testing.assert_allclose(motion[:, 1], start, atol=2 * EPS)
+    else:
+        assert np.abs(motion[:, 1] - start).max() > 1e-17
+    assert np.isinf(form.nutation_period) == (mgl == 0.0 or (mgl > 0.0 and theta == 0.0))
+
+
+def test_free_top_precesses_about_its_momentum():
+    top, start = SymmetricTop(2.0, 1.3, 0.0), Angles(1.0, 0.2, 0.3, 0.4, 0.5, 3.0)
+    form, times = ClosedForm(top, start), np.linspace(0.0, 1e4, 11)
+    momentum = _momentum(top, start)
+    np.testing.assert_allclose(form.momentum(times), [momentum] * 11, atol=8 * EPS * np.linalg.norm(momentum))
+    assert form.nutation_period == pytest.approx(2.0 * math.pi * top.I1 / np.linalg.norm(momentum), rel=2 * EPS)
+
+
+def test_plane_pendulum_stays_in_its_plane():
+    top = SymmetricTop(1.0, 0.5, 2.0)
+    for rate in (0.3, 9.0):  # to and fro below, over the top
+        form, times = ClosedForm(top, Angles(2.0, 0.4, 0.1, rate, 0.0, 0.0)), np.linspace(0.0, 20.0, 2001)
+        motion, axis = form(times), form.axis(times)
+        assert np.abs(axis @ [math.cos(0.4), math.sin(0.4), 0.0]).max() < 2 * EPS
+        assert np.abs(np.sin(motion.phi - 0.4)).max() < 2 * EPS
+        energy = 0.5 * top.I1 * motion.theta_dot**2 + top.mgl * np.cos(motion.theta)
+        np.testing.assert_allclose(energy, top.energy(form.start), rtol=1e-14)
+    assert form.theta_range == (0.0, math.pi)
+
+
+@pytest.mark.parametrize("facing", [1.0, -1.0])
+@pytest.mark.parametrize("rate", [2.0, -2.0])
+def test_a_start_at_the_pole_moves_the_way_it_is_pushed(facing, rate):
+    top, start = SymmetricTop(1.0, 0.5, facing), Angles(0.0, 0.3, 0.0, rate, 0.0, 3.0)
+    soon = 1e-6
+    axis = ClosedForm(top, start).axis(soon)
+    np.testing.assert_allclose(axis[:2], rate * soon * np.array([math.sin(0.3), -math.cos(0.3)]), rtol=1e-5)
+    at = ClosedForm(top, start)(0.0)
+    assert (float(at.theta), float(at.phi), float(at.psi)) == (0.0, 0.3, 0.0)
+    assert float(at.theta_dot) == pytest.approx(rate, rel=2 * EPS)
+
+
+def test_hanging_top_is_the_standing_one_upside_down():
+    start = Angles(0.9, 0.4, 0.2, 0.5, 1.5, 3.0)
+    mirror = Angles(math.pi - 0.9, 0.4, -0.2, -0.5, 1.5, -3.0)
+    times = np.linspace(0.0, 3.0, 7)
+    down = ClosedForm(SymmetricTop(2.0, 1.0, -4.0), start)(times)
+    up = ClosedForm(SymmetricTop(2.0, 1.0, 4.0), mirror)(times)
+    np.testing.assert_allclose(down.theta, math.pi - up.theta, atol=1e-14)
+    np.testing.assert_allclose(down.phi, up.phi, atol=1e-13)
+    np.testing.assert_allclose(down.psi, -up.psi, atol=1e-13)
+    assert np.abs(down.theta - up.theta).max() > 0.1
+
+
+# ---------------------------------------------------------------------------------------- consistency of one motion
+
+
+@pytest.mark.parametrize("kind", REGIMES)
+def test_views_of_one_motion_agree(kind):
+    top, start = _random_top(kind, np.random.default_rng([7, REGIMES.index(kind)]))
+    form, times = ClosedForm(top, start), np.linspace(-3.0, 9.0, 401)
+    motion, attitude, axis, momentum = form(times), form.quaternion(times), form.axis(times), form.momentum(times)
+    grain = 4 * EPS * (1.0 + np.abs([motion.phi, motion.psi]).max())
+    assert attitude_distance(quaternion_from_angles(*motion[:3]), attitude).max() < 2 * grain
+    np.testing.assert_allclose(axis_from_quaternion(attitude), axis, atol=8 * EPS)
+    np.testing.assert_allclose(axis_from_angles(motion.theta, motion.phi), axis, atol=2 * grain)
+    size = np.linalg.norm(momentum, axis=-1).max()
+    momenta = top.momenta(start)
+    np.testing.assert_allclose(momentum[:, 2], momenta.p_phi, atol=16 * EPS * size)
+    np.testing.assert_allclose(np.sum(momentum * axis, axis=-1), momenta.p_psi, atol=16 * EPS * size)
+    first = _momentum(top, start)
+    np.testing.assert_allclose(form.momentum(0.0), first, atol=16 * EPS * max(size, 1e-300))
+    assert motion.theta.min() >= form.theta_range[0] - 4 * EPS
+    assert motion.theta.max() <= form.theta_range[1] + 4 * EPS
+
+
+def test_attitude_is_continuous_through_and_beside_the_poles():
+    for kind in ("through the top", "through the bottom", "grazes the top", "plane pendulum", "generic"):
+        top, start = _random_top(kind, np.random.default_rng([8, REGIMES.index(kind)]))
+        form, times = ClosedForm(top, start), np.linspace(0.0, 10.0, 20001)
+        rate = np.linalg.norm(form.momentum(times), axis=-1).max() / min(top.I1, top.I3)
+        for view in (form.quaternion(times), form.axis(times)):
+            assert np.linalg.norm(np.diff(view, axis=0), axis=-1).max() < 5e-4 * rate * 1.1
+
+
+def test_one_period_adds_the_precession_and_the_spin():
+    form = PreciseForm(*SPHEROID, digits=40)
+    first, second = form("0.4"), form(mp.mpf("0.4") + form.nutation_period)
+    assert abs(second.theta - first.theta) < 1e-38
+    assert abs(second.phi - first.phi - form.phi_per_period) < 1e-38
+    assert abs(second.psi - first.psi - form.psi_per_period) < 1e-38
+    double = ClosedForm(*SPHEROID)
+    assert double.nutation_period == float(form.nutation_period)
+    assert (double.phi_per_period, double.psi_per_period) == (float(form.phi_per_period), float(form.psi_per_period))
+
+
+def test_turning_points_are_the_extremes_of_theta():
+    form = ClosedForm(*SPHEROID)
+    theta = form(np.linspace(0.0, 20.0 * form.nutation_period, 200_001)).theta
+    assert theta.min() - form.theta_range[0] < 1e-6 > form.theta_range[1] - theta.max()
+    assert form.theta_range[0] <= theta.min()
+    assert theta.max() <= form.theta_range[1]
+
+
+def test_times_of_any_shape():
+    form = ClosedForm(*SPHEROID)
+    assert form(1.0).theta.shape == ()
+    assert form([]).theta.shape == (0,)
+    assert form(np.zeros((2, 3))).phi.shape == (2, 3)
+    assert form.quaternion(np.zeros((2, 3))).shape == (2, 3, 4)
+    assert form.axis(0.5).shape == form.momentum(0.5).shape == (3,)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, [0.0, -math.inf], 1e101])
+def test_times_that_are_not_finite_are_refused(bad):
+    with pytest.raises(SymtopError, match="times must be finite"):
+        ClosedForm(*SPHEROID)(bad)
+
+
+@pytest.mark.parametrize(
+    ("body", "state", "words"),
+    [
+        (("1", "1"), ("1", 0, 0, 0, 0, 0), "numbers"),
+        (("1", "x", "1"), ("1", 0, 0, 0, 0, 0), "I3 must be a finite number"),
+        (("1", "1", math.nan), ("1", 0, 0, 0, 0, 0), "mgl must be a finite number"),
+        (("1", "2.1", "1"), ("1", 0, 0, 0, 0, 0), "I3 must be at most"),
+        (("1", "1", "1"), ("3.2", 0, 0, 0, 0, 0), "theta must lie in"),
+        (("-1", "1", "1"), ("1", 0, 0, 0, 0, 0), "I1 must be above zero"),
+    ],
+)
+def test_values_outside_the_model_are_refused(body, state, words):
+    with pytest.raises(SymtopError, match=words):
+        PreciseForm(body, state)
+
+
+def test_poles_missed_by_less_than_double_precision_can_hold_are_left_to_the_precise_form():
+    top, start = SymmetricTop(1.0, 0.5, 1.0), Angles(1e-160, 0.0, 0.0, 0.3, 0.4, 0.5)
+    with pytest.raises(SymtopError, match="must meet a pole or miss it by 1e-145"):
+        ClosedForm(top, start)
+    assert PreciseForm(top, start).theta_range[0] > 0
+    assert ClosedForm(top, dataclasses.replace(start, theta=1e-60)).theta_range[0] < 1e-119
+
+
+def test_kinds_of_numbers_that_mean_the_same_give_the_same():
+    mixed = PreciseForm((mp.mpf(2), 1, "26.5"), ("0.5", 0.125, mp.mpf("0.25"), "0", 10, -0.5))
+    floats = PreciseForm(SymmetricTop(2.0, 1.0, 26.5), Angles(0.5, 0.125, 0.25, 0.0, 10.0, -0.5))
+    assert mixed("1.5") == floats(mp.mpf(1.5)) == floats(1.5)
+    decimal, double = (PreciseForm((2, 1, "26.5"), (theta, 0, 0, 0, 10, 0)) for theta in ("0.1", 0.1))
+    assert decimal(1) != double(1)
+
+
+def test_working_precision_of_the_caller_does_not_matter():
+    with mp.workdps(5):
+        low = PreciseForm(*SPHEROID, digits=40)(8)
+        assert mp.mp.dps == 5
+    assert low == PreciseForm(*SPHEROID, digits=40)(8)
+
+
+def test_importing_the_module_does_not_import_slow_libraries():
+    code = "import sys, symtop.model.closed_form; print(*({'mpmath', 'scipy', 'numba', 'heyoka'} & set(sys.modules)))"
+    root = Path(__file__).parents[2]
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
+    assert found.stdout.strip() == ""

@@ -1,0 +1,140 @@
+"""The model: published numbers, derivatives, poles."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from symtop import Angles, SymmetricTop, SymtopError, scene
+from tests.conftest import random_scenes
+
+
+def test_energy_and_momenta_of_the_thirty_digit_scenes(truth):
+    for name in ("spheroid_ieee", "goldstein_at_rest_ieee"):
+        entry = truth[name]
+        where = scene("spheroid" if name.startswith("spheroid") else "goldstein")
+        momenta = where.top.momenta(where.start)
+        assert where.top.energy(where.start) == pytest.approx(float(entry["E"]), rel=3e-16)
+        assert momenta.p_phi == pytest.approx(float(entry["p_phi"]), rel=3e-16)
+        assert momenta.p_psi == pytest.approx(float(entry["p_psi"]), rel=3e-16)
+        assert where.nutation_period == pytest.approx(float(entry["nutation_period"]), rel=1e-13)
+
+
+def test_simo_wong_energy_is_the_published_one():
+    where = scene("simo-wong")
+    assert where.top.energy(where.start) == pytest.approx(1269.975, abs=5e-4)
+
+
+def test_spheroid_has_the_notebooks_inertia_and_a_physical_reading():
+    top = SymmetricTop.from_spheroid(mass=1, polar_radius=2.7386127875258306, equatorial_radius=1.5811388300841898)
+    assert pytest.approx((2.0, 1.0), rel=1e-15) == (top.I1, top.I3)
+    assert top.mgl == pytest.approx(26.86579, abs=5e-6)
+    hung = SymmetricTop.from_spheroid(2.0, 2.0, 1.0, gravity=10.0, pivot_distance=0.5)
+    assert pytest.approx(2.0 * 5.0 / 5.0 + 2.0 * 0.25) == hung.I1  # Huygens-Steiner
+    assert hung.mgl == pytest.approx(2.0 * 10.0 * 0.5)
+
+
+@pytest.mark.parametrize("where", random_scenes(8, seed=1), ids=lambda s: s.name)
+def test_slope_and_curvature_are_the_derivatives_of_the_potential(where):
+    top, momenta = where.top, where.top.momenta(where.start)
+    with mpmath.workdps(40):
+        n, s, I1, mgl = (mpmath.mpf(v) for v in (momenta.north, momenta.south, top.I1, top.mgl))
+
+        def potential(theta):
+            p_phi, p_psi = (n + s) / 2, (s - n) / 2
+            return (p_phi - p_psi * mpmath.cos(theta)) ** 2 / (2 * I1 * mpmath.sin(theta) ** 2) + mgl * mpmath.cos(
+                theta
+            )
+
+        for theta in (0.5, 1.2, 2.4):
+            values = [mpmath.diff(potential, mpmath.mpf(theta), k) for k in range(3)]
+            assert top.potential(theta, momenta) == pytest.approx(float(values[0]), rel=1e-13, abs=1e-13)
+            assert top.potential_slope(theta, momenta) == pytest.approx(float(values[1]), rel=1e-12, abs=1e-12)
+            assert top.potential_curvature(theta, momenta) == pytest.approx(float(values[2]), rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("distance", [1e-4, 1e-7])
+@pytest.mark.parametrize("pole", [0.0, math.pi])
+def test_the_potential_keeps_its_digits_at_a_pole_where_the_textbook_form_does_not(distance, pole):
+    """The naive numerator has relative error 1e-8 at theta = 1e-4 (PHYSICS 1); ours stays at rounding."""
+    theta = distance if pole == 0.0 else pole - distance
+    top = SymmetricTop(1.3, 0.7, 2.0)
+    start = Angles(theta=theta, phi_dot=0.4, psi_dot=3.0)
+    momenta = top.momenta(start)
+    with mpmath.workdps(50):
+        t = mpmath.mpf(theta)
+        spin = mpmath.mpf(start.psi_dot) + mpmath.mpf(start.phi_dot) * mpmath.cos(t)
+        p_psi = top.I3 * spin
+        p_phi = top.I1 * start.phi_dot * mpmath.sin(t) ** 2 + p_psi * mpmath.cos(t)
+        exact = (p_phi - p_psi * mpmath.cos(t)) ** 2 / (2 * top.I1 * mpmath.sin(t) ** 2) + top.mgl * mpmath.cos(t)
+        exact_rate = (p_phi - p_psi * mpmath.cos(t)) / (top.I1 * mpmath.sin(t) ** 2)
+    from symtop.model.top import effective_force
+
+    assert top.potential(theta, momenta) == pytest.approx(float(exact), rel=4e-15)
+    rate = effective_force(theta, momenta.north, momenta.south, top.I1, top.mgl)[1]
+    assert rate == pytest.approx(float(exact_rate), rel=4e-15)
+    naive = (momenta.p_phi - momenta.p_psi * math.cos(theta)) / (top.I1 * math.sin(theta) ** 2)
+    assert abs(naive / float(exact_rate) - 1.0) > 1e-10
+
+
+def test_nutation_frequency_is_the_limit_of_small_nutations():
+    where = scene("steady")
+    momenta = where.top.momenta(where.start)
+    assert where.top.steady_theta(momenta) == pytest.approx(math.pi / 3, abs=1e-8)
+    # V'' at the precession Omega = 1: omega^2 = (p_psi - 2 I1 Omega c)^2/I1^2 + Omega^2 s^2 + c [...]/I1 = 1
+    assert where.top.nutation_frequency(momenta) == pytest.approx(1.0, rel=1e-8)
+    nudged = Angles(theta=where.start.theta + 1e-4, phi_dot=where.start.phi_dot, psi_dot=where.start.psi_dot)
+    period = where.top.nutation_period(nudged)
+    assert 2.0 * math.pi / period == pytest.approx(where.top.nutation_frequency(where.top.momenta(nudged)), rel=1e-6)
+
+
+def test_nutation_frequency_of_sleeping_tops_has_the_classical_threshold():
+    """Stable for I3 w3 > 2 sqrt(I1 mgl): omega^2 = p_psi^2/4 I1^2 - mgl/I1 at theta = 0."""
+    asleep = SymmetricTop(1.0, 1.0, 1.0)
+    awake = asleep.momenta(Angles(theta=0.0, psi_dot=2.5))
+    assert asleep.steady_theta(awake) == 0.0
+    assert asleep.nutation_frequency(awake) == pytest.approx(math.sqrt(2.5**2 / 4 - 1.0), rel=1e-14)
+    fallen = asleep.momenta(Angles(theta=0.0, psi_dot=1.5))
+    assert asleep.steady_theta(fallen) > 0.1
+
+
+def test_free_and_hanging_tops_have_a_nutation_period():
+    free = SymmetricTop(2.0, 1.0, 0.0)
+    start = Angles(theta=1.0, theta_dot=0.3, phi_dot=0.5, psi_dot=2.0)
+    momenta = free.momenta(start)
+    across = 2.0 * (free.energy(start) - momenta.p_psi**2 / 2.0) * free.I1  # |L|^2 - p_psi^2
+    assert free.nutation_period(start) == pytest.approx(
+        2 * math.pi * 2.0 / math.sqrt(across + momenta.p_psi**2), rel=1e-12
+    )
+    up, down = SymmetricTop(2.0, 1.0, 3.0), SymmetricTop(2.0, 1.0, -3.0)
+    mirrored = Angles(theta=math.pi - 1.0, theta_dot=-0.3, phi_dot=-0.5, psi_dot=2.0)
+    assert down.nutation_period(mirrored) == pytest.approx(up.nutation_period(start), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("build", "says"),
+    [
+        (lambda: SymmetricTop(0.0, 1.0, 1.0), "I1 must be above zero"),
+        (lambda: SymmetricTop(1.0, -1.0, 1.0), "I3 must be above zero"),
+        (lambda: SymmetricTop(1.0, 2.1, 1.0), "I3 must be at most 2 I1"),
+        (lambda: SymmetricTop(1.0, 1.0, math.inf), "mgl must be a finite number"),
+        (lambda: SymmetricTop("heavy", 1.0, 1.0), "I1 must be a finite number"),
+        (lambda: Angles(theta=-0.1), "theta must lie in"),
+        (lambda: Angles(theta=math.nan), "theta must be a finite number"),
+        (lambda: Angles(theta=1.0, phi_dot=None), "phi_dot must be a finite number"),
+        (lambda: SymmetricTop.from_spheroid(1.0, 0.0, 1.0), "polar_radius must be above zero"),
+    ],
+)
+def test_bad_numbers_are_refused_in_one_sentence(build, says):
+    with pytest.raises(SymtopError, match=says) as caught:
+        build()
+    assert "\n" not in str(caught.value)
+
+
+def test_arrays_and_floats_give_the_same_potential():
+    where = scene("spheroid")
+    momenta = where.top.momenta(where.start)
+    thetas = np.linspace(0.1, 3.0, 7)
+    one_by_one = [where.top.potential(float(theta), momenta) for theta in thetas]
+    assert np.array_equal(where.top.potential(thetas, momenta), one_by_one)

@@ -1,0 +1,236 @@
+"""The guard before a run: it misses no wrong answer, is silent when all is well, and never changes the run."""
+
+import math
+import random
+import re
+import warnings
+
+import numpy as np
+import pytest
+from regimes import trial
+
+import symtop
+from symtop.measure.timing import timings
+from symtop.methods.registry import integrators
+from symtop.model import charts
+from symtop.model.scenes import closed_form, grazing, steady
+from symtop.run import forecast, guard
+from symtop.run.forecast import Probe, grown, landmarks, step_map
+from symtop.run.guard import EXPECTED
+from symtop.run.simulation import make_plan
+
+WRONG, RIGHT = 0.1, 1e-3  # rad
+MOST_FALSE = 0.05
+
+
+def said(scene, name, **knobs):
+    """What the guard says of a run."""
+    heard = []
+    symtop.simulate(scene, name, guard=heard.append, samples=11, **knobs)
+    return heard[0] if heard else ""
+
+
+# ---- no silent wrong answer ------------------------------------------------------------------------------------------
+
+
+def judge_trials(count, seed):
+    """Runs that were wrong in silence, and the share of the accurate ones that were warned of."""
+    draw = random.Random(seed)
+    trials = [trial(draw, f"random-{k}") for k in range(count)]
+    wrong = [one for one in trials if one.outcome == "ok" and one.error > WRONG]
+    right = [one for one in trials if one.outcome == "ok" and one.error < RIGHT]
+    assert len(wrong) > count / 30  # the trials are hard enough to mean something, and not too hard
+    assert len(right) > count / 3
+    silent = [(one.integrator, one.scene, one.knob, one.error) for one in wrong if not one.warning]
+    return silent, sum(bool(one.warning) for one in right) / len(right)
+
+
+def test_no_wrong_answer_is_silent_and_few_good_ones_are_warned_of():
+    silent, false = judge_trials(100, seed=7)
+    assert silent == []
+    assert false <= MOST_FALSE
+
+
+@pytest.mark.slow
+def test_no_wrong_answer_is_silent_in_two_thousand_runs():
+    """Measured: 211 wrong and 1303 accurate runs; none of the former was silent, 3 of the latter were warned of."""
+    silent, false = judge_trials(2000, seed=11)
+    assert silent == []
+    assert false <= MOST_FALSE
+
+
+# ---- silence, and the run untouched ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "knob"),
+    [
+        ("stormer-verlet", {"step_size": 2e-3}),
+        ("midpoint", {"step_size": 2e-3}),
+        ("strang", {"step_size": 2e-3}),
+        ("gauss-4", {"step_size": 1e-2}),
+        ("rk45-compiled", {"tolerance": 1e-8}),
+        ("taylor", {}),
+        ("exact", {}),
+    ],
+)
+def test_a_good_run_is_met_with_silence_and_any_run_with_the_same_bits(name, knob):
+    assert said("spheroid", name, **knob) == ""
+    quiet, watched = (symtop.simulate("spheroid", name, samples=41, guard=guard, **knob) for guard in (False, True))
+    assert quiet.attrs.pop("guard") == "off"
+    assert watched.attrs.pop("guard") == ""
+    assert watched.identical(quiet)
+
+
+def test_a_bad_run_is_the_same_run_with_a_warning():
+    knobs = {"step_size": 0.1, "samples": 41}
+    with pytest.warns(symtop.SymtopWarning, match="expect an axis error") as caught:
+        watched = symtop.simulate("spheroid", "midpoint", **knobs)
+    assert len(caught) == 1
+    assert "\n" not in str(caught[0].message)
+    assert caught[0].filename == __file__  # the line that the user wrote
+    assert watched.attrs.pop("guard") == str(caught[0].message)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        quiet = symtop.simulate("spheroid", "midpoint", guard=False, **knobs)
+    del quiet.attrs["guard"]
+    assert watched.identical(quiet)
+
+
+# ---- the numbers behind it -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("law", "straight"), [(lambda t: 3e-6 * t, True), (lambda t: 1e-6 * t + 4e-7 * t * t, False)])
+def test_errors_are_grown_by_their_law(law, straight):
+    times = np.linspace(0.0, 10.0, 401)[1:]
+    probe = Probe(times, law(times), "ok", 10.0)
+    assert grown(probe, 1000.0, straight=straight) == pytest.approx(law(1000.0), rel=0.03)
+    assert grown(probe, 10.0, straight=straight) == law(10.0)
+    if not straight:  # the wrong law would be silent
+        assert grown(probe, 1000.0, straight=True) < 0.1 * law(1000.0)
+
+
+@pytest.mark.parametrize("turn", [0.3, 1.0, 1.7, 1.99])
+def test_a_step_map_is_what_linear_theory_says(turn):
+    """Verlet turns by 2 asin(h omega/2), the midpoint rule by 2 atan(h omega/2); both maps keep areas."""
+    scene = steady(20.0)
+    h = turn / landmarks(scene).frequency
+    for name, angle in (("stormer-verlet", 2.0 * math.asin(0.5 * turn)), ("midpoint", 2.0 * math.atan(0.5 * turn))):
+        matrix = step_map(scene, symtop.integrator(name), "angles", h)
+        assert np.linalg.det(matrix) == pytest.approx(1.0, abs=1e-8)
+        assert math.acos(0.5 * np.trace(matrix)) == pytest.approx(angle, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["strang", "gauss-4", "rk4"])
+def test_a_step_map_in_space_turns_a_small_step_by_omega(name):
+    scene = steady(20.0)
+    frequency = landmarks(scene).frequency
+    method = symtop.integrator(name)
+    matrix = step_map(scene, method, "axis", 0.01 / frequency)
+    assert abs(np.angle(np.linalg.eigvals(matrix)[0])) == pytest.approx(0.01, rel=1e-5)
+
+
+def test_the_limits_of_verlet_and_rk4_are_found():
+    """F1: Verlet loses small nutations at h omega = 2, rk4 at 2 sqrt 2, the midpoint rule never."""
+    scene = steady(20.0)
+    frequency = landmarks(scene).frequency
+    for name, limit in (("stormer-verlet", 2.0), ("rk4", 2.0 * math.sqrt(2.0))):
+        warned = said(scene, name, step_size=1.02 * limit / frequency, observe="nutation")
+        assert float(re.search(r"h omega = ([\d.]+)\)", warned).group(1)) == pytest.approx(limit, abs=3e-3)
+        assert "grow" in warned
+        assert "grow" not in said(scene, name, step_size=0.98 * limit / frequency, observe="nutation")
+    assert said(scene, "midpoint", step_size=3.0 / frequency) == ""
+
+
+def test_landmarks_are_those_of_the_closed_form():
+    marks = landmarks(grazing(1e-4))
+    assert marks.pole == "upper"
+    assert marks.gap == pytest.approx(1.105e-4, rel=1e-2)
+    motion = closed_form(grazing(1e-4))(np.linspace(0.0, 4.23, 2_000_001))
+    assert marks.rate == pytest.approx(np.abs(motion.phi_dot).max(), rel=1e-3)
+    lower = landmarks(symtop.scene("bruls-cardona-arnold"))
+    assert lower.pole == "lower"
+    assert math.degrees(lower.gap) == pytest.approx(4.15e-5, rel=1e-2)
+
+
+# ---- causes and remedies ---------------------------------------------------------------------------------------------
+
+
+def test_each_cause_is_named():
+    fast = steady(20.0)
+    frequency = landmarks(fast).frequency
+    nutating = symtop.Scene("nutating", fast.top, symtop.Angles(1.0, theta_dot=1.0, psi_dot=20.0), 60.0)
+    assert "the upper pole" in said(grazing(1e-3), "stormer-verlet", step_size=0.02)
+    assert said(grazing(1e-3), "strang", step_size=2e-3) == ""  # no pole in its chart
+    assert "separatrix" in said("separatrix", "gauss-8", step_size=0.01, horizon=150.0)
+    assert said("separatrix", "gauss-8", step_size=0.01, horizon=15.0) == ""
+    assert "jumps over the nutation" in said("goldstein", "gauss-4", step_size=2.0)
+    assert "1/3 of a turn, a resonance" in said(nutating, "stormer-verlet", step_size=math.sqrt(3.0) / frequency)
+    assert "errors add up over" in said("goldstein", "midpoint", step_size=0.1, horizon=1000.0)
+    assert "tolerance" in said("goldstein", "rk45-compiled", tolerance=1e-5, horizon=1000.0)
+    assert "stopped at t =" in said("spheroid", "gauss-2", step_size=0.5, observe="axis")
+
+
+@pytest.mark.parametrize(
+    ("scene", "name", "knob", "horizon"),
+    [
+        ("spheroid", "midpoint", {"step_size": 0.05}, 40.0),
+        ("goldstein", "stormer-verlet", {"step_size": 0.2}, 300.0),
+        ("hairer-lubich-wanner", "strang", {"step_size": 0.3}, 100.0),
+        ("spheroid", "rk4", {"step_size": 0.05}, 60.0),
+        ("spheroid", "rk45-compiled", {"tolerance": 1e-4}, 100.0),
+        ("cusp", "gauss-4", {"step_size": 0.3}, 300.0),
+    ],
+)
+def test_a_remedy_is_a_remedy(scene, name, knob, horizon):
+    """What the sentence advises silences the guard and makes the run right, and is not ten times too careful."""
+    warned = said(scene, name, horizon=horizon, **knob)
+    advice = float(re.search(r"(?:step of about|tolerance) ([\d.e-]+)$", warned).group(1))
+    knob = dict.fromkeys(knob, advice)
+    run = symtop.simulate(scene, name, horizon=horizon, **knob)
+    truth = closed_form(symtop.scene(scene)).axis(run["time"].values)
+    error = float(charts.axis_distance(run["axis"].values, truth).max())
+    assert 1e-5 < error < EXPECTED
+
+
+@pytest.mark.slow
+def test_the_guard_costs_less_than_two_milliseconds():
+    where, method = symtop.scene("spheroid"), symtop.integrator("midpoint")
+    for step, horizon in ((0.01, 8.0), (1e-4, 8.0), (1e-3, 1000.0)):
+        plan, _ = make_plan(where, method, step, None, horizon, 501)
+        kernel, guarded = timings(
+            [
+                lambda plan=plan: method.solvers["angles"](where.top, where.start, plan),
+                lambda plan=plan: guard.warning(where, method, "angles", plan),
+            ]
+        )
+        assert guarded.best < 2e-3 + 0.2 * kernel.best
+
+
+def test_every_method_can_be_probed_and_is_told_what_it_can_do():
+    """One forecast a method: finite, and silent at a fine setting."""
+    where = symtop.scene("goldstein")
+    for method in integrators().values():
+        knob = {"step_size": 0.01} if method.knob == "step_size" else {}
+        if method.knob == "tolerance" and method.default_tolerance is None:
+            knob = {"tolerance": 1e-6 if method.tier == "compiled" else 1e-5}
+        plan, _ = make_plan(where, method, knob.get("step_size"), knob.get("tolerance"), 3.0, 11)
+        found = forecast.forecast(where, method, method.charts()[0], plan)
+        assert found.outcome == "ok"
+        assert found.axis_error < 1e-2
+
+
+def test_the_command_line_prints_it_before_the_run_and_can_be_told_not_to():
+    from click.testing import CliRunner
+
+    from symtop.cli.main import main
+
+    words = ["run", "goldstein", "midpoint", "--step-size", "0.1", "--horizon", "200"]
+    told, quiet = (CliRunner().invoke(main, [*words, *more]) for more in ([], ["--no-guard"]))
+    assert told.exit_code == quiet.exit_code == 0
+    assert told.output.splitlines()[0].startswith("symtop: midpoint on goldstein: expect an axis error of")
+    assert "expect" not in quiet.output
+    assert told.stdout == quiet.stdout  # the warning goes to stderr, the run is the same
+    short = CliRunner().invoke(main, ["run", "goldstein", "taylor", "--budget", "3"])
+    assert short.exit_code == 3
+    assert "the limit on the work of one run was reached" in short.output

@@ -1,0 +1,248 @@
+"""Long runs: the same bits in stretches, after kill -9 and in one piece; flat memory; rounding at its best."""
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import time
+import tracemalloc
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numba import njit
+from symtop_studies.drift.rounding import members, round_off
+
+import symtop
+from symtop.base.validate import SymtopError
+from symtop.cli.main import main
+from symtop.methods import loop as drive
+from symtop.methods.fused import fused
+from symtop.run import long_run as longrun
+from symtop.run.long_run import chart_of, leaves, long_run, regrown, scattered, windows
+
+WHERE = symtop.scene("spheroid")
+H = WHERE.nutation_period / 400.37
+
+
+@pytest.mark.parametrize("steps", [1, 9_999, 10_000, 123_456, 10**9])
+def test_windows_and_samples_cover_a_run_once(steps):
+    ends = windows(steps)
+    assert ends[-1] == steps
+    assert ends == sorted(set(ends))
+    assert max(np.diff([0, *ends])) <= longrun.LONGEST
+    marks = scattered(ends[-2] if len(ends) > 1 else 0, steps)
+    assert marks[-1] == steps
+    assert np.all(np.diff(marks) > 0)
+    if marks.size > 100:
+        assert np.unique(np.diff(marks)).size > 1  # no fixed stride
+
+
+@pytest.mark.parametrize(
+    "name", ["stormer-verlet", "midpoint", "galerkin-simpson", "takahashi-imada", "gauss-4", "rk4"]
+)
+def test_a_run_in_stretches_has_the_bits_of_one_in_one_piece(name):
+    chart, solver = chart_of(symtop.integrator(name))
+    par, rule, state = solver.setup(WHERE.top, WHERE.start, H)
+    marks = np.array([3, 50, 51, 200])
+    whole = solver.loop(par, rule, state, H, marks)
+    first, at = solver.loop.advance(par, rule, solver.loop.begun(par, rule, state, H), H, marks[:2])
+    again = at._replace(carry=regrown(at.carry, iter(leaves(at.carry))))
+    for position in (at, again):
+        second, end = solver.loop.advance(par, rule, position, H, marks[2:])
+        assert np.array_equal(np.concatenate([first.states, second.states]), whole.states)
+        assert np.array_equal(np.concatenate([first.momenta, second.momenta])[1:], whole.momenta[1:])
+        assert (end.k, at.k) == (200, 50)
+    assert chart in ("axis", "angles")
+
+
+def test_what_was_rounded_off_is_part_of_a_position():
+    _, solver = chart_of(symtop.integrator("stormer-verlet"))
+    par, rule, state = solver.setup(WHERE.top, WHERE.start, H)
+    _, at = solver.loop.advance(par, rule, solver.loop.begun(par, rule, state, H), H, np.array([1000]))
+    forgetful = at._replace(low=(0.0,) * 4)
+    ends = [solver.loop.advance(par, rule, one, H, np.array([20_000]))[0].states for one in (at, forgetful)]
+    assert not np.array_equal(*ends)
+
+
+def test_extremes_are_those_of_a_dense_run():
+    steps = 20_000
+    found = long_run(WHERE, "stormer-verlet", steps=steps, step_size=H, quiet=True)
+    dense = symtop.simulate(WHERE, "stormer-verlet", step_size=H, horizon=steps * H, samples=steps + 1)
+    change = (dense["energy"] - dense["energy"][0]).values / (WHERE.top.energy(WHERE.start) + WHERE.top.mgl)
+    assert float(found["energy_least"].min()) == pytest.approx(change.min(), rel=1e-2, abs=1e-9)
+    assert float(found["energy_largest"].max()) == pytest.approx(change.max(), rel=1e-2, abs=1e-9)
+    assert float(found["theta_largest"].max()) == pytest.approx(float(dense["theta"].max()), abs=1e-3)
+
+
+SCRIPT = """
+import sys, symtop
+from symtop.measure import longrun
+longrun.LONGEST, longrun.SAVE = 200_000, 0.0
+where = symtop.scene("spheroid")
+longrun.long_run(where, "midpoint", steps=12_000_000, step_size=where.nutation_period / 400.37, checkpoint=sys.argv[1])
+"""
+
+
+@pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGTERM])
+def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
+    file = tmp_path / "run.nc"
+    child = subprocess.Popen([sys.executable, "-c", SCRIPT, str(file)], env={**os.environ, "PYTHONPATH": _root()})
+    deadline = time.monotonic() + 120.0
+    while not file.is_file() and child.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    time.sleep(0.1)
+    child.send_signal(blow)
+    code = child.wait(60)
+    assert code == (-signal.SIGKILL if blow == signal.SIGKILL else 128 + signal.SIGTERM)
+    monkeypatch.setattr(longrun, "LONGEST", 200_000)
+    from symtop.base import datasets
+
+    reached = datasets.read(file).attrs["steps_done"]
+    assert 10_000 <= reached < 12_000_000
+    steps = 12_000_000
+    seen = []
+    advance = drive.Loop.advance
+
+    def counting(self, par, rule, at, h, marks):
+        seen.append(at.k)
+        return advance(self, par, rule, at, h, marks)
+
+    monkeypatch.setattr(drive.Loop, "advance", counting)
+    resumed = long_run(WHERE, "midpoint", steps=steps, step_size=H, checkpoint=file, quiet=True)
+    assert reached in seen  # it did go on from there
+    assert not file.exists()
+    assert resumed.identical(long_run(WHERE, "midpoint", steps=steps, step_size=H, quiet=True))
+
+
+def test_a_checkpoint_knows_a_method_by_what_it_holds_and_not_by_its_name():
+    h = WHERE.nutation_period / 100.37
+
+    def triple(x):
+        return symtop.composition("triple", (x, 1.0 - 2.0 * x, x), (x / 2, (1 - x) / 2, (1 - x) / 2, x / 2), order=2)
+
+    def identity(method):
+        return longrun._identity(WHERE, method, h, 500, True)
+
+    assert identity(triple(0.3)) == identity(triple(0.3))  # the control: made twice, it is the same
+    assert identity(triple(0.3)) != identity(triple(0.3000001))
+    plain = symtop.integrator("stormer-verlet")
+    renamed = dataclasses.replace(symtop.integrator("strang"), name=plain.name)
+    assert identity(renamed) != identity(plain)  # another kernel
+    assert identity(dataclasses.replace(plain, summary="said otherwise")) == identity(plain)
+
+
+def _root() -> str:
+    return str(Path(symtop.__file__).resolve().parents[1])
+
+
+def test_an_interrupt_keeps_every_finished_window(tmp_path, monkeypatch):
+    file, calls = tmp_path / "run.nc", []
+    summary = longrun._summary
+
+    def tired(values):
+        calls.append(1)
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+        return summary(values)
+
+    monkeypatch.setattr(longrun, "_summary", tired)
+    with pytest.raises(KeyboardInterrupt):
+        long_run(WHERE, "rk4", steps=50_000, step_size=H, checkpoint=file, quiet=True)
+    resumed = long_run(WHERE, "rk4", steps=50_000, step_size=H, checkpoint=file, quiet=True)
+    assert len(calls) == 5 + resumed.sizes["window"] - 4
+    assert resumed.identical(long_run(WHERE, "rk4", steps=50_000, step_size=H, quiet=True))
+
+
+def test_a_checkpoint_of_another_run_is_refused(tmp_path):
+    file = tmp_path / "run.nc"
+    book = longrun._Book(file, "another")
+    book.note(drive.Position((1.0,), (0.0,), (), 7), [[0.0]])
+    book.save()
+    with pytest.raises(SymtopError, match="belongs to another run"):
+        long_run(WHERE, "cayley", steps=1000, step_size=H, checkpoint=file, quiet=True)
+
+
+def test_a_failed_run_shows_the_windows_it_had():
+    where = symtop.scene("bruls-cardona-arnold")
+    found = long_run(where, "stormer-verlet", steps=10**6, step_size=2e-3, quiet=True)
+    assert found.attrs["outcome"] == "left_chart"
+    assert "stopped at" in found.attrs["outcome_message"]
+
+
+@pytest.mark.parametrize(
+    ("integrator", "settings", "said"),
+    [
+        ("rk45", {"steps": 10, "step_size": 0.1}, "rk45 has no compiled loop of fixed steps"),
+        ("midpoint", {"steps": 0, "step_size": 0.1}, "steps must be a whole number of at least 1"),
+        ("midpoint", {"steps": 10**12, "step_size": 0.1}, "steps must be at most"),
+        ("midpoint", {"steps": 10, "step_size": -0.1}, "step_size must be above zero"),
+    ],
+)
+def test_bad_input_gets_one_sentence(integrator, settings, said):
+    with pytest.raises(SymtopError, match=said):
+        long_run(WHERE, integrator, quiet=True, **settings)
+
+
+def test_memory_does_not_grow_with_the_steps():
+    peaks = []
+    for steps in (100_000, 3_000_000):
+        long_run(WHERE, "stormer-verlet", steps=steps, step_size=H, quiet=True)
+        tracemalloc.start()
+        long_run(WHERE, "stormer-verlet", steps=steps, step_size=H, quiet=True)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < peaks[0] + 1_000_000
+
+
+@pytest.mark.parametrize("name", ["stormer-verlet", "midpoint", "strang", "cayley"])
+def test_compensated_sums_drift_less_than_plain_ones(name):
+    found = round_off(WHERE, symtop.integrator(name), 300_000, 1000.37, 3)
+    assert float(found["rounding_end"]) < 2e-15
+    assert float(found["rounding_gain"]) > 8.0
+    assert max(float(found["rounding_p_phi"]), float(found["rounding_p_psi"])) < 2e-14
+
+
+def test_a_small_correction_is_not_rounded_to_one_side():
+    """This start lost 1.5e-14 of its energy in 5e7 steps while midpoint rounded its last correction by itself."""
+    start = members(WHERE, 15)[14]
+    run = long_run(start, "midpoint", steps=50_000_000, step_size=start.nutation_period / 1000.37, quiet=True)
+    assert abs(float(run["modified_energy_mean"][-1])) < 5e-15
+
+
+def test_a_fused_sum_is_rounded_once_and_a_plain_one_twice():
+    tiny = 2.0**-30
+
+    @njit
+    def compiled(a, b, c):
+        return fused(a, b, c)
+
+    assert compiled(1.0 + tiny, 1.0 - tiny, -1.0) == -(tiny**2)
+    assert (1.0 + tiny) * (1.0 - tiny) - 1.0 == 0.0
+    assert fused(Fraction(1, 3), Fraction(3), Fraction(1)) == 2
+
+
+def test_the_command_runs_and_says_what_changed(tmp_path):
+    output = tmp_path / "long.nc"
+    done = CliRunner().invoke(
+        main,
+        [
+            "long",
+            "spheroid",
+            "cayley",
+            "--steps",
+            "2e4",
+            "--checkpoint",
+            str(tmp_path / "c.nc"),
+            "--output",
+            str(output),
+        ],
+    )
+    assert done.exit_code == 0, done.output
+    assert "modified_energy" in done.output
+    assert output.is_file()
+    bad = CliRunner().invoke(main, ["long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1"])
+    assert bad.exit_code == 2

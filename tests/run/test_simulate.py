@@ -1,0 +1,188 @@
+"""simulate(): the dataset it promises, its sampling, and what it refuses."""
+
+import math
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.base import datasets
+from symtop.run.simulation import sample_times
+
+
+def test_the_dataset_is_the_one_that_is_promised():
+    run = symtop.simulate("spheroid", "midpoint", step_size=0.013, samples=51, guard=False)
+    assert set(run.dims) == {"time", "component"}
+    assert list(run["component"].values) == ["x", "y", "z"]
+    for name in ("theta", "phi", "psi", "energy", "p_phi", "p_psi", "p_theta"):
+        assert run[name].dims == ("time",)
+        assert run[name].attrs["units"]
+    assert run["axis"].dims == ("time", "component")
+    assert np.linalg.norm(run["axis"], axis=1) == pytest.approx(1.0, abs=1e-15)
+    attrs = run.attrs
+    assert attrs["steps"] == 615
+    assert attrs["step_size"] == 8.0 / 615  # h = T/N exactly
+    assert attrs["outcome"] == "ok"
+    assert attrs["reached_time"] == pytest.approx(8.0)
+    for name in ("integrator", "scene", "force_evaluations", "newton_iterations", "outcome_message", "symtop_version"):
+        assert name in attrs
+    steps = run["time"].values / attrs["step_size"]
+    assert steps == pytest.approx(np.rint(steps), abs=1e-9)
+
+
+def test_energy_and_momenta_start_at_their_exact_values():
+    where = symtop.scene("goldstein-rising")
+    for name, knob in (("midpoint", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-6}), ("taylor", {})):
+        run = symtop.simulate(where, name, horizon=1.0, **knob)
+        assert float(run["energy"][0]) == pytest.approx(14.1, rel=1e-15)
+        assert float(run["p_phi"][0]) == pytest.approx(3.4, rel=1e-15)
+        assert float(run["p_psi"][0]) == pytest.approx(5.0, rel=1e-15)
+
+
+def test_the_chart_follows_what_is_observed():
+    axis = symtop.simulate("spheroid", "taylor", observe="axis", samples=11)
+    attitude = symtop.simulate("spheroid", "taylor", observe="attitude", samples=11)
+    assert axis.attrs["chart"] == "axis"
+    assert "psi" not in axis
+    assert attitude.attrs["chart"] == "attitude"
+    assert "psi" in attitude
+    assert float(abs(axis["theta"] - attitude["theta"]).max()) < 1e-13
+    assert float(abs(axis["phi"] - attitude["phi"]).max()) < 1e-12
+
+
+def test_samples_commensurate_with_the_nutation_are_dithered_and_said_to_be():
+    """F11: sampled at multiples of the nutation period, Verlet's energy error reads a thousand times too small."""
+    where = symtop.scene("spheroid")
+    period = where.nutation_period
+    run = symtop.simulate(where, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=51)
+    assert run.attrs["sampling"] == "dithered"
+    honest = float(np.max(np.abs(run["energy"] - run["energy"][0])))
+    dense = symtop.simulate(where, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=10_001)
+    assert dense.attrs["sampling"] == "uniform"
+    every = np.abs(dense["energy"].values - dense["energy"].values[0])
+    assert honest > 0.3 * every.max()
+    blind = every[::200]  # what uniform samples would have shown
+    assert blind.max() < 0.01 * every.max()
+
+
+def test_sampling_falls_on_whole_steps_and_covers_the_run():
+    times, marks, dithered = sample_times(8.0, 101, 1.18, steps=977)
+    assert not dithered
+    assert marks[0] == 0
+    assert marks[-1] == 977
+    assert times == pytest.approx(marks * (8.0 / 977))
+    few, _, _ = sample_times(8.0, 101, 1.18, steps=10)
+    assert few.size == 11  # no more samples than steps
+
+
+def test_files_are_whole_reproducible_and_readable(tmp_path):
+    run = symtop.simulate("spheroid", "stormer-verlet", step_size=0.01)
+    first = datasets.write(run, tmp_path / "a" / "run.nc")
+    second = datasets.write(symtop.simulate("spheroid", "stormer-verlet", step_size=0.01), tmp_path / "b.nc")
+    assert first.read_bytes() == second.read_bytes()
+    back = datasets.read(first)
+    assert back.identical(run)
+    assert sorted(path.name for path in tmp_path.rglob("*") if path.is_file()) == ["b.nc", "run.nc"]
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_scraps(tmp_path, monkeypatch):
+    run = symtop.simulate("spheroid", "stormer-verlet", step_size=0.01)
+    path = datasets.write(run, tmp_path / "run.nc")
+    before = path.read_bytes()
+
+    def full(*_args, **_kwargs):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(type(run), "to_netcdf", full)
+    with pytest.raises(symtop.SymtopError, match="No space left"):
+        datasets.write(run, path)
+    assert path.read_bytes() == before
+    assert [item.name for item in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_damaged_and_foreign_files_are_refused_in_one_sentence(tmp_path):
+    path = tmp_path / "noise.nc"
+    path.write_bytes(b"not a dataset")
+    with pytest.raises(symtop.SymtopError, match="cannot read"):
+        datasets.read(path)
+    with pytest.raises(symtop.SymtopError, match="it is a folder"):
+        datasets.write(symtop.simulate("spheroid", "taylor", samples=3), tmp_path)
+
+
+GOOD = {"scene": "spheroid", "integrator": "midpoint", "step_size": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"scene": "sferoid"}, "did you mean spheroid"),
+        ({"integrator": "midpiont"}, "did you mean midpoint"),
+        ({"step_size": 0.0}, "step_size must be above zero"),
+        ({"step_size": -0.1}, "step_size must be above zero"),
+        ({"step_size": math.nan}, "step_size must be a finite number"),
+        ({"step_size": "small"}, "step_size must be a finite number"),
+        ({"step_size": 9.0}, "step_size must be at most the horizon"),
+        ({"step_size": 1e-300}, "the limit is"),
+        ({"step_size": None}, "needs step_size"),
+        ({"tolerance": 1e-6}, "give step_size, not tolerance"),
+        ({"horizon": 0.0}, "horizon must be above zero"),
+        ({"horizon": math.inf}, "horizon must be a finite number"),
+        ({"samples": 1}, "samples must be a whole number of at least 2"),
+        ({"samples": 10.5}, "samples must be a whole number"),
+        ({"observe": "everything"}, "observe 'everything' is unknown"),
+        ({"integrator": "rk45"}, "give tolerance, not step_size"),
+        ({"integrator": "rk45", "step_size": None}, "needs a tolerance"),
+        ({"integrator": "rk45", "step_size": None, "tolerance": 1e-15}, "tolerance of rk45 must be at least"),
+        ({"integrator": "rk45", "step_size": None, "tolerance": 2.0}, "below 1"),
+        ({"integrator": "taylor", "step_size": None, "tolerance": -1.0}, "tolerance must be above zero"),
+    ],
+)
+def test_bad_arguments_are_refused_in_one_sentence(change, says):
+    arguments = {**GOOD, **change}
+    with pytest.raises(symtop.SymtopError, match=says) as caught:
+        symtop.simulate(arguments.pop("scene"), arguments.pop("integrator"), **arguments)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("theta", [0.0, math.pi])
+def test_a_start_on_a_pole_is_refused_by_the_angles_chart_and_welcome_elsewhere(theta):
+    where = symtop.Scene("pole", symtop.SymmetricTop(2.0, 1.0, 1.0), symtop.Angles(theta=theta, psi_dot=9.0), 1.0)
+    with pytest.raises(symtop.SymtopError, match=r"inside \(0, pi\)"):
+        symtop.simulate(where, "midpoint", step_size=0.01)
+    run = symtop.simulate(where, "taylor", samples=5)
+    assert run["theta"].values == pytest.approx(theta, abs=1e-15)
+
+
+def test_scenes_say_what_they_are_for():
+    names = {
+        "spheroid", "goldstein", "goldstein-falling", "goldstein-rising", "cusp", "loop", "wave", "fast", "steady",
+        "hairer-lubich-wanner", "simo-wong", "kinon-betsch",
+    }  # fmt: skip
+    assert names <= set(symtop.scenes())
+    for where in map(symtop.scene, names):
+        assert where.purpose
+        assert "\n" not in where.purpose
+        assert where.nutation_period > 0.0
+
+
+def test_the_two_readings_of_the_notebooks_second_top_differ_as_they_should():
+    """alpha = 1.6 is not a release at rest: u'^2 there is 0.0473752579827533, and at rest alpha = 1.4981443962885."""
+    rest, rising = symtop.scene("goldstein"), symtop.scene("goldstein-rising")
+
+    def alpha(where):
+        momenta = where.top.momenta(where.start)
+        return 2.0 * (where.top.energy(where.start) - momenta.p_psi**2 / (2.0 * where.top.I3)) / where.top.I1
+
+    assert alpha(rest) == pytest.approx(1.4981443962885, abs=1e-12)
+    assert alpha(rising) == pytest.approx(1.6, abs=1e-14)
+    u_dot = math.sin(rising.start.theta) * rising.start.theta_dot
+    assert u_dot**2 == pytest.approx(0.0473752579827533, rel=1e-13)
+
+
+def test_the_three_kinds_of_nutation_are_what_they_are_called():
+    """At the upper turning point phi' vanishes (cusp), turns back (loop) or goes on (wave)."""
+    for name, sign in (("cusp", 0.0), ("loop", -1.0), ("wave", 1.0)):
+        where = symtop.scene(name)
+        motion = symtop.ClosedForm(where.top, where.start)(np.linspace(0.0, where.nutation_period, 2001))
+        assert np.sign(np.round(motion.phi_dot.min(), 9)) == sign
+        assert motion.phi_dot.max() > 0.0

@@ -1,0 +1,125 @@
+"""The runner on a dask cluster of two processes on this machine: the same bits, and no harm if one is killed."""
+
+import os
+import signal
+import sys
+import time
+
+import pytest
+from click.testing import CliRunner
+
+from symtop.base.validate import SymtopError
+from symtop.cli.main import main
+from symtop.runner import run as runner
+from symtop.runner.pools import Workers
+from tests.commands import PROBE, contents, ended, leftovers, symtop
+
+distributed = pytest.importorskip("distributed")
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]  # of the cluster's own making
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """Where the workers of the cluster write what they begin."""
+    return tmp_path_factory.mktemp("cluster") / "log"
+
+
+@pytest.fixture(scope="module")
+def cluster(log):
+    with distributed.LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=None,
+        silence_logs=50,
+        env={"PROBE_LOG": str(log), "PROBE_PAUSE": "0.3"},
+    ) as found:
+        yield found
+
+
+def same(one, other):
+    one, other = contents(one), contents(other)
+    assert one.keys() == other.keys()
+    assert all(one[name].identical(other[name]) for name in one)
+
+
+def test_the_same_bits_as_without_a_cluster(cluster, tmp_path):
+    code, out, err = ended(
+        symtop("study", PROBE, "--results", tmp_path / "there", "--scheduler", cluster.scheduler_address)
+    )
+    assert code == 0, err
+    assert "12 of 12 cases computed" in out
+    assert ended(symtop("study", PROBE, "--results", tmp_path / "here", "--jobs", 1))[0] == 0
+    same(tmp_path / "here", tmp_path / "there")
+    assert not leftovers(tmp_path / "there")
+
+
+def test_a_worker_that_is_killed_midway(cluster, log, tmp_path):
+    log.unlink(missing_ok=True)
+    with distributed.Client(cluster, set_as_default=False) as client:
+        victim = next(iter(client.run(os.getpid).values()))
+        process = symtop("study", PROBE, "--results", tmp_path / "r", "--scheduler", cluster.scheduler_address)
+        while not (log.is_file() and len(log.read_text().split()) >= 3):
+            assert process.poll() is None
+            time.sleep(0.05)
+        os.kill(victim, signal.SIGKILL)
+        code, _, err = ended(process)
+    assert code == 0, err
+    names = log.read_text().split()
+    assert len(set(names)) == 12
+    assert len(names) - 12 <= 1  # what the killed one was computing
+    assert ended(symtop("study", PROBE, "--results", tmp_path / "here", "--jobs", 1))[0] == 0
+    same(tmp_path / "here", tmp_path / "r")
+    assert not leftovers(tmp_path / "r")
+
+
+def test_a_case_that_fails_there_is_recorded_here(cluster, tmp_path):
+    plugin = tmp_path / "bad.py"
+    plugin.write_text(
+        "import symtop\n"
+        "def solve(top, start, plan):\n    raise RuntimeError('no luck')\n"
+        "symtop.register(symtop.Integrator(name='bad-raises', family='other', summary='', solvers={'angles': solve}))\n"
+    )
+    words = ["study", PROBE, "--results", tmp_path / "r", "--plugin", plugin, "--scheduler", cluster.scheduler_address]
+    code, out, err = ended(symtop(*words))
+    assert code == 1
+    assert err.count("RuntimeError: no luck") == 2
+    assert "of 14 cases computed" in out
+
+
+@pytest.mark.parametrize("address", ["nowhere", "tcp://127.0.0.1:1", "ftp://x", "tcp://[::1:0"])
+def test_a_scheduler_that_is_none_is_one_sentence(address, tmp_path, monkeypatch):
+    monkeypatch.setattr("symtop.runner.pools.PATIENCE", 0.5)
+    done = CliRunner().invoke(main, ["study", str(PROBE), "--results", str(tmp_path), "--scheduler", address])
+    assert done.exit_code == 2, done.output
+    assert "scheduler must be the address of a dask scheduler that answers and has workers" in done.output
+    assert "Traceback" not in done.output
+
+
+def test_a_cluster_without_workers_is_one_sentence(monkeypatch):
+    monkeypatch.setattr("symtop.runner.pools.PATIENCE", 2)
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as empty,
+        pytest.raises(SymtopError, match="has workers"),
+    ):
+        Workers(scheduler=empty.scheduler_address)
+
+
+def test_without_the_package_it_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(SymtopError, match=r"pip install 'symtop\[distributed\]'"):
+        Workers(scheduler="tcp://127.0.0.1:8786")
+
+
+def test_timed_cases_stay_at_home():
+    from symtop.runner.execute import size_for
+    from symtop.runner.pools import CLUSTER
+    from symtop.runner.work import Task
+
+    workers = Workers(2)
+    workers.scheduler = "somewhere"
+    study = runner.load(str(PROBE))
+    tasks = [Task("", case, "", (), 1.0) for case in study.cases(False)]
+    assert size_for(tasks, workers, timed=False) == CLUSTER
+    assert size_for(tasks, workers, timed=True) == 1
+    workers.close()

@@ -1,0 +1,466 @@
+"""Hostile conditions: each ends with one sentence, its documented code and no partial file, and nothing is lost."""
+
+import errno
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from numba.core.caching import IndexDataCacheFile
+
+from symtop.base import datasets
+from symtop.base.validate import SymtopError
+from symtop.cli.main import main
+from symtop.methods import compiled
+from symtop.runner import run as runner
+from symtop.runner import store, work
+from tests.commands import PROBE, contents, ended, leftovers, symtop
+from tests.kills import survive
+
+
+def probe(results, *words):
+    """The quick probe in this process: exit code and what it said."""
+    done = CliRunner().invoke(main, ["study", str(PROBE), "--quick", "--results", str(results), *map(str, words)])
+    assert "Traceback" not in done.output
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    return done.exit_code, done.output
+
+
+def refused(results, says):
+    """One sentence, code 2, nothing partial."""
+    code, output = probe(results)
+    assert code == 2, output
+    assert output.count("\n") == 1, output
+    assert output.startswith("symtop: cannot write")
+    assert says in output
+    assert not leftovers(Path(results)) if Path(results).is_dir() else True
+
+
+# ---- the place -------------------------------------------------------------------------------------------------------
+
+
+def test_a_full_disk_ends_the_run_and_what_was_computed_is_kept(tmp_path, monkeypatch):
+    real, count = xr.Dataset.to_netcdf, []
+
+    def full(self, *arguments, **options):
+        count.append(1)
+        if len(count) > 2:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return real(self, *arguments, **options)
+
+    monkeypatch.setattr(xr.Dataset, "to_netcdf", full)
+    refused(tmp_path, "No space left on device")
+    assert len(count) == 3  # the third case was the last one tried
+    assert len(list(tmp_path.rglob("cases/probe/*.nc"))) == 2
+    monkeypatch.undo()
+    code, output = probe(tmp_path)
+    assert code == 0
+    assert "2 of 4 cases computed" in output
+
+
+def test_a_full_disk_in_the_words_of_the_netcdf_library(tmp_path, monkeypatch):
+    def full(self, *arguments, **options):
+        raise RuntimeError("NetCDF: HDF error")
+
+    monkeypatch.setattr(xr.Dataset, "to_netcdf", full)
+    refused(tmp_path, "NetCDF: HDF error")
+    monkeypatch.setattr(datasets, "LITTLE", 1e30)
+    refused(tmp_path, "no room is left")
+
+
+@pytest.mark.slow
+def test_a_real_limit_on_the_size_of_files(tmp_path):
+    """The kernel refuses to let files grow beyond 8 kB: every write fails as on a full disk, in workers too."""
+    assert ended(symtop("study", PROBE, "--results", tmp_path / "warm"))[0] == 0  # kernels are cached now
+    code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192)); "
+    code += "from symtop.cli.main import main; sys.argv[0] = 'symtop'; main()"
+    words = ["study", str(PROBE), "--results", str(tmp_path / "small")]
+
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=240, check=False
+    )
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("symtop: cannot write")
+    assert "Traceback" not in done.stderr
+    assert not list((tmp_path / "small").rglob("*.nc"))
+    assert not leftovers(tmp_path / "small")
+
+
+TWICE = "def twice(x):\n    return 2.0 * x\n"
+
+
+@pytest.fixture
+def kernel(tmp_path, monkeypatch):
+    """Compiles a small function, as a new process would, with a cache of its own."""
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "twice.py").write_text(TWICE)
+    space = {"__name__": "twice", "__file__": str(tmp_path / "twice.py")}
+    exec(compile(TWICE, str(tmp_path / "twice.py"), "exec"), space)
+    return lambda: compiled.compile_kernel(space["twice"], space["twice"])
+
+
+def test_a_full_disk_under_the_cache_of_kernels_costs_time_and_no_run(kernel, tmp_path, monkeypatch):
+    def full(*arguments):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(IndexDataCacheFile, "_save_data", full)
+    assert kernel()(2.0) == 4.0
+    assert not list(tmp_path.rglob("*.nbc"))
+    monkeypatch.undo()
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "cache"))
+    assert kernel()(2.0) == 4.0
+    assert list(tmp_path.rglob("*.nbc"))
+
+
+@pytest.mark.parametrize("kind", ["*.nbc", "*.nbi"])
+def test_a_damaged_cache_of_kernels_costs_time_and_no_run(kernel, tmp_path, kind):
+    assert kernel()(2.0) == 4.0
+    (victim,) = tmp_path.rglob(kind)
+    victim.write_bytes(victim.read_bytes()[:40])
+    again = kernel()
+    assert again(2.0) == 4.0
+    assert not again.stats.cache_hits
+
+
+@pytest.mark.parametrize("place", ["quick", "quick/cases", "quick/cases/probe", "quick/figures"])
+def test_a_file_where_a_folder_should_be(tmp_path, place):
+    (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / place).write_text("I was here first")
+    refused(tmp_path, str(tmp_path / "quick"))
+    assert (tmp_path / place).read_text() == "I was here first"
+
+
+def test_results_that_are_a_file_or_cannot_be_made(tmp_path):
+    (tmp_path / "file").touch()
+    code, output = probe(tmp_path / "file")
+    assert code == 2
+    assert "is a file" in output
+    refused("/proc/nowhere", "/proc/nowhere")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_is_read_only(tmp_path):
+    tmp_path.chmod(0o500)
+    refused(tmp_path, "Permission denied")
+
+
+def test_a_folder_refused_by_the_system(tmp_path, monkeypatch):
+    def refuse(*arguments, **options):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(store.tempfile, "TemporaryFile", refuse)
+    refused(tmp_path, "Read-only file system")
+
+
+def test_a_folder_where_a_file_should_be(tmp_path):
+    assert probe(tmp_path)[0] == 0
+    for name in ("probe.nc", "probe.json", "figures/probe-energy.png"):
+        target = tmp_path / "quick" / name
+        (tmp_path / "quick" / "probe.nc").unlink(missing_ok=True)  # so that there is something to do
+        target.unlink(missing_ok=True)
+        target.mkdir()
+        refused(tmp_path, "it is a folder")
+        target.rmdir()
+    case = next((tmp_path / "quick" / "cases" / "probe").glob("*.nc"))
+    case.unlink()
+    case.mkdir()
+    refused(tmp_path, "it is a folder")
+
+
+# ---- what is on disk -------------------------------------------------------------------------------------------------
+
+
+def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
+    assert probe(tmp_path)[0] == 0
+    before = contents(tmp_path)
+    cases = sorted((tmp_path / "quick" / "cases" / "probe").glob("*.nc"))
+    whole = cases[0].read_bytes()
+    values = datasets.read(cases[1])
+    cases[0].write_bytes(whole[: len(whole) // 2])
+    datasets.write(values.assign(energy=values["energy"] * (1.0 + 1e-15)), cases[1])  # readable, and not what it says
+    datasets.write(xr.Dataset({"energy": ("sample", [1.0])}), cases[2])  # somebody else's
+    cases[3].write_bytes(whole)  # another case's file under this name
+    assert "4 of 4 cases computed" in probe(tmp_path)[1]
+    after = contents(tmp_path)
+    assert all(before[name].identical(after[name]) for name in before)
+    assert "0 of 4 cases computed" in probe(tmp_path)[1]
+
+
+@pytest.mark.parametrize("damage", ["", "{", "[1, 2]", '{"stamp": 3}', "\0\0\0"])
+def test_damaged_findings_are_made_again(tmp_path, damage):
+    assert probe(tmp_path)[0] == 0
+    path = tmp_path / "quick" / "probe.json"
+    good = json.loads(path.read_text())
+    path.write_text(damage)
+    code, output = probe(tmp_path)
+    assert code == 0
+    assert "0 of 4 cases computed" in output
+    assert json.loads(path.read_text()) == good
+
+
+def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
+    path = tmp_path / "case.nc"
+    order = []
+
+    def wait():
+        with store.claim(path, wait=True) as ours:
+            order.append(ours)
+
+    with store.claim(path, wait=False) as ours:
+        assert ours
+        with store.claim(path, wait=False) as second:
+            assert not second
+        waiting = threading.Thread(target=wait)
+        waiting.start()
+        time.sleep(0.1)
+        assert order == []
+        assert not store.was_begun(path)  # it is being computed
+    waiting.join(5.0)
+    assert order == [True]
+    assert not list(tmp_path.iterdir())
+    store.lock_path(path).touch()  # what a killed process leaves
+    assert store.was_begun(path)
+    with store.claim(path, wait=False) as ours:
+        assert ours
+
+
+@pytest.mark.slow
+def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
+    log = tmp_path / "log"
+    runs = [
+        symtop("study", PROBE, "--results", tmp_path / "shared", "--jobs", 2, PROBE_LOG=log, PROBE_PAUSE=0.3)
+        for _ in range(2)
+    ]
+    for run in runs:
+        code, out, err = ended(run)
+        assert code == 0, err
+        assert "of 12 cases computed" in out
+    begun = log.read_text().split()
+    assert len(begun) == len(set(begun)) == 12
+    assert ended(symtop("study", PROBE, "--results", tmp_path / "alone"))[0] == 0
+    shared, alone = contents(tmp_path / "shared"), contents(tmp_path / "alone")
+    assert shared.keys() == alone.keys()
+    assert all(shared[name].identical(alone[name]) for name in alone)
+    assert not leftovers(tmp_path / "shared")
+
+
+def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(tmp_path):
+    code, output = probe(tmp_path)
+    assert code == 0, output
+    (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.nc")
+    case.unlink()
+    for name in (work.trace_path(case), store.lock_path(case), case.with_name(f".{case.name}.x.part.nc")):
+        name.touch()
+    code, output = probe(tmp_path)
+    assert "1 of 4 cases computed" in output
+    assert not leftovers(tmp_path)
+
+
+# ---- signals ---------------------------------------------------------------------------------------------------------
+
+
+def begun(log: Path, count: int, process) -> None:
+    """Wait until so many cases have begun."""
+    end = time.monotonic() + 120.0
+    while time.monotonic() < end and process.poll() is None:
+        if log.is_file() and len(log.read_text().split()) >= count:
+            return
+        time.sleep(0.02)
+    pytest.fail(f"it never came to {count} cases: {process.poll()}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "code", "says"), [(2, 130, "interrupted"), (15, 143, "terminated")])
+@pytest.mark.parametrize("quick", [True, False])
+def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quick):
+    log = tmp_path / "log"
+    words = ["study", PROBE, "--results", tmp_path / "r", "--jobs", 2, *(["--quick"] if quick else [])]
+    process = symtop(*words, PROBE_LOG=log, PROBE_PAUSE=0.5)
+    begun(log, 3 if quick else 5, process)
+    process.send_signal(number)
+    start = time.monotonic()
+    ended_with, _, err = ended(process)
+    assert time.monotonic() - start < 10.0
+    assert ended_with == code
+    assert err == f"symtop: {says}; what was computed is kept, and the same command goes on from there\n"
+    assert not leftovers(tmp_path / "r")
+    kept = len(list((tmp_path / "r").rglob("cases/probe/*.nc")))
+    assert kept >= 1
+    code, out, err = ended(symtop(*words, PROBE_LOG=log))
+    assert code == 0, err
+    assert f"{(4 if quick else 12) - kept} of" in out
+    assert not leftovers(tmp_path / "r")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("words", "longest"), [([PROBE], 2.5), (["--all", "--quick"], 15.0)])
+def test_kill_9_at_random_moments(tmp_path, words, longest):
+    found = survive(words, tmp_path, longest)
+    assert found.kills == 30
+    assert found.lost > 0  # some of the kills did come in the middle of a case
+    print(found)
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed_costs_no_more_than_what_it_was_computing(tmp_path):
+    log = tmp_path / "log"
+    process = symtop("study", PROBE, "--results", tmp_path / "r", "--jobs", 2, PROBE_LOG=log, PROBE_PAUSE=0.5)
+    begun(log, 4, process)
+    workers = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+    spawned = [pid for pid in workers if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    os.kill(spawned[0], signal.SIGKILL)
+    code, out, err = ended(process)
+    assert code == 0, err
+    assert "12 of 12 cases computed" in out
+    names = log.read_text().split()
+    assert len(names) - len(set(names)) <= 2  # one case a worker
+
+
+# ---- methods ---------------------------------------------------------------------------------------------------------
+
+BAD = """
+import itertools, os, time
+import numpy as np
+import symtop
+from symtop.methods.registry import Run
+
+def raises(top, start, plan):
+    raise RuntimeError("no luck")
+
+def hangs(top, start, plan):
+    while True:
+        time.sleep(0.01)
+
+def deaf(top, start, plan):
+    sum(itertools.repeat(0))  # never returns to the interpreter, like a compiled loop
+
+def exits(top, start, plan):
+    os._exit(7)
+
+def answers(states):
+    n = lambda plan: plan.times.size
+    return lambda top, start, plan: Run(states(n(plan)), np.ones(n(plan)), np.ones(n(plan)), 1, 1, 0, "ok", 8.0)
+
+METHODS = {
+    "raises": raises, "hangs": hangs, "deaf": deaf, "exits": exits,
+    "nan": answers(lambda n: np.full((n, 4), np.nan)), "shape": answers(lambda n: np.ones((n, 3))),
+}
+for name, solve in METHODS.items():
+    symtop.register(symtop.Integrator(name=f"bad-{name}", family="other", summary="", solvers={"angles": solve}))
+"""
+
+
+@pytest.mark.slow
+def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
+    plugin = tmp_path / "bad.py"
+    plugin.write_text(BAD)
+    results = tmp_path / "r"
+    words = ["study", PROBE, "--results", results, "--jobs", 2]
+    assert ended(symtop(*words))[0] == 0  # the good ones have compiled their kernels
+    code, out, err = ended(symtop(*words, "--plugin", plugin, "--limit", 3))
+    assert code == 1
+    assert "2 of 24 cases computed" in out  # those that return NaN: a result like any other
+    says = {
+        "raises": "RuntimeError: no luck",
+        "hangs": "it was not done after 3 s",
+        "deaf": "it was not done after 3 s and did not answer",
+        "exits": "its process was ended",
+        "shape": "must return a Run with real states",
+    }
+    lines = err.strip().splitlines()
+    assert len(lines) == 2 * len(says)
+    for name, said in says.items():
+        found = [line for line in lines if f"bad-{name} on " in line]
+        assert len(found) == 2, err
+        assert all(said in line for line in found), found
+    data = datasets.read(results / "probe.nc")
+    assert list(data["outcome"].sel(integrator="bad-nan").values) == ["not_finite", "not_finite"]
+    good = data.drop_sel(integrator="bad-nan")
+    assert set(good["outcome"].values.ravel()) == {"ok"}
+    assert good.sizes["integrator"] == 6
+    records = [json.loads(path.read_text()) for path in results.rglob("*.failed.json")]
+    assert len(records) == 10
+    assert any("raise RuntimeError" in line for r in records for line in r["traceback"])
+    assert any("in deaf" in line for r in records for line in r["traceback"])
+    assert not leftovers(results)
+    code, out, _ = ended(symtop("study", PROBE, "--results", results, "--plugin", plugin, "--status", "--json"))
+    assert code == 1
+    states = [row["state"] for row in json.loads(out)["probe"]]
+    assert states.count("failed") == 10
+    assert states.count("done") == 14
+
+
+def test_a_case_has_its_time_and_a_call_that_ends_in_time_is_left_alone(tmp_path):
+    with pytest.raises(work.OverdueError, match="not done after"), work.limited(0.05, tmp_path / "trace"):
+        time.sleep(60.0)
+    with work.limited(0.2, tmp_path / "trace"):
+        pass
+    time.sleep(0.3)  # nothing comes later
+    assert signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
+
+
+def test_the_limit_is_heard_by_the_runner(tmp_path, monkeypatch):
+    monkeypatch.setenv("PROBE_PAUSE", "1.0")
+    code, output = probe(tmp_path, "--limit", 0.05)
+    assert code == 2  # not one case could be measured
+    assert "OverdueError: it was not done after 0.05 s" in output
+    assert probe(tmp_path, "--limit", -1)[0] == 2
+
+
+# ---- surroundings ----------------------------------------------------------------------------------------------------
+
+
+def test_a_clock_that_jumps(tmp_path, monkeypatch):
+    assert probe(tmp_path / "calm")[0] == 0
+    draw = random.Random(1)
+    monkeypatch.setattr(time, "time", lambda: draw.uniform(-1e9, 4e9))
+    assert probe(tmp_path / "r")[0] == 0
+    monkeypatch.undo()
+    calm, other = contents(tmp_path / "calm"), contents(tmp_path / "r")
+    assert all(calm[name].identical(other[name]) for name in calm)
+
+
+def test_paths_that_are_not_ascii(tmp_path):
+    place = tmp_path / "Ergebnisse für θ – 結果"
+    plugin = tmp_path / "méthode_à_moi.py"
+    plugin.write_text("import symtop\n")
+    assert probe(place, "--plugin", plugin)[0] == 0
+    assert len(contents(place)) == 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("closed", ["0", "1", "2", "012"])
+def test_no_terminal_and_closed_streams(tmp_path, closed):
+
+    words = f"{sys.executable} -m symtop.cli study {PROBE} --results {tmp_path / 'r'} --jobs 2"
+    done = subprocess.run(
+        ["/bin/sh", "-c", words + "".join(f" {n}>&-" if n != "0" else " 0<&-" for n in closed)],
+        timeout=240,
+        check=False,
+    )
+    assert done.returncode == 0
+    assert len(contents(tmp_path / "r")) == 13
+
+
+def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
+    """Sources that changed under a running study end it: nothing else would do better."""
+    study = runner.load(str(PROBE))
+    case = study.cases(True)[0]
+    path = store.case_path(tmp_path, study, case)
+    task = work.Task(str(PROBE), case, str(path), (), 10.0)
+    assert work.compute(task).state == "computed"
+    assert work.compute(task).state == "found"
+    assert work.compute(task._replace(fresh=True)).state == "computed"
+    other = path.with_name(path.name.replace(store.digest_of(path), "0" * 20))
+    with pytest.raises(SymtopError, match="not those that the study was started with"):
+        work.compute(task._replace(path=str(other)))
+    with store.claim(path, wait=False):
+        assert work.compute(task).state == "busy"

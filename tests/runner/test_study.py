@@ -1,0 +1,390 @@
+"""The runner: resumes, recomputes nothing, survives damaged files, and runs a user's plug-in through every study."""
+
+import dataclasses
+import importlib
+import json
+import linecache
+import os
+import shutil
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from symtop_studies.reduction import commutation
+
+import symtop
+from symtop.base import datasets
+from symtop.cli.main import main
+from symtop.methods import registry
+from symtop.methods.fixed_step import inside
+from symtop.methods.registry import Integrator, is_built_in
+from symtop.runner import check, depends
+from symtop.runner import run as runner
+from symtop.runner.study import Case
+from tests.commands import PROBE, ended
+from tests.commands import symtop as symtop_command
+
+PLUGIN = """\
+import symtop
+
+symtop.register(symtop.discrete_lagrangian("simpson-of-a-user", (0, 0.5, 1), (1 / 6, 2 / 3, 1 / 6), order=2))
+top, start = symtop.SymmetricTop(1.5, 1.0, 3.0), symtop.Angles(theta=1.0, psi_dot=4.0)
+symtop.register_scene(symtop.Scene("mine", top, start, horizon=6.0))
+"""
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory) -> Path:
+    """Every study, quickly, with a plug-in of four lines that adds a method and a scene."""
+    folder = tmp_path_factory.mktemp("results")
+    plugin = folder / "plugin.py"
+    plugin.write_text(PLUGIN)
+    done = CliRunner().invoke(main, ["study", "--all", "--quick", "--results", str(folder), "--plugin", str(plugin)])
+    assert done.exit_code == 0, done.output
+    return folder / "quick"
+
+
+def test_every_study_leaves_a_dataset_figures_and_findings(results):
+    for name in runner.names():
+        data = datasets.read(results / f"{name}.nc")
+        assert {"scene", "integrator"} <= set(data.dims)
+        assert not {"method", "tolerance"} & set(data.dims)
+        findings = json.loads((results / f"{name}.json").read_text())
+        assert findings["verdict"]
+        assert findings["failures"] == []
+        assert findings["pictures"]
+        for picture in findings["pictures"]:
+            assert (results / "figures" / picture["file"]).stat().st_size > 5000
+            assert picture["caption"]
+            assert picture["alt"]
+
+
+def test_a_plugins_method_and_scene_are_in_every_study(results):
+    for name in ("convergence", "work_precision", "drift", "stability"):
+        data = datasets.read(results / f"{name}.nc")
+        assert "simpson-of-a-user" in data["integrator"].values
+        assert "mine" in data["scene"].values
+
+
+def test_the_second_time_nothing_is_computed_and_damaged_cases_are(results):
+    study = runner.load("convergence")
+    again = runner.run(study, results, quick=True, quiet=True)
+    assert again["computed"] == 0
+    before = datasets.read(results / "convergence.nc")
+    victims = sorted((results / "cases" / "convergence").glob("*.nc"))[:3]
+    victims[0].write_bytes(victims[0].read_bytes()[:1000])
+    victims[1].write_bytes(b"\0" * 4096)
+    victims[2].unlink()
+    mended = runner.run(study, results, quick=True, quiet=True)
+    assert mended["computed"] == 3
+    assert datasets.read(results / "convergence.nc").equals(before)
+
+
+def test_every_sentence_and_table_of_the_report_follows_from_a_stored_dataset(results):
+    """Nothing is said that the dataset on disk does not say again; `seconds` aside, nothing else is asked."""
+    for name in runner.names():
+        study, stored = runner.load(name), datasets.read(results / f"{name}.nc")
+        said = json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
+        assert study.verdict(stored) == said["verdict"], name
+        assert json.loads(json.dumps([table._asdict() for table in study.tables(stored)])) == said["tables"], name
+        assert any(digit in " ".join(said["verdict"]) for digit in "123456789"), name  # and there are numbers in it
+
+
+def test_the_report_is_one_page_without_outside_references(results):
+    done = CliRunner().invoke(main, ["report", "--results", str(results)])
+    assert done.exit_code == 0, done.output
+    text = (results / "report.html").read_text()
+    assert text.count("data:image/png;base64,") >= 4
+    for outside in ("http://", "https://", "<script src", "<link"):
+        assert outside not in text
+    for name in runner.names():
+        assert f'id="{name}"' in text
+
+
+# ---- what a case depends on ------------------------------------------------------------------------------------------
+
+
+def stale_after(edited: str, study) -> set[str]:
+    """Integrators of a study's cases whose digest changes with one file of the package."""
+    path = depends.PACKAGE / edited
+    assert path.is_file()
+    cases = study.cases(True)
+    before = [study.digest(case) for case in cases]
+    real = depends.file_hash
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(depends, "file_hash", lambda file: real(file) + ("edited" if file == path else ""))
+        after = [study.digest(case) for case in cases]
+    assert before == [study.digest(case) for case in cases]
+    return {case.integrator for case, one, two in zip(cases, before, after, strict=True) if one != two}
+
+
+def of_everyone():
+    """The probe with every integrator of the registry."""
+    cases = [Case("goldstein", name, {}) for name in symtop.integrators()]
+    return dataclasses.replace(runner.load(str(PROBE)), cases=lambda quick: cases)
+
+
+GAUSS = {f"gauss-{order}" for order in (2, 4, 6, 8, 10, 12)}
+SCIPY = {"rk45", "dop853", "lsoda", "radau"}
+SPLITTING = {name for name, method in symtop.integrators().items() if method.family == "splitting"}
+STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "trapezoidal-unreduced"}
+
+
+@pytest.mark.parametrize(
+    ("edited", "stale"),
+    [
+        ("methods/gauss.py", GAUSS),
+        ("methods/galerkin.py", {"galerkin-simpson"}),
+        ("methods/unreduced.py", {"midpoint-unreduced", "trapezoidal-unreduced"}),
+        ("methods/discrete_lagrangian.py", STRAIGHT | {"galerkin-simpson"}),
+        ("methods/scipy_ivp.py", SCIPY),
+        ("methods/dormand_prince.py", {"rk45-compiled"}),
+        ("methods/runge_kutta.py", {"rk4", "rk45-compiled"}),
+        ("methods/euler_lagrange.py", {"rk4", "rk45-compiled"} | SCIPY),
+        ("methods/exact.py", {"exact"}),
+        ("methods/splitting_loop.py", SPLITTING),
+        ("methods/taylor.py", {"taylor", "taylor-longdouble", "taylor-quad", "exact"}),
+        ("cli/main.py", set()),
+        ("report/figures.py", set()),
+        ("measure/accuracy.py", set()),
+    ],
+)
+def test_editing_a_kernel_makes_the_cases_that_use_it_stale_and_no_others(edited, stale):
+    """In a study that runs every integrator and compares with no reference, which is made by `taylor.py`."""
+    found = stale_after(edited, of_everyone())
+    assert {name for name in found if is_built_in(name)} == stale  # other tests add methods of their own
+
+
+@pytest.mark.parametrize(
+    ("edited", "again"),
+    [("measure/ranking.py", True), ("report/figures.py", True), ("measure/step_map.py", False), ("cli/main.py", False)],
+)
+def test_findings_are_made_again_when_what_judges_them_is_edited(edited, again, monkeypatch):
+    study, real, path = runner.load("work_precision"), depends.file_hash, depends.PACKAGE / edited
+    before = runner._stamp(study, ["case"])
+    monkeypatch.setattr(depends, "file_hash", lambda file: real(file) + ("edited" if file == path else ""))
+    assert (runner._stamp(study, ["case"]) != before) is again
+
+
+def test_what_all_cases_depend_on_makes_all_stale():
+    convergence = runner.load("convergence")
+    for edited in ("model/top.py", "model/scenes.py", "run/simulation.py", "methods/registry.py"):
+        assert stale_after(edited, of_everyone()) == set(symtop.integrators()), edited
+    for edited in ("run/reference.py", "methods/taylor.py", "measure/accuracy.py"):
+        assert stale_after(edited, convergence) == {case.integrator for case in convergence.cases(True)}, edited
+
+
+def test_a_study_that_asks_the_registry_depends_on_all_of_it_unless_it_says_what_it_uses():
+    reduction = runner.load("reduction")
+    twins = next(case for case in reduction.cases(True) if case.settings["part"] == "twins")
+    assert depends.used(reduction, twins) == sorted([twins.integrator, f"{twins.integrator}-unreduced"])
+    silent = dataclasses.replace(reduction, uses=None)
+    assert depends.used(silent, twins) == sorted(symtop.integrators())
+    starred = Case("goldstein", "*", {})
+    assert depends.used(of_everyone(), starred) == sorted(symtop.integrators())
+
+
+LOOKUPS = ("convergence", "drift", "stability", "reduction", "truth")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LOOKUPS)
+def test_no_case_runs_an_integrator_that_it_is_not_said_to_depend_on(name, monkeypatch):
+    """Every quick case is measured with a registry that notes who is run."""
+    study, ran = runner.load(name), set()
+
+    def noting(method):
+        def solver(chart):
+            def solve(top, start, plan):
+                ran.add(method.name)
+                return method.solvers[chart](top, start, plan)
+
+            solve.solve = inside(method.solvers[chart])  # a long run steps the loop itself
+            return solve
+
+        return dataclasses.replace(method, solvers={chart: solver(chart) for chart in method.solvers})
+
+    cases = study.cases(True)[::7]
+    allowed = {case.label: set(depends.used(study, case)) for case in cases}
+    known = registry.integrators()
+    rules = {n: m for n, m in known.items() if commutation.rule_of(m) is not None}  # told by the type of their solver
+    monkeypatch.setattr(registry, "_registry", {n: m if n in rules else noting(m) for n, m in known.items()})
+    for case in cases:
+        ran.clear()
+        study.measure(case)
+        assert ran <= allowed[case.label], case
+
+
+def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
+    script = tmp_path / "counted.py"
+    text = PROBE.read_text()
+    digests = set()
+    for version in (
+        text,
+        text.replace('"Energy."', '"Another caption."'),
+        text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 51\nMETHODS = ("),
+        text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 52\nMETHODS = ("),
+        text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(51)\n",
+        text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(53)\n",
+        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 51\n",
+        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 53\n",
+        text.replace("samples=51", "samples=Few().count()")
+        + "\n\nclass Few:\n    def count(self):\n        return 51\n",
+        text.replace("samples=51", "samples=Few().count()")
+        + "\n\nclass Few:\n    def count(self):\n        return 53\n",
+    ):
+        script.write_text("import functools\n" + version)
+        sys.modules.pop("symtop_study_counted", None)
+        linecache.checkcache()
+        importlib.invalidate_caches()
+        shutil.rmtree(tmp_path / "__pycache__", ignore_errors=True)
+        study = runner.load(str(script))
+        digests.add(study.digest(study.cases(True)[0]))
+    assert len(digests) == 9  # the caption alone changes nothing
+
+
+@pytest.mark.slow
+def test_a_copy_of_the_package_with_one_kernel_edited(tmp_path):
+    """Through the command line: an edit, the status, and a run that computes what is stale and nothing else."""
+    for name in ("symtop", "studies"):
+        shutil.copytree(depends.PACKAGE.parent / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    words = ["study", PROBE, "--results", tmp_path / "r"]
+    assert ended(symtop_command(*words, cwd=tmp_path, PYTHONPATH=tmp_path))[0] == 0
+    with (tmp_path / "symtop" / "methods" / "gauss.py").open("a") as file:
+        file.write("\n# edited\n")
+    code, out, _ = ended(symtop_command(*words, "--status", "--json", cwd=tmp_path, PYTHONPATH=tmp_path))
+    assert code == 0
+    rows = json.loads(out)["probe"]
+    assert {row["integrator"] for row in rows if row["state"] == "stale"} == {"gauss-4"}
+    assert sum(row["state"] == "done" for row in rows) == 10
+    code, out, _ = ended(symtop_command(*words, cwd=tmp_path, PYTHONPATH=tmp_path))
+    assert "2 of 12 cases computed" in out
+    code, out, _ = ended(symtop_command(*words, "--status", cwd=tmp_path, PYTHONPATH=tmp_path))
+    assert out == "probe: 12 done\n"
+
+
+# ---- status, fresh, check --------------------------------------------------------------------------------------------
+
+
+def probe(results, *words):
+    return CliRunner().invoke(main, ["study", str(PROBE), "--quick", "--results", str(results), *words])
+
+
+def test_status_says_what_is_missing_done_and_stale(tmp_path):
+    assert probe(tmp_path, "--status").output.startswith("probe: 4 missing\n")
+    assert not (tmp_path / "quick").exists()  # looking leaves nothing behind
+    assert probe(tmp_path).exit_code == 0
+    assert probe(tmp_path, "--status").output == "probe: 4 done\n"
+    case = next((tmp_path / "quick" / "cases" / "probe").glob("loop--midpoint*.nc"))
+    case.rename(case.with_name(f"loop--midpoint--{'0' * 20}.nc"))
+    rows = json.loads(probe(tmp_path, "--status", "--json").output)["probe"]
+    assert [row["state"] for row in rows] == ["done", "done", "stale", "done"]
+    assert "1 of 4 cases computed" in probe(tmp_path).output
+    assert not case.with_name(f"loop--midpoint--{'0' * 20}.nc").exists()
+
+
+def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_path):
+    assert probe(tmp_path).exit_code == 0
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    done = probe(tmp_path, "--fresh", "--json")
+    assert done.exit_code == 0
+    (said,) = json.loads(done.output)
+    assert said["computed"] == said["cases"] == 4
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+
+def test_every_file_says_where_it_comes_from(tmp_path):
+    assert probe(tmp_path).exit_code == 0
+    for path in (tmp_path / "quick").rglob("*.nc"):
+        data = datasets.read(path)
+        asked = set(datasets.provenance())
+        if path.parent.name == "probe":
+            asked |= {"study", "settings", "sources", "seed", "content"}
+            assert data.attrs["sources"] in path.name
+        assert asked <= set(data.attrs), path.name
+        assert not any("time" in key or "date" in key for key in data.attrs)
+
+
+def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
+    assert probe(tmp_path, "--check").exit_code == 2  # nothing is stored
+    assert probe(tmp_path).exit_code == 0
+    done = probe(tmp_path, "--check", "--fresh")
+    assert done.exit_code == 0, done.output
+    assert "4 of 4 cases computed again, the same to the last bit" in done.output
+    victim = next((tmp_path / "quick" / "cases" / "probe").glob("*.nc"))
+    data = datasets.read(victim)
+    data["energy"][3] = np.nextafter(data["energy"].values[3], np.inf)
+    datasets.write(data.assign_attrs(content=datasets.fingerprint(data)), victim)  # well made, and wrong
+    done = probe(tmp_path, "--check", "--fresh")
+    assert done.exit_code == 1
+    assert "energy differs by up to" in done.output
+
+
+def test_differences_leave_out_times_and_nothing_else():
+    one = xr.Dataset({"axis": ("x", [1.0, float("nan")]), "seconds": ("x", [1.0, 2.0])}, attrs={"seed": 0})
+    assert check.differences(one, one.copy(deep=True)) == []
+    assert check.differences(one, one.assign(seconds=one["seconds"] * 2)) == []
+    assert check.differences(one, one.assign(axis=one["axis"] * 2)) == ["axis differs by up to 1"]
+    assert check.differences(one, one.drop_vars("axis")) == ["axis is in one of them only"]
+    assert check.differences(one, one.assign_attrs(seed=1)) == ["attribute seed differs: 0 and 1"]
+    assert len(check.differences(one, one.isel(x=[0]))) == 2  # also of the times: their shape
+
+
+# ---- failures --------------------------------------------------------------------------------------------------------
+
+
+def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
+    def solve(top, start, plan):
+        raise RuntimeError("no luck")
+
+    unlucky = Integrator(name="unlucky", family="other", summary="", solvers={"angles": solve})
+    whole = runner.load("stability")
+    cases = [case for case in whole.cases(True) if case.scene == "goldstein" and case.integrator == "midpoint"]
+    cases.append(dataclasses.replace(cases[0], integrator="unlucky"))
+    small = dataclasses.replace(whole, cases=lambda quick: cases)
+    symtop.register(unlucky)
+    try:
+        found = runner.run(small, tmp_path, quick=True, quiet=True)
+    finally:
+        registry._registry.pop("unlucky")
+    assert found["failures"] == ["unlucky on goldstein failed: RuntimeError: no luck"]
+    assert list(datasets.read(tmp_path / "stability.nc")["integrator"].values) == ["midpoint"]
+    assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten
+
+
+CLOCKED = """
+import os, time
+import matplotlib.pyplot as plt
+import xarray as xr
+from symtop.runner.study import Case, Picture, Study
+
+def cases(quick):
+    return [Case("spheroid", "midpoint", {"k": k}, timed=k >= 8) for k in range(16)]
+
+def measure(case):
+    begin = time.monotonic()
+    time.sleep(0.05 if case.timed else 0.6)  # long enough for the second worker to start
+    one = xr.Dataset({"begin": begin, "end": time.monotonic(), "process": os.getpid(), "timed": float(case.timed)})
+    return one.expand_dims(k=[case.settings["k"]])
+
+STUDY = Study("clocked", "Clocked", "Alone?", "", cases, measure, lambda data: [], lambda data: ["It ran."])
+"""
+
+
+def test_timed_cases_run_one_at_a_time_in_workers_that_are_there_already(tmp_path):
+    (tmp_path / "clocked.py").write_text(CLOCKED)
+    runner.run(runner.load(str(tmp_path / "clocked.py")), tmp_path / "r", jobs=2, quiet=True)
+    found = [datasets.read(path) for path in (tmp_path / "r").rglob("cases/clocked/*.nc")]
+    spans = {timed: sorted((float(one["begin"][0]), float(one["end"][0])) for one in found if one["timed"][0] == timed)
+             for timed in (0.0, 1.0)}  # fmt: skip
+    crew = {timed: {int(one["process"][0]) for one in found if one["timed"][0] == timed} for timed in (0.0, 1.0)}
+    assert [len(spans[timed]) for timed in (0.0, 1.0)] == [8, 8]
+    assert all(end <= begin for (_, end), (begin, _) in pairwise(spans[1.0]))
+    assert max(end for _, end in spans[0.0]) <= spans[1.0][0][0]
+    assert any(begin < end for (_, end), (begin, _) in pairwise(spans[0.0]))  # the control: two at once
+    assert crew[1.0] <= crew[0.0]
+    assert os.getpid() not in crew[0.0]

@@ -1,0 +1,190 @@
+"""Outcome maps against single runs, and the sentences against maps whose content is known."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from symtop_studies.stability import atlas_figures, atlas_words, mechanism_words
+from symtop_studies.stability.mechanisms import family_limits, map_table
+from symtop_studies.stability.outcome_maps import NOT_RUN, family, ladder, outcome_map, row, spin_unit, with_spin
+
+import symtop
+from symtop.measure.errors import errors
+from symtop.measure.verdicts import VERDICTS, verdict
+from symtop.methods.registry import integrator, integrators
+from symtop.model.scenes import closed_form, scene
+from symtop.report.style import OUTCOME_COLORS
+from symtop.run.reference import reference
+from symtop.runner import run as runner
+from symtop.runner import store
+from symtop.runner.study import Case
+
+STEPS = [0.011, 0.053, 0.17, 0.31, 0.83]
+
+
+@pytest.mark.parametrize("name", ["midpoint", "stormer-verlet", "strang", "gauss-4", "rk4"])
+def test_a_map_says_what_single_runs_say(name):
+    """The same runs through `simulate`, the reference and `verdict`, sampled more densely."""
+    found = outcome_map("cusp", [0.3, 1.0, 8.0], integrator(name), STEPS, 12.0)
+    for place, ratio in enumerate((0.3, 1.0, 8.0)):
+        where = with_spin(scene("cusp"), ratio)
+        for column, value in enumerate(STEPS):
+            horizon = math.ceil(12.0 / value) * value * where.nutation_period
+            run = symtop.simulate(
+                where, name, step_size=value * where.nutation_period, horizon=horizon, samples=241, observe="axis",
+                guard=False,
+            )  # fmt: skip
+            error = errors(where, run, reference(where, run["time"].values, "closed-form"))["axis"].values
+            mapped = VERDICTS[found.verdict[place, column]]
+            single = verdict(where, run, error)
+            assert (mapped == "accurate") == (single == "accurate"), (ratio, value, mapped, single)
+            if run.attrs["outcome"] != "ok":
+                assert mapped == run.attrs["outcome"]
+                assert math.isnan(found.axis_error[place, column])
+            else:
+                assert found.axis_error[place, column] <= 1.0001 * error.max()
+                assert found.axis_error[place, column] >= 0.3 * error.max()
+
+
+def test_adaptive_methods_are_mapped_over_their_tolerance():
+    found = outcome_map("cusp", [1.0], integrator("rk45-compiled"), [1e-10, 1e-6, 0.3], 12.0)
+    assert [VERDICTS[k] for k in found.verdict[0][:2]] == ["accurate", "accurate"]
+    assert VERDICTS[found.verdict[0][2]] != "accurate"
+    assert found.axis_error[0, 0] < 1e-6 < found.axis_error[0, 1]
+    exact = outcome_map("cusp", [0.3, 3.0], integrator("exact"), [math.nan], 12.0)
+    assert (exact.verdict == 0).all()
+
+
+def test_rows_share_phases_and_are_not_commensurate_with_the_nutation():
+    runs = ladder(integrator("strang"), [0.01, 0.25, 2.0], 12.0)
+    assert runs.steps == (1200, 48, 6)
+    assert np.isnan(runs.phases[2]).sum() == 49 - 7
+    phases = np.sort(np.mod(runs.phases[0], 1.0))
+    assert np.max(np.diff(phases)) < 0.125
+    row(runs, family("cusp")(2.0))
+
+
+def test_the_families_are_what_they_say():
+    for ratio in (0.1, 1.0, 30.0):
+        where = with_spin(scene("cusp"), ratio)
+        assert where.start.spin * where.top.I3 / (2.0 * math.sqrt(where.top.I1 * where.top.mgl)) == pytest.approx(ratio)
+        assert where.start.theta == scene("cusp").start.theta
+    free = symtop.Scene("free", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(theta=1.0, psi_dot=2.0), 1.0)
+    assert spin_unit(free) == 1.0
+    assert closed_form(family("grazing")(1e-3)).theta_range[0] == pytest.approx(1.1e-3, rel=0.05)
+
+
+def test_limits_over_a_family_end_at_verlets_and_rk4s():
+    """A fast top's nutation is harmonic: h omega = 2 is 1/pi of a nutation, 2 sqrt 2 of one for rk4."""
+    limit, third = family_limits("cusp", integrator("stormer-verlet"), 30.0, 2.0)
+    assert limit == pytest.approx(1.0 / math.pi, rel=1e-3)
+    assert third == pytest.approx(math.sqrt(3.0) / (2.0 * math.pi), rel=1e-3)
+    assert math.isnan(family_limits("cusp", integrator("midpoint"), 30.0, 2.0)[0])
+
+
+def hand_made(words, knob=(0.01, 0.1, 1.0), parameter=(0.3, 0.6, 5.0, 10.0), knob_name="step_size", scene_name="cusp"):
+    """A dataset with one integrator's map, from rows of words."""
+    outcome = np.array([[VERDICTS.index(word) for word in line] for line in words], dtype=np.uint8)
+    data = xr.Dataset(
+        {
+            "outcome": (("parameter", "setting"), outcome),
+            "parameter_value": ("parameter", np.asarray(parameter, float)),
+            "knob": ("setting", np.asarray(knob, float)),
+            "knob_name": knob_name,
+        }
+    )
+    return store.combine([(Case(scene_name, "midpoint"), data)])
+
+
+A, B, L = "accurate", "bounded_but_wrong", "left_chart"
+
+
+def test_advice_reads_reach_and_failures_off_the_map():
+    data = hand_made([[A, B, L], [A, B, L], [A, A, B], [A, A, B]])
+    line = atlas_words.advice(data, "cusp", "midpoint")
+    assert line.use == "with steps up to 0.1 of a nutation on fast tops and up to 0.01 on slow tops"
+    assert line.fails == "it leaves its chart from 1 of a nutation on and is wrong without a sign in 33% of its map"
+    assert line.sentence.startswith("Use it with steps up to 0.1")
+
+
+def test_advice_on_a_method_that_is_never_right_or_always():
+    never = atlas_words.advice(hand_made([[B, B, L]] * 4), "cusp", "midpoint")
+    assert never.use == "with steps below 0.01 of a nutation only"
+    always = atlas_words.advice(hand_made([[A, A, A]] * 4), "cusp", "midpoint")
+    assert always.fails == "it failed nowhere on the map"
+    assert atlas_words.advice(hand_made([[A, A, A]] * 4), "cusp", "strang") is None
+
+
+def test_advice_counts_a_failure_only_when_it_is_common():
+    rows = [[A, A, A]] * 39 + [[A, L, A]]
+    spins = np.geomspace(0.1, 30.0, 40)
+    assert "chart" not in atlas_words.advice(hand_made(rows, parameter=spins), "cusp", "midpoint").fails
+    rows[3] = [A, L, A]
+    assert "leaves its chart from 0.1" in atlas_words.advice(hand_made(rows, parameter=spins), "cusp", "midpoint").fails
+
+
+def test_a_pole_that_spoils_is_named():
+    gaps = (1e-6, 1e-5, 1e-2, 0.2)
+    near = hand_made([[L, L, L], [L, L, L], [A, L, L], [A, A, L]], parameter=gaps, scene_name="grazing")
+    both = xr.concat([hand_made([[A, A, A]] * 4), near], "scene")
+    assert (
+        "spoiled by a pole closer than 0.01 rad, whatever its knob"
+        in atlas_words.advice(both, "cusp", "midpoint").fails
+    )
+    unspoiled = hand_made([[A, A, L]] * 4, parameter=gaps, scene_name="grazing")
+    both = xr.concat([hand_made([[A, A, A]] * 4), unspoiled], "scene")
+    assert "pole" not in atlas_words.advice(both, "cusp", "midpoint").fails
+
+
+def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
+    small = map_table("grazing", integrator("strang"), {"parameters": [1e-3, 0.1], "ladder": [0.01, 0.05],
+                                                        "periods": 1.0, "shown": 0.01})  # fmt: skip
+    large = map_table("grazing", integrator("midpoint"), {"parameters": [1e-3, 0.1, 0.2], "ladder": [0.01, 0.05, 0.1],
+                                                          "periods": 1.0, "shown": 0.01})  # fmt: skip
+    data = store.combine([(Case("grazing", "strang"), small), (Case("grazing", "midpoint"), large)])
+    symtop_file = tmp_path / "maps.nc"
+    from symtop.base import datasets
+
+    datasets.write(data, symtop_file)
+    again = datasets.read(symtop_file)
+    assert again["outcome"].dtype == np.uint8
+    assert (again["outcome"].sel(integrator="strang").values[0, 2] == NOT_RUN).all()
+    assert atlas_words.cell(again, "grazing", "strang").outcome.shape == (2, 2)
+    assert atlas_words.cell(again, "grazing", "midpoint").outcome.shape == (3, 3)
+
+
+def test_maps_can_be_read_without_colours():
+    """Every outcome that is not plain has a hatch of its own, and any two colours differ in lightness or have one."""
+    hatched = {}
+    for index, word in enumerate(VERDICTS):
+        image = atlas_figures.painted(np.full((4, 6), index, dtype=np.uint8))
+        hatched[word] = tuple(np.unique(image.reshape(-1, 3), axis=0).shape)
+    plain = [word for word, shape in hatched.items() if shape[0] == 1]
+    lightness = {word: 0.2126 * r + 0.7152 * g + 0.0722 * b for word in plain
+                 for r, g, b in [tuple(int(OUTCOME_COLORS[word][k : k + 2], 16) / 255 for k in (1, 3, 5))]}  # fmt: skip
+    for first in plain:
+        for second in plain:
+            assert first == second or abs(lightness[first] - lightness[second]) > 0.1, (first, second)
+    assert {"left_chart", "wrong_regime", "not_converged", "drifting"} <= set(VERDICTS) - set(plain)
+
+
+def test_every_integrator_has_a_page():
+    pages = atlas_words.pages(list(integrators()))
+    assert sorted(name for names in pages.values() for name in names) == sorted(integrators())
+    assert max(map(len, pages.values())) <= 12
+
+
+def test_words_of_mechanisms_come_only_from_what_is_there():
+    data = hand_made([[A, B, L]] * 4)
+    assert mechanism_words.mechanism_sentences(data) == []
+    assert mechanism_words.limit_table(data) is None
+
+
+def test_the_full_grid_is_as_large_as_promised():
+    cases = [case for case in runner.load("stability").cases(False) if case.scene == "cusp"]
+    assert {case.integrator for case in cases} >= set(integrators())
+    full = [case for case in cases if integrator(case.integrator).knob == "step_size"]
+    for case in full:
+        assert len(case.settings["ladder"]) >= 200
+        assert len(case.settings["parameters"]) >= 120

@@ -1,0 +1,117 @@
+"""Reduce, then discretise, against discretise, then reduce."""
+
+import numpy as np
+import pytest
+from scipy.optimize import root
+from symtop_studies.reduction import commutation
+from symtop_studies.reduction.commutation import (
+    commutation_gap,
+    commutation_table,
+    gap,
+    kernel_path,
+    midpoint_gap,
+    path,
+)
+
+import symtop
+from symtop.measure.order import power_law
+from symtop.methods.discrete_lagrangian import Quadrature, rule_of
+from tests.conftest import random_scenes
+
+SCENES = ("spheroid", "goldstein")
+COUNTS = (100, 200, 400, 800)
+
+
+def commutes(where, method, h=0.02, steps=200):
+    """Within rounding of two compensated sums."""
+    return commutation_gap(where, method, h, steps).theta < 1e-13
+
+
+def slope(scene_name, name):
+    """The power of h with which the two orders approach each other over two nutations."""
+    where = symtop.scene(scene_name)
+    table = commutation_table(where, symtop.integrator(name), 2.0 * where.nutation_period, COUNTS)
+    return power_law(table["commutation_step_size"], table["commutation_gap"]).slope
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_the_midpoint_rule_commutes_with_the_reduction(scene_name):
+    where = symtop.scene(scene_name)
+    assert commutes(where, symtop.integrator("midpoint"))
+    assert midpoint_gap(where, 0.02, 200).theta < 1e-13
+
+
+@pytest.mark.parametrize("node", [0.0, 0.3, 1.0])
+def test_so_does_every_rule_of_one_node(node):
+    assert commutes(random_scenes(1, seed=31)[0], symtop.discrete_lagrangian("one", (node,), (1.0,)))
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+@pytest.mark.parametrize("name", ["trapezoidal", "simpson-linear"])
+def test_rules_of_several_nodes_do_not_and_differ_by_their_own_order(scene_name, name):
+    assert not commutes(symtop.scene(scene_name), symtop.integrator(name))
+    assert slope(scene_name, name) == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_galerkin_does_not_commute_either(scene_name):
+    assert not commutes(symtop.scene(scene_name), symtop.integrator("galerkin-simpson"))
+    assert slope(scene_name, "galerkin-simpson") == pytest.approx(4.0, abs=0.05)
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_the_trapezoidal_routhian_is_stormer_verlet(scene_name):
+    where = symtop.scene(scene_name)
+    verlet = kernel_path(where, symtop.integrator("stormer-verlet"), 0.02, 200)
+    for rule, same in ((Quadrature((0.0, 1.0), (0.5, 0.5)), True), (Quadrature((0.0, 1.0), (0.4, 0.6)), False)):
+        assert (gap(path(where, commutation.routhian_step(where, rule), 0.02, 200), verlet).theta < 1e-13) is same
+
+
+def lobatto_step(top, point, h):
+    """One step of Lobatto IIIA-IIIB, order 4, on the Hamiltonian of the whole top: theta and p_theta afterwards."""
+    IIIA = np.array([[0.0, 0.0, 0.0], [5 / 24, 1 / 3, -1 / 24], [1 / 6, 2 / 3, 1 / 6]])
+    IIIB = np.array([[1 / 6, -1 / 6, 0.0], [1 / 6, 1 / 3, 0.0], [1 / 6, 5 / 6, 0.0]])
+    weights = IIIA[2]
+    theta, _, _, p_theta, p_phi, p_psi = point
+    # the force on phi and psi is zero, so that their stage momenta are p_phi and p_psi
+
+    def slopes(stages):
+        return np.array([top.potential_slope(t, top.momenta(start_with(t))) for t in stages])
+
+    def start_with(t):
+        rate = (p_phi - p_psi * np.cos(t)) / (top.I1 * np.sin(t) ** 2)
+        return symtop.Angles(t, phi_dot=rate, psi_dot=p_psi / top.I3 - rate * np.cos(t))
+
+    def equations(unknown):
+        places, momenta = unknown[:3], unknown[3:]
+        return np.concatenate(
+            [places - theta - h * IIIA @ momenta / top.I1, momenta - p_theta + h * IIIB @ slopes(places)]
+        )
+
+    found = root(equations, np.array([theta] * 3 + [p_theta] * 3), tol=1e-14).x
+    return theta + h * weights @ found[3:] / top.I1, p_theta - h * weights @ slopes(found[:3])
+
+
+@pytest.mark.parametrize("where", random_scenes(4, seed=32), ids=lambda s: s.name)
+def test_lobatto_on_the_whole_top_is_galerkin_on_the_routhian_and_not_on_the_top(where):
+    """The two are one method for a constant mass only; the inertia of the top is not constant."""
+    at, momenta, h = where.start, where.top.momenta(where.start), 0.05
+    point = (at.theta, at.phi, at.psi, where.top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi)
+    lobatto = lobatto_step(where.top, point, h)
+    start = np.array([at.theta, point[3]])
+    first = path(where, commutation.routhian_galerkin_step(where), h, 1)[1]
+    last = kernel_path(where, symtop.integrator("galerkin-simpson"), h, 1)[1]
+    assert first == pytest.approx(lobatto, abs=1e-13)
+    assert not np.allclose(last, lobatto, rtol=0.0, atol=1e-12)
+    assert np.max(np.abs(last - lobatto)) < 1e-3 * np.max(np.abs(np.array(lobatto) - start))
+
+
+def test_a_solver_remembers_its_rule_and_others_have_none():
+    assert rule_of(symtop.integrator("midpoint")).nodes == (0.5,)
+    for name in ("stormer-verlet", "taylor", "midpoint-unreduced"):
+        assert rule_of(symtop.integrator(name)) is None
+
+
+def test_a_method_that_has_no_reduced_twin_is_refused_in_one_sentence():
+    with pytest.raises(symtop.SymtopError, match="must be a reduced discrete Lagrangian, not 'rk45'"):
+        commutation_gap(symtop.scene("spheroid"), symtop.integrator("rk45"), 0.01, 10)

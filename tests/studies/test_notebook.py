@@ -1,0 +1,248 @@
+"""The notebook that the project began with: its algebra checked symbolically, its numbers, its inconsistencies."""
+
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from symtop_studies.notebook.tables import (
+    SOLVER,
+    SOLVER_TOLERANCE,
+    both_ways,
+    discrete_methods,
+    easy_way,
+    energies,
+    figures_kept,
+    hard_way,
+    notebook_top,
+    nutation_cubic,
+    rate_of_alpha,
+    residual_history,
+    shadow_table,
+    with_alpha,
+)
+
+import symtop
+from symtop.base.validate import SymtopError
+from symtop.measure.modified_energy import modified_energy
+from symtop.measure.order import power_law
+from symtop.methods.discrete_lagrangian import RULES
+from symtop.methods.euler_lagrange import accelerations, momenta
+from symtop.methods.registry import Plan
+from symtop.report import solid
+
+FIRST = symtop.scene("spheroid").top
+NUMBERS = (FIRST.I1, FIRST.I3, FIRST.mgl)
+
+
+class Symbols:
+    """The Lagrangian of the top as heyoka's expressions, and what follows from it by differentiation alone."""
+
+    def __init__(self):
+        hy = pytest.importorskip("heyoka", reason="heyoka, whose expressions are differentiated here, is not installed")
+        self.hy = hy
+        self.q = hy.make_vars("theta", "phi", "psi")
+        self.v = hy.make_vars("theta_dot", "phi_dot", "psi_dot")
+        I1, I3, mgl = NUMBERS
+        (theta, _, psi), (theta_dot, phi_dot, psi_dot) = self.q, self.v
+        s, c, sp, cp = hy.sin(theta), hy.cos(theta), hy.sin(psi), hy.cos(psi)
+        w = (phi_dot * s * sp + theta_dot * cp, phi_dot * s * cp - theta_dot * sp, phi_dot * c + psi_dot)
+        V = mgl * c
+        inertia = ((I1, 0.0, 0.0), (0.0, I1, 0.0), (0.0, 0.0, I3))
+        self.ways = (
+            0.5 * I1 * (w[0] ** 2 + w[1] ** 2) + 0.5 * I3 * w[2] ** 2 - V,
+            0.5 * sum(w[i] * inertia[i][j] * w[j] for i in range(3) for j in range(3)) - V,
+            0.5 * I1 * (theta_dot**2 + phi_dot**2 * s**2) + 0.5 * I3 * (psi_dot + phi_dot * c) ** 2 - V,
+        )
+
+    def values(self, expressions, points):
+        """Numbers of expressions at points (n, 6) of (theta, phi, psi, theta', phi', psi'); shape (len, n)."""
+        function = self.hy.cfunc(list(expressions), [*self.q, *self.v])
+        return function(np.ascontiguousarray(points.T))
+
+
+@pytest.fixture(scope="module")
+def symbols():
+    return Symbols()
+
+
+@pytest.fixture(scope="module")
+def points():
+    draw = np.random.default_rng(7)
+    return np.column_stack([draw.uniform(0.3, 2.8, 200), draw.uniform(-3, 3, (200, 5))])
+
+
+def test_the_lagrangian_three_ways(symbols, points):
+    found = symbols.values(symbols.ways, points)
+    assert np.ptp(found, axis=0).max() < 1e-13
+    assert np.std(found[0]) > 1.0
+    for coordinate in symbols.q[1:]:  # phi and psi are cyclic, psi although two of the three forms contain it
+        for way in symbols.ways:
+            assert np.abs(symbols.values([symbols.hy.diff(way, coordinate)], points)).max() < 1e-13
+
+
+def test_the_euler_lagrange_equations_of_the_kernels(symbols, points):
+    """d/dt dL/dv - dL/dq = 0 by differentiation, solved for the accelerations, against the kernels' formula."""
+    hy, L = symbols.hy, symbols.ways[1]
+    mass = [[hy.diff(hy.diff(L, a), b) for b in symbols.v] for a in symbols.v]
+    force = [
+        hy.diff(L, q) - sum(hy.diff(hy.diff(L, v), p) * rate for p, rate in zip(symbols.q, symbols.v, strict=True))
+        for q, v in zip(symbols.q, symbols.v, strict=True)
+    ]
+    M = symbols.values([entry for row in mass for entry in row], points).T.reshape(-1, 3, 3)
+    F = symbols.values(force, points).T
+    true = np.linalg.solve(M, F[..., None])[..., 0]
+    for point, expected in zip(points, true, strict=True):
+        assert accelerations(*NUMBERS, point[0], *point[3:]) == pytest.approx(expected, rel=1e-11, abs=1e-11)
+
+
+def test_both_conjugate_momenta_of_the_kernels(symbols, points):
+    top = symtop.SymmetricTop(*NUMBERS)
+    slopes = symbols.values([symbols.hy.diff(symbols.ways[0], v) for v in symbols.v[1:]], points)
+    for k, point in enumerate(points):
+        at = symtop.Angles(*point)
+        assert top.momenta(at)[:2] == pytest.approx(slopes[:, k], rel=1e-12, abs=1e-12)
+        assert momenta(top, point[0], point[4], point[5]) == pytest.approx(slopes[:, k], rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("method", ["midpoint", "trapezoidal", "simpson-linear"])
+def test_a_step_of_the_kernels_is_the_discrete_legendre_transform(symbols, method):
+    """p0 = -D1 L_d and p1 = D2 L_d with L_d made of the symbolic Lagrangian: differentiated, not derived by hand."""
+    where, h = symtop.scene("spheroid"), 0.01
+    hy, rule = symbols.hy, RULES[method]
+    first, last = hy.make_vars("a0", "a1", "a2"), hy.make_vars("b0", "b1", "b2")
+    L_d = 0.0
+    for node, weight in zip(*rule[:2], strict=True):
+        place = {f"{q}": a + node * (b - a) for q, a, b in zip(symbols.q, first, last, strict=True)}
+        place |= {f"{v}": (b - a) / h for v, a, b in zip(symbols.v, first, last, strict=True)}
+        L_d = L_d + h * weight * hy.subs(symbols.ways[2], place)
+    slopes = hy.cfunc([*(hy.diff(L_d, a) for a in first), *(hy.diff(L_d, b) for b in last)], [*first, *last])
+    run = symtop.integrator(method).solvers["angles"](
+        where.top, where.start, Plan(np.array([0.0, h]), h, h, np.array([0, 1]), math.nan)
+    )
+    q = run.states[:, [0, 2, 3]]
+    found = slopes(np.concatenate([q[0], q[1]]))
+    assert -found[:3] == pytest.approx([run.states[0, 1], run.p_phi[0], run.p_psi[0]], abs=1e-11)
+    assert found[3:] == pytest.approx([run.states[1, 1], run.p_phi[1], run.p_psi[1]], abs=1e-11)
+    assert -found[1:3] == pytest.approx(found[4:], abs=1e-11)  # Noether, one step
+
+
+def test_the_spheroid_and_back():
+    top, radii = notebook_top()
+    assert radii == pytest.approx((2.73861, 1.58114), abs=5e-6)
+    assert pytest.approx((2.0, 1.0), rel=1e-15) == (top.I1, top.I3)
+    assert round(top.mgl, 4) == 26.8658
+    for mass, polar, equatorial in ((1.0, 2.0, 1.0), (0.3, 0.1, 0.7)):
+        body = symtop.SymmetricTop.from_spheroid(mass, polar, equatorial)
+        assert body.spheroid_radii(mass) == pytest.approx((polar, equatorial), rel=1e-13)
+    with pytest.raises(SymtopError, match="no spheroid"):
+        symtop.SymmetricTop(1.0, 2.0, 1.0).spheroid_radii(1.0)
+    with pytest.raises(SymtopError, match="mass"):
+        top.spheroid_radii(0.0)
+
+
+def test_its_solver_keeps_five_figures_of_energy_and_six_of_momentum():
+    found = residual_history(symtop.scene("spheroid"), SOLVER, SOLVER_TOLERANCE)
+    kept = {name: figures_kept(found[name].values) for name in ("energy", "p_phi", "p_psi")}
+    assert kept == {"energy": 5, "p_phi": 6, "p_psi": 6}
+    midpoint = residual_history(symtop.scene("spheroid"), "midpoint", 0.01)
+    assert figures_kept(midpoint["p_phi"].values) >= 14 > kept["p_phi"]
+
+
+def test_figures_kept_counts():
+    assert figures_kept([83.2634, 83.2636]) == 5
+    assert figures_kept([1.0, 1.0]) == 17
+    assert figures_kept([11.60401, 11.60402]) == 7
+    assert figures_kept([1.0, -2.0]) == 0
+
+
+@pytest.mark.parametrize("name", ["spheroid", "goldstein"])
+def test_the_hard_way_and_the_easy_way_agree(name):
+    where = symtop.scene(name)
+    draw = np.random.default_rng(3)
+    top, start = where.top, where.top.momenta(where.start)
+    for theta, theta_dot in zip(draw.uniform(0.2, 2.9, 100), draw.uniform(-3, 3, 100), strict=True):
+        phi_dot = (start.p_phi - start.p_psi * math.cos(theta)) / (top.I1 * math.sin(theta) ** 2)
+        psi_dot = start.p_psi / top.I3 - phi_dot * math.cos(theta)
+        hard = hard_way(where)(0.0, np.array([0.1, theta, 0.2, phi_dot, theta_dot, psi_dot]))
+        easy = easy_way(where)(0.0, np.array([0.1, theta, 0.2, theta_dot]))
+        assert easy[[0, 2, 1]] == pytest.approx(hard[:3][[0, 2, 1]], rel=1e-12, abs=1e-12)
+        assert easy[3] == pytest.approx(hard[4], rel=1e-11, abs=1e-11)  # round-off of terms in 1/sin^3
+        kernel = accelerations(top.I1, top.I3, top.mgl, theta, theta_dot, phi_dot, psi_dot)
+        assert hard[[4, 3, 5]] == pytest.approx(kernel, rel=1e-11, abs=1e-10)
+    both = both_ways(where)
+    assert float(both["ways_gap"].max()) < 1e-10
+    assert float(both["hard_gap"].max()) < 1e-10
+
+
+def test_the_two_energies_are_reconciled():
+    draw = np.random.default_rng(5)
+    states = np.vstack([draw.uniform(-3, 3, 50), draw.uniform(0.3, 2.8, 50), draw.uniform(-3, 3, (4, 50))])
+    E, E1, spin = energies(symtop.scene("goldstein"), states)
+    assert E1 + spin == pytest.approx(E, rel=1e-13)
+    assert np.min(E - E1) >= 0.0
+    assert np.max(E - E1) > 1.0  # they are not the same constant
+
+
+def test_alpha_contradicts_a_release_at_rest():
+    where = symtop.scene("goldstein")
+    cubic = nutation_cubic(where)
+    assert cubic == pytest.approx((1.4981443962885, 2.0, 2.5, 1.7), abs=1e-13)
+    u = math.cos(math.radians(43.0))
+    assert cubic(u) == pytest.approx(0.0, abs=1e-14)  # at rest
+    assert cubic._replace(alpha=1.6)(u) == pytest.approx(0.0473752579827533, abs=1e-14)  # as printed
+    assert rate_of_alpha(where, 1.6) == pytest.approx(0.31914824723237937, abs=1e-14)
+    for name, sign in (("goldstein-rising", 1.0), ("goldstein-falling", -1.0)):
+        assert with_alpha(where, 1.6, sign).start.theta_dot == pytest.approx(symtop.scene(name).start.theta_dot)
+        assert nutation_cubic(symtop.scene(name)).alpha == pytest.approx(1.6, abs=1e-14)
+    with pytest.raises(SymtopError, match="alpha"):
+        rate_of_alpha(where, 1.4)
+
+
+@pytest.mark.parametrize("method", ["midpoint", "stormer-verlet"])
+def test_the_modified_energy_is_kept_to_fourth_order(method):
+    where = symtop.scene("spheroid")
+    table = shadow_table(where, method, [where.nutation_period / (60.3 * 2.0**k) for k in range(5)])
+    assert power_law(table["shadow_step_size"], table["energy_swing"]).slope == pytest.approx(2.0, abs=0.03)
+    assert power_law(table["shadow_step_size"], table["modified_swing"]).slope == pytest.approx(4.0, abs=0.06)
+
+
+def test_the_modified_energy_of_another_method_does_not_serve():
+    where = symtop.scene("spheroid")
+    run = symtop.simulate(where, "midpoint", step_size=0.01, guard=False)
+    states, h = np.stack([run["theta"].values, run["p_theta"].values], axis=1), run.attrs["step_size"]
+    own, other = (np.ptp(modified_energy(where, name, "angles", states, h)) for name in ("midpoint", "stormer-verlet"))
+    assert own < 0.02 * np.ptp(run["energy"].values) < other
+
+
+def test_every_discrete_method_keeps_the_momenta_and_is_shown():
+    assert len(discrete_methods()) >= 27
+    for name, method in itertools.product(("spheroid", "goldstein"), ("trapezoidal", "cayley", "galerkin-simpson")):
+        found = residual_history(symtop.scene(name), method, 0.02, samples=101)
+        assert max(float(found["p_phi_largest"]), float(found["p_psi_largest"])) < 1e-13
+
+
+def test_the_films_body_axes_are_those_of_the_charts(tmp_path):
+    from PIL import Image
+
+    from symtop.model import charts
+
+    q = charts.quaternion_from_angles(*np.random.default_rng(1).uniform(0.2, 2.8, (3, 5)))
+    frames = solid.columns_of(q)
+    assert np.max(np.abs(frames[:, 2] - charts.axis_from_quaternion(q))) < 1e-15
+    assert np.max(np.abs(frames[:, 0] - charts.transverse_from_quaternion(q))) < 1e-15
+    assert np.max(np.abs(np.cross(frames[:, 0], frames[:, 1]) - frames[:, 2])) < 1e-15
+    solid.Film(q, q[::-1], "five attitudes", pixels=120).savefig(tmp_path / "film.gif")
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames == 5
+        colors = {color for _, color in film.convert("RGB").getcolors(1 << 20)}
+    assert {(0xD5, 0x5E, 0x00), (0x00, 0x9E, 0x73), (0x00, 0x72, 0xB2)} <= colors  # the triad's own
+
+
+def test_the_film_fits_a_page_and_is_embedded_as_what_it_is():
+    from symtop.report import page
+
+    film = Path(__file__).resolve().parents[2] / "results" / "figures" / "notebook-triad.gif"
+    assert film.stat().st_size < 500_000
+    assert page._embedded(film).startswith("data:image/gif;base64,")
