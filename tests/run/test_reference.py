@@ -13,8 +13,8 @@ from mpmath import mp, mpf, workdps
 
 import symtop
 from symtop.model.precise_form import PreciseForm
-from symtop.run import reference as reference_function
 from symtop.run.reference import _cache_path, check_times
+from symtop.run.reference import reference as reference_function
 
 
 @pytest.fixture
@@ -117,7 +117,7 @@ def test_a_bound_that_is_too_small_would_be_seen():
 
 def test_a_disagreement_of_the_two_methods_raises_the_bound(monkeypatch):
     """An integration that is 1e-9 off, and a closed form that an integration contradicts by 1e-6: both must show."""
-    module = sys.modules["symtop.reference"]
+    module = sys.modules["symtop.run.reference"]
     where, times = symtop.scene("goldstein"), np.array([1.0, 2.0, 3.0])
     honest = module._closed_values
 
@@ -271,7 +271,7 @@ def test_without_heyoka_the_closed_form_stands_alone_and_says_so(monkeypatch, ca
 
 
 def test_a_certificate_is_kept_and_one_made_without_heyoka_is_not_taken_for_one_with_it(monkeypatch, cache):
-    module = sys.modules["symtop.reference"]
+    module = sys.modules["symtop.run.reference"]
 
     def overlap():
         module._closed_checks.cache_clear()  # as in a new process
