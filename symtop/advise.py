@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from symtop.base.numbers import TINY
 from symtop.base.validate import SymtopError, one_of, positive
 from symtop.measure import meet, ranking
 from symtop.measure.errors import QUANTITIES
@@ -93,7 +94,7 @@ def regime(where: Scene) -> np.ndarray:
     """Dimensionless numbers of a scene's motion: cos(theta) of both turning points, both momenta in asinh."""
     top, start = where.top, where.start
     low, high = sorted(top.turning_cosines(start))
-    unit = math.sqrt(top.I1 * max(abs(top.mgl), np.finfo(float).tiny))
+    unit = math.sqrt(top.I1 * max(abs(top.mgl), TINY))
     momenta = top.momenta(start)
     return np.array([low, high, math.asinh(momenta.p_psi / unit), math.asinh(momenta.p_phi / unit)])
 

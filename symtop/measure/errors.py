@@ -26,14 +26,13 @@ QUANTITIES: dict[str, str] = {
 
 
 def energy_scale(scene: Scene) -> float:
-    """E0 - min(mgl cos theta): what energy errors are divided by."""
-    return max(scene.top.energy(scene.start) + abs(scene.top.mgl), np.finfo(float).tiny)
+    """Alias for studies: `Scene.energy_scale` says it."""
+    return scene.energy_scale
 
 
 def momentum_scale(scene: Scene) -> float:
-    """The larger of the two conserved momenta: what both momentum errors are divided by."""
-    momenta = scene.top.momenta(scene.start)
-    return max(abs(momenta.p_phi), abs(momenta.p_psi), np.finfo(float).tiny)
+    """Alias for studies: `Scene.momentum_scale` says it."""
+    return scene.momentum_scale
 
 
 def errors(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Dataset:
@@ -50,9 +49,9 @@ def _found(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> dict[str, charts
     found = {
         "axis": charts.axis_distance(run["axis"].values, truth["axis"].values),
         "theta": np.abs(run["theta"].values - truth["theta"].values),
-        "energy": np.abs(run["energy"].values - truth["energy"].values) / energy_scale(scene),
-        "p_phi": np.abs(run["p_phi"].values - truth["p_phi"].values) / momentum_scale(scene),
-        "p_psi": np.abs(run["p_psi"].values - truth["p_psi"].values) / momentum_scale(scene),
+        "energy": np.abs(run["energy"].values - truth["energy"].values) / scene.energy_scale,
+        "p_phi": np.abs(run["p_phi"].values - truth["p_phi"].values) / scene.momentum_scale,
+        "p_psi": np.abs(run["p_psi"].values - truth["p_psi"].values) / scene.momentum_scale,
     }
     if "quaternion" in run or "psi" in run:
         found["attitude"] = attitude_error(run, truth)

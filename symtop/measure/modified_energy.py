@@ -1,8 +1,7 @@
 """Alias of `symtop.run.modified_energy` for studies/drift, studies/notebook and benchmarks/roundoff.py."""
 
-from symtop.run.modified_energy import energy as energy
-from symtop.run.modified_energy import modified_energy as modified_energy
-from symtop.run.modified_energy import oscillation as oscillation
-from symtop.run.modified_energy import section as section
+from symtop.run.modified_energy import energy, modified_energy, oscillation, section
+
+__all__ = ["KNOWN", "energy", "modified_energy", "oscillation", "section"]
 
 KNOWN = ("stormer-verlet", "midpoint", "strang", "cayley")  # names of those in the registry with `modified_energy`

@@ -18,7 +18,7 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters X.3 an
 
 import functools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -118,7 +118,9 @@ def _probe(
         piece = Plan.until(duration * (place / POINTS), plan.tolerance)
     run = solve(method, chart, scene.top, start, piece)
     with np.errstate(all="ignore"):
-        error = charts.axis_distance(view(chart, scene.top, np.asarray(run.states)).axis, form.axis(since + piece.times))
+        error = charts.axis_distance(
+            view(chart, scene.top, np.asarray(run.states)).axis, form.axis(since + piece.times)
+        )
     error[~np.isfinite(error)] = math.inf
     outcome = "not_finite" if run.outcome == "ok" and not np.isfinite(error).all() else run.outcome
     return Probe(piece.times, error, outcome, since + run.reached)

@@ -13,7 +13,6 @@ windows end is fixed by the number of steps alone, so that a resumed run has the
 import contextlib
 import hashlib
 import json
-import math
 import signal
 import threading
 import time
