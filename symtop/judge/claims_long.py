@@ -23,7 +23,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.measure.conservation import residuals, trend
-from symtop.measure.errors import errors
+from symtop.measure.errors import errors_against
 from symtop.measure.growth import behaviour, growth
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
@@ -254,7 +254,7 @@ def passages(method: Integrator) -> list[Passage]:
             )
             truth = reference(POLE, run["time"].values, precision="closed-form")
             ends.append(str(run.attrs["outcome"]))
-            miss = errors(POLE, run, truth)["axis"].values
+            miss = errors_against(POLE, run, truth)["axis"].values
             errors_there.append(float(np.nanmax(miss)) if np.isfinite(miss).any() else math.nan)
         found.append(Passage(chart, next((end for end in ends if end != "ok"), "ok"), *errors_there))
     return found

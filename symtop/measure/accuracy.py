@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.base.numbers import EPSILON
-from symtop.measure.errors import QUANTITIES, attitude_error, errors
+from symtop.measure.errors import QUANTITIES, attitude_error, errors_against
 from symtop.measure.phase import phase
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
@@ -91,7 +91,7 @@ def error_row(
     knob = knobs(method, setting)
     run = simulate(scene, method, **knob, horizon=horizon, samples=SAMPLES, observe=observe, guard=False)
     truth = reference(scene, run["time"].values, precision="closed-form")
-    found = errors(scene, run, truth)
+    found = errors_against(scene, run, truth)
     row: dict[str, float | str] = {name: run.attrs[name] for name in _COUNTS}
     failed = run.attrs["outcome"] != "ok"
     for name in QUANTITIES:

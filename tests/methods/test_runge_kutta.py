@@ -7,7 +7,7 @@ import pytest
 
 import symtop
 from symtop.measure.conservation import residuals, trend
-from symtop.measure.errors import errors
+from symtop.measure.errors import errors_against
 from symtop.measure.growth import growth
 from symtop.methods import dormand_prince
 from symtop.methods.euler_lagrange import unreduced
@@ -193,7 +193,7 @@ def _error(name, tolerance, quantity="axis", **knobs):
     run = symtop.simulate(scene, name, tolerance=tolerance, **knobs)
     assert run.attrs["outcome"] == "ok"
     truth = symtop.reference(scene, run["time"].values, precision="closed-form")
-    return run, float(errors(scene, run, truth)[quantity].max())
+    return run, float(errors_against(scene, run, truth)[quantity].max())
 
 
 @pytest.mark.parametrize("name", ["rk45", "dop853", "lsoda", "radau"])

@@ -80,7 +80,7 @@ def test_extremes_are_those_of_a_dense_run():
 
 SCRIPT = """
 import sys, symtop
-from symtop.measure import longrun
+from symtop.run import long_run as longrun
 longrun.LONGEST, longrun.SAVE = 200_000, 0.0
 where = symtop.scene("spheroid")
 longrun.long_run(where, "midpoint", steps=12_000_000, step_size=where.nutation_period / 400.37, checkpoint=sys.argv[1])
