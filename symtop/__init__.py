@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from symtop.advise import recommend as recommend
     from symtop.base.validate import SymtopError as SymtopError
     from symtop.base.validate import SymtopWarning as SymtopWarning
+    from symtop.measure.errors import errors as errors
     from symtop.methods.citations import citation as citation
     from symtop.methods.discrete_lagrangian import discrete_lagrangian as discrete_lagrangian
     from symtop.methods.registry import Integrator as Integrator
@@ -35,24 +36,33 @@ if TYPE_CHECKING:
     from symtop.run.long_run import long_run as long_run
     from symtop.run.reference import reference as reference
     from symtop.run.simulation import simulate as simulate
+    from symtop.runner.study import Case as Case
+    from symtop.runner.study import Picture as Picture
+    from symtop.runner.study import Study as Study
+    from symtop.runner.study import Table as Table
 
 __version__ = "0.1.0"
 
 _HOME = {
     "Advice": "advise",
     "Angles": "model.top",
+    "Case": "runner.study",
     "ClosedForm": "model.closed_form",
     "Integrator": "methods.registry",
     "Momenta": "model.top",
+    "Picture": "runner.study",
     "Plan": "methods.registry",
     "Run": "methods.registry",
     "Scene": "model.scenes",
+    "Study": "runner.study",
     "SymmetricTop": "model.top",
     "SymtopError": "base.validate",
     "SymtopWarning": "base.validate",
+    "Table": "runner.study",
     "citation": "methods.citations",
     "composition": "methods.splitting",
     "discrete_lagrangian": "methods.discrete_lagrangian",
+    "errors": "measure.errors",
     "integrator": "methods.registry",
     "integrators": "methods.registry",
     "long_run": "run.long_run",

@@ -23,12 +23,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from symtop.base.numbers import TINY
 from symtop.base.validate import SymtopError, one_of, positive
 from symtop.measure import meet, ranking
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
 from symtop.methods.registry import Integrator, integrators
-from symtop.model.scenes import Scene, scene, scenes
+from symtop.model.scenes import Scene, scenes
+from symtop.model.scenes import scene as find_scene
 from symtop.run.simulation import MOST_STEPS
 
 ASKED = (*QUANTITIES, *FREQUENCIES)
@@ -89,17 +91,17 @@ class _Trial:
         return f"{self.name} with {knob} {self.met.setting:.4g}"
 
 
-def regime(where: Scene) -> np.ndarray:
+def regime(scene: Scene) -> np.ndarray:
     """Dimensionless numbers of a scene's motion: cos(theta) of both turning points, both momenta in asinh."""
-    top, start = where.top, where.start
+    top, start = scene.top, scene.start
     low, high = sorted(top.turning_cosines(start))
-    unit = math.sqrt(top.I1 * max(abs(top.mgl), np.finfo(float).tiny))
+    unit = math.sqrt(top.I1 * max(abs(top.mgl), TINY))
     momenta = top.momenta(start)
     return np.array([low, high, math.asinh(momenta.p_psi / unit), math.asinh(momenta.p_phi / unit)])
 
 
 def recommend(
-    where: "str | Scene",
+    scene: "str | Scene",
     *,
     accuracy: float,
     quantity: str = "axis",
@@ -108,12 +110,12 @@ def recommend(
 ) -> Advice:
     """The cheapest method, with its step or tolerance, that keeps the error of `quantity` below `accuracy`.
 
-    `where` is a Scene or the name of one; `horizon` its own by default; `results` a folder with a stored
+    `scene` is a Scene or the name of one; `horizon` its own by default; `results` a folder with a stored
     ``work_precision.nc`` (default: ``results`` if it is there). Raises SymtopError for arguments that make no sense;
     when no method is good enough, the advice says so. It runs what it recommends, which takes from a tenth of a second
     to half a minute.
     """
-    chosen = where if isinstance(where, Scene) else scene(where)
+    chosen = find_scene(scene)
     wanted = positive("accuracy", accuracy)
     if wanted >= math.pi:
         raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {wanted!r}")
@@ -180,7 +182,7 @@ def _shows_attitude(method: Integrator) -> bool:
 
 
 def _candidates(
-    where: Scene, accuracy: float, quantity: str, horizon: float, data: xr.Dataset | None
+    scene: Scene, accuracy: float, quantity: str, horizon: float, data: xr.Dataset | None
 ) -> tuple[dict[str, float | None], str]:
     """Names to try, each with a setting to begin with, and where they came from."""
     usable = _usable(quantity)
@@ -190,33 +192,33 @@ def _candidates(
     known = {name: scenes()[name] for name in map(str, data["scene"].values) if name in scenes()}
     if not known:
         return everyone, f"tried all {len(everyone)} compiled methods (the stored study holds no known scene)"
-    here = regime(where)
+    here = regime(scene)
     nearest = min(known, key=lambda name: float(np.sum((regime(known[name]) - here) ** 2)))
-    periods = horizon / where.nutation_period
+    periods = horizon / scene.nutation_period
     far = int(np.argmin(np.abs(np.log(data["horizon"].values / max(periods, 1e-3)))))
     cell = data.sel(scene=nearest).isel(horizon=far)
     chosen: dict[str, float | None] = {}
     for place in ranking.cheapest(cell, accuracy, quantity):
         if place.integrator in usable and len(chosen) < CANDIDATES:
             row = cell.sel(integrator=place.integrator).isel(setting=place.setting)
-            chosen[place.integrator] = _setting(row, where, known[nearest])
+            chosen[place.integrator] = _setting(row, scene, known[nearest])
     if not chosen:
         why = f"none met it on {nearest}, the nearest stored scene"
         return everyone, f"tried all {len(everyone)} compiled methods ({why})"
     return chosen, f"tried the {len(chosen)} methods that are cheapest on {nearest}, the nearest stored scene"
 
 
-def _setting(row: xr.Dataset, where: Scene, stored: Scene) -> float:
+def _setting(row: xr.Dataset, scene: Scene, stored: Scene) -> float:
     """A stored setting in the time scale of this scene."""
     step = float(row["step_size"])
     if not math.isfinite(step):
         return float(row["tolerance"])
-    scale = where.nutation_period / stored.nutation_period
+    scale = scene.nutation_period / stored.nutation_period
     return step * scale if math.isfinite(scale) and scale > 0.0 else step
 
 
 def _try(
-    where: Scene,
+    scene: Scene,
     method: Integrator,
     accuracy: float,
     quantity: str,
@@ -225,32 +227,32 @@ def _try(
     patience: float,
 ) -> "_Trial | str":
     """A candidate's setting and cost from a short run, or a sentence on why it has none."""
-    period = where.nutation_period
+    period = scene.nutation_period
     short = min(horizon, meet.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** meet.growth(method, quantity)
-    found = meet.search(where, method, accuracy * law, quantity, short, guess, patience)
+    found = meet.search(scene, method, accuracy * law, quantity, short, guess, patience)
     if isinstance(found, meet.Missed):
         dear = found.why == meet.BUDGET and patience < meet.MOST_EVALUATIONS[method.tier]
         return f"Not within {TOO_DEAR:g} times the work of the best" if dear else found.why
     if method.knob == "step_size" and horizon / found.setting > MOST_STEPS:
         return f"Would need more than {MOST_STEPS:.0e} steps"
-    return _Trial(found, found.error / law, meet.seconds(where, found, quantity, horizon), "extrapolated")
+    return _Trial(found, found.error / law, meet.seconds(scene, found, quantity, horizon), "extrapolated")
 
 
-def _confirm(where: Scene, trial: _Trial, accuracy: float, quantity: str, horizon: float) -> "_Trial | str":
+def _confirm(scene: Scene, trial: _Trial, accuracy: float, quantity: str, horizon: float) -> "_Trial | str":
     """The trial run to the whole horizon, its setting corrected; as it was if that is too long, or why it fails."""
     met = trial.met
     if met.evaluations * horizon / met.horizon > meet.MOST_EVALUATIONS[met.integrator.tier]:
         return trial
-    found = meet.search(where, met.integrator, MARGIN * accuracy, quantity, horizon, met.setting)
+    found = meet.search(scene, met.integrator, MARGIN * accuracy, quantity, horizon, met.setting)
     if isinstance(found, meet.Missed):
         return f"Good enough over a short run but not to the end ({found.why[0].lower()}{found.why[1:]})"
     confidence = "checked" if found.error + found.bound <= accuracy else "at the reference's limit"
-    return _Trial(found, found.error, meet.seconds(where, found, quantity, horizon), confidence)
+    return _Trial(found, found.error, meet.seconds(scene, found, quantity, horizon), confidence)
 
 
 def _advice(
-    where: Scene,
+    scene: Scene,
     accuracy: float,
     quantity: str,
     horizon: float,
@@ -258,8 +260,8 @@ def _advice(
     fails: tuple[str, ...],
     source: str,
 ) -> Advice:
-    asked: dict[str, Any] = {"scene": where.name, "quantity": quantity, "accuracy": accuracy, "horizon": horizon}
-    goal = f"{quantity} error {accuracy:g} on {where.name} to t = {horizon:g}"
+    asked: dict[str, Any] = {"scene": scene.name, "quantity": quantity, "accuracy": accuracy, "horizon": horizon}
+    goal = f"{quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}"
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}. The closed form, integrator exact, takes no steps."
         nothing: dict[str, Any] = {"integrator": None, "step_size": None, "tolerance": None, "confidence": "none"}

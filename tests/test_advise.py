@@ -12,7 +12,7 @@ from symtop import advise
 from symtop.advise import regime
 from symtop.cli.main import main
 from symtop.measure import meet
-from symtop.measure.errors import errors
+from symtop.measure.errors import errors_against
 
 
 def measured(scene, advice, quantity="axis"):
@@ -22,7 +22,7 @@ def measured(scene, advice, quantity="axis"):
         samples=1009, observe="attitude" if quantity == "attitude" else "axis", guard=False,
     )  # fmt: skip
     truth = symtop.reference(scene, run["time"].values, precision="closed-form")
-    return float(errors(scene, run, truth)[quantity].max())
+    return float(errors_against(scene, run, truth)[quantity].max())
 
 
 @pytest.mark.parametrize(("quantity", "accuracy"), [("axis", 1e-6), ("energy", 1e-4)])

@@ -25,7 +25,8 @@ import numpy as np
 import xarray as xr
 
 from symtop.base.validate import SymtopError
-from symtop.methods.discrete_lagrangian import Quadrature, rule_of
+from symtop.methods.discrete_lagrangian import Quadrature, is_midpoint, rule_of
+from symtop.methods.galerkin import is_galerkin
 from symtop.methods.registry import Integrator, Plan, integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
@@ -92,7 +93,7 @@ def routhian_galerkin_step(scene: Scene) -> Step:
 
 def reduced_first(scene: Scene, method: Integrator) -> Step | None:
     """The step that comes of reducing before discretising as this integrator does; None if it is not known."""
-    if method.name == "galerkin-simpson":
+    if is_galerkin(method):
         return routhian_galerkin_step(scene)
     rule = rule_of(method)
     return None if rule is None else routhian_step(scene, rule)
@@ -189,6 +190,6 @@ def commutation_table(scene: Scene, method: Integrator, horizon: float, counts: 
             "commutation_gap": ("commutation_step", [commutation_gap(scene, method, *step).theta for step in steps]),
         }
     )
-    if method.name == "midpoint":
+    if is_midpoint(method):
         data["hamiltonian_gap"] = ("commutation_step", [midpoint_gap(scene, *step).theta for step in steps])
     return data

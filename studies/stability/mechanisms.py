@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.methods.discrete_lagrangian import rule_of
+from symtop.methods.discrete_lagrangian import is_midpoint, rule_of
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene, scene
 from symtop.run.linear_stability import linear_limits, sleeping_threshold, with_momenta
@@ -115,7 +115,7 @@ def sampling_table(name: str, method: Integrator, settings: Mapping[str, Any]) -
             "solver_momentum": ("tolerance_setting", [entry.momentum for entry in rows]),
             "solver_iterations": ("tolerance_setting", [entry.iterations for entry in rows]),
         }
-        if method.name == "midpoint":
+        if is_midpoint(method):
             plain = [plain_midpoint(where, h, steps, float(value)).energy for value in tolerances]
             table["plain_energy"] = ("tolerance_setting", plain)
             table["one_iteration_energy"] = plain_midpoint(where, h, steps, 0.0, 1).energy

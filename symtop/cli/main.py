@@ -140,7 +140,7 @@ def run(
     symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
     """
     from symtop.base import datasets
-    from symtop.measure.errors import QUANTITIES, errors
+    from symtop.measure.errors import QUANTITIES, errors_against
     from symtop.measure.verdicts import judgement
     from symtop.model.scenes import scene as find_scene
     from symtop.run.reference import reference
@@ -157,7 +157,7 @@ def run(
         datasets.write(data, output)
     where = find_scene(scene)
     truth = reference(where, data["time"].values, precision="closed-form")
-    found = errors(where, data, truth)
+    found = errors_against(where, data, truth)
     judged = judgement(where, data, found["axis"].values)
     if figure is not None:
         from symtop.report import single

@@ -14,7 +14,6 @@ is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. P
 Python solvers are too slow for a million steps: they run for as many as `EVALUATIONS` allow, and the ledger says so.
 """
 
-import dataclasses
 import math
 import tracemalloc
 from typing import NamedTuple
@@ -24,7 +23,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.measure.conservation import residuals, trend
-from symtop.measure.errors import errors
+from symtop.measure.errors import errors_against
 from symtop.measure.growth import behaviour, growth
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
@@ -41,7 +40,6 @@ SAMPLES = 4001
 PILOT = 400  # steps of the run that is sampled at every step
 EVALUATIONS = {"compiled": 2e8, "python": 4e4}
 TOLERANCE = 1e-6  # of an adaptive method without a default of its own
-SLOW = {"taylor-quad": 0.002}  # quadruple precision is software
 KEPT = 1e-11
 ROUNDING = 2e-13  # a change in one step that may be rounding, where |p| is small beside what makes it up
 BOUNDED = 0.25  # an exponent that exceeds it with its whole interval is growth
@@ -94,10 +92,6 @@ class LongRun(NamedTuple):
     steady_cost: bool  # every run of the same number of steps cost the same, at two step sizes
 
 
-def _period(where: Scene) -> float:
-    return where.nutation_period if math.isfinite(where.nutation_period) else where.horizon / 8.0
-
-
 def _run(method: Integrator, where: Scene, steps: float, step: float, samples: int) -> xr.Dataset:
     """A run for `steps` times `step`: of that many steps, or for that time at the tolerance."""
     if method.knob == "step_size":
@@ -108,20 +102,15 @@ def _run(method: Integrator, where: Scene, steps: float, step: float, samples: i
     return simulate(where, method, tolerance=given, horizon=steps * step, samples=samples, observe="axis", guard=False)
 
 
-def in_chart(method: Integrator, chart: str) -> Integrator:
-    """The method with nothing but its solver of one chart."""
-    return dataclasses.replace(method, solvers={chart: method.solvers[chart]})
-
-
 def long_run(method: Integrator, where: Scene, chart: str, *, quick: bool = False) -> LongRun:
     """A million steps of a compiled method in one of its charts, fewer where that would take minutes."""
-    method = in_chart(method, chart)
+    method = method.only(chart)
     for finer in FINER:  # a motion that passes close to a pole needs shorter steps
-        step = _period(where) / (STEPS_A_NUTATION * finer)
+        step = where.time_scale() / (STEPS_A_NUTATION * finer)
         pilot = _run(method, where, PILOT, step, PILOT + 1)
         cost = max(float(pilot.attrs["force_evaluations"]) / PILOT, 1.0)
         most = QUICK_STEPS if quick else STEPS
-        steps = min(most, EVALUATIONS[method.tier] / cost) * SLOW.get(method.name, 1.0)
+        steps = min(most, EVALUATIONS[method.tier] / cost) * method.speed
         if method.knob is None:
             steps = PILOT  # a formula has no steps: nothing adds up
         run = _run(method, where, max(steps, PILOT), step, SAMPLES)
@@ -136,7 +125,7 @@ def long_run(method: Integrator, where: Scene, chart: str, *, quick: bool = Fals
         str(run.attrs["outcome_message"]),
         str(run.attrs["chart"]),
         int(run.attrs["steps"]),
-        float(run.attrs["reached_time"]) / _period(where),
+        float(run.attrs["reached_time"]) / where.time_scale(),
         float(run.attrs["force_evaluations"]) / made,
         float(run.attrs["newton_iterations"]) / made,
         len({data.attrs["force_evaluations"] / max(data.attrs["steps"], 1) for data in (pilot, other)}) == 1,
@@ -190,10 +179,10 @@ def cost_of_an_attempt(method: Integrator, where: Scene, chart: str) -> int:
     `ATTEMPTS` runs to different times at different tolerances differ by multiples of s. Where a solver iterates until
     it converges, they have no common divisor; by chance they had 2 in one case in 2000.
     """
-    only, costs = in_chart(method, chart), []
+    only, costs = method.only(chart), []
     for k in range(ATTEMPTS):
         tolerance = max(10.0 ** (-4.0 - 0.4 * k), method.least_tolerance)
-        horizon = (1.37 + 0.23 * k) * _period(where)
+        horizon = (1.37 + 0.23 * k) * where.time_scale()
         run = simulate(where, only, tolerance=tolerance, horizon=horizon, samples=2, guard=False)
         if run.attrs["outcome"] != "ok":
             return 1
@@ -209,8 +198,8 @@ def memory_a_step(method: Integrator, where: Scene) -> int:
 
     In whole pointers: nothing smaller can be kept, and fractions of one are what Python happens to hold at the moment.
     """
-    few = max(100, round((4_000 if method.tier == "compiled" else 200) * min(1.0, 20.0 * SLOW.get(method.name, 1.0))))
-    step = _period(where) / STEPS_A_NUTATION
+    few = max(100, round((4_000 if method.tier == "compiled" else 200) * min(1.0, 20.0 * method.speed)))
+    step = where.time_scale() / STEPS_A_NUTATION
     peaks, made = [], []
     _run(method, where, few, step, 11)  # whatever is made once is made here
     for steps in (few, 6 * few):
@@ -253,7 +242,7 @@ def passages(method: Integrator) -> list[Passage]:
     """What happens at a pole, in every chart of the method."""
     found = []
     for chart in method.charts():
-        only = in_chart(method, chart)
+        only = method.only(chart)
         ends, errors_there = [], []
         for finer in (1.0, 2.0):
             step = POLE.horizon / (POLE_STEPS * finer)
@@ -265,7 +254,7 @@ def passages(method: Integrator) -> list[Passage]:
             )
             truth = reference(POLE, run["time"].values, precision="closed-form")
             ends.append(str(run.attrs["outcome"]))
-            miss = errors(POLE, run, truth)["axis"].values
+            miss = errors_against(POLE, run, truth)["axis"].values
             errors_there.append(float(np.nanmax(miss)) if np.isfinite(miss).any() else math.nan)
         found.append(Passage(chart, next((end for end in ends if end != "ok"), "ok"), *errors_there))
     return found

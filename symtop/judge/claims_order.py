@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from symtop.base.validate import SymtopError
 from symtop.measure.accuracy import error_table, step_ladder, tolerance_ladder
-from symtop.measure.errors import momentum_scale
 from symtop.measure.order import Fit, order
 from symtop.methods.registry import Integrator
 from symtop.model import charts
@@ -70,8 +69,7 @@ def measured_order(method: Integrator, where: Scene, *, quick: bool = False) -> 
 
 
 def _slopes(method: Integrator, where: Scene, nutations: float, quick: bool) -> Order:
-    period = where.nutation_period if math.isfinite(where.nutation_period) else where.horizon / 8.0
-    horizon = nutations * period
+    horizon = nutations * where.time_scale()
     if method.knob == "step_size":
         settings = step_ladder(method, where, horizon, 11 if quick else 13, FINEST[method.tier])
     else:
@@ -119,9 +117,8 @@ class Limit(NamedTuple):
 
 def limit(method: Integrator, where: Scene, power: int) -> Limit:
     """How far from the true motion a run ends in the limit of small steps, for a method whose order is `power`."""
-    period = where.nutation_period if math.isfinite(where.nutation_period) else where.horizon / 8.0
     fewest = STEPS.get(power, 200) // (1 if method.tier == "compiled" else 20)
-    ends = [_signed_error(method, where, SHARE * period, fewest * 2**k) for k in range(3)]
+    ends = [_signed_error(method, where, SHARE * where.time_scale(), fewest * 2**k) for k in range(3)]
     once = [_without(power, ends[k], ends[k + 1]) for k in range(2)]
     size = [float(np.max(np.abs(value))) for value in (ends[2], once[1], _without(power + 1, once[0], once[1]))]
     return Limit(min(size[0], size[2]), abs(size[2] - size[1]))
@@ -140,7 +137,7 @@ def _signed_error(method: Integrator, where: Scene, horizon: float, steps: int) 
         raise SymtopError(f"a run of {steps} steps over {horizon:.3g} {run.attrs['outcome_message']}")
     last, true = run.isel(time=-1), closed_form(where)(np.array([horizon]))
     axis = charts.axis_from_angles(true.theta[0], true.phi[0])
-    slip = (float(last["p_theta"]) - where.top.I1 * float(true.theta_dot[0])) / momentum_scale(where)
+    slip = (float(last["p_theta"]) - where.top.I1 * float(true.theta_dot[0])) / where.momentum_scale
     turn = [float(last["psi"]) - float(true.psi[0])] if "psi" in run else []
     return np.array([*(last["axis"].values - axis), slip, *turn])
 

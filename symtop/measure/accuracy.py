@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from symtop.measure.errors import QUANTITIES, attitude_error, energy_scale, errors, momentum_scale
+from symtop.base.numbers import EPSILON
+from symtop.measure.errors import QUANTITIES, attitude_error, errors_against
 from symtop.measure.phase import phase
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
@@ -15,7 +16,6 @@ from symtop.run.simulation import simulate
 
 SAMPLES = 331
 ENOUGH = {"compiled": 1e9, "python": 2e4}  # force evaluations of a run after which no finer setting is tried
-EPSILON = float(np.finfo(float).eps)
 
 
 def step_ladder(method: Integrator, scene: Scene, horizon: float, count: int = 13, most: float = 4e6) -> list[float]:
@@ -24,7 +24,7 @@ def step_ladder(method: Integrator, scene: Scene, horizon: float, count: int = 1
     The finest step of a method of order p resolves a nutation about 10 * 10^(11/p) times; methods of high order, whose
     steps have many stages, begin at five.
     """
-    period = scene.nutation_period if math.isfinite(scene.nutation_period) else horizon / 8.0
+    period = scene.time_scale(horizon)
     power = method.order or 2
     first = 10.37 if power <= 4 else 5.37  # nothing here may be commensurate with the nutation
     decades = min(4.5, 11.0 / power + math.log10(10.37 / first), max(math.log10(most * period / horizon / first), 0.5))
@@ -91,7 +91,7 @@ def error_row(
     knob = knobs(method, setting)
     run = simulate(scene, method, **knob, horizon=horizon, samples=SAMPLES, observe=observe, guard=False)
     truth = reference(scene, run["time"].values, precision="closed-form")
-    found = errors(scene, run, truth)
+    found = errors_against(scene, run, truth)
     row: dict[str, float | str] = {name: run.attrs[name] for name in _COUNTS}
     failed = run.attrs["outcome"] != "ok"
     for name in QUANTITIES:
@@ -116,7 +116,7 @@ _COUNTS = (
 def judge_limit(scene: Scene, truth: xr.Dataset, quantity: str) -> float:
     """The reference's largest bound on a quantity over the run, plus the rounding of the compared doubles."""
     if quantity in ("energy", "p_phi", "p_psi"):
-        scale = energy_scale(scene) if quantity == "energy" else momentum_scale(scene)
+        scale = scene.energy_scale if quantity == "energy" else scene.momentum_scale
         return 4.0 * EPSILON * max(1.0, float(np.max(np.abs(truth[quantity].values))) / scale)
     bound = float(np.max(truth[f"{quantity}_error_bound"].values))
     if quantity == "attitude":  # phi and psi come as doubles; their rounding is an angle

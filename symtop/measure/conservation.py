@@ -15,8 +15,8 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from symtop.measure.clock import Clock, has_phase
-from symtop.measure.errors import energy_scale, momentum_scale
 from symtop.measure.growth import change_point, growth, law, tops
+from symtop.measure.statistics import line, student
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate
@@ -81,14 +81,12 @@ def _laws(name: str, named: str, time: np.ndarray, values: np.ndarray) -> dict[s
 
 def residuals(scene: Scene, run: xr.Dataset) -> dict[str, np.ndarray]:
     """Relative change of energy, p_phi and p_psi since the start, signed."""
-    scales = {"energy": energy_scale(scene), "p_phi": momentum_scale(scene), "p_psi": momentum_scale(scene)}
+    scales = {"energy": scene.energy_scale, "p_phi": scene.momentum_scale, "p_psi": scene.momentum_scale}
     return {name: (run[name].values - run[name].values[0]) / scales[name] for name in CONSTANTS}
 
 
 def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
     """The linear trend of a residual (n,) at times (n,), from the means of `BLOCKS` equal stretches of the run."""
-    from scipy.stats import t as student  # 0.5 s to import
-
     t, r = np.asarray(time, float), np.asarray(residual, float)
     good = np.isfinite(r)
     t, r = t[good], r[good]
@@ -96,14 +94,10 @@ def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
         return Trend(math.nan, math.nan, math.nan)
     t_mean = np.array([part.mean() for part in np.array_split(t, BLOCKS)])
     r_mean = np.array([part.mean() for part in np.array_split(r, BLOCKS)])
-    dt, dr = t_mean - t_mean.mean(), r_mean - r_mean.mean()
-    spread = float(dt @ dt)
-    slope = float(dt @ dr) / spread
-    rest = dr - slope * dt
-    error = math.sqrt(float(rest @ rest) / (BLOCKS - 2) / spread)
+    slope, error, _, rest = line(t_mean, r_mean)
     # first-order autocorrelation r of the residuals leaves (1-r)/(1+r) of them independent; r is biased by about -4/n
     power = float(rest @ rest)
     memory = float(rest[1:] @ rest[:-1]) / power + 4.0 / BLOCKS if power > 0.0 else 0.0
     memory = min(max(memory, 0.0), 0.95)
     error *= math.sqrt((1.0 + memory) / (1.0 - memory))
-    return Trend(slope, float(student.ppf(0.975, BLOCKS - 2)) * error, slope * float(t[-1] - t[0]))
+    return Trend(slope, student(BLOCKS - 2) * error, slope * float(t[-1] - t[0]))

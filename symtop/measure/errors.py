@@ -9,11 +9,19 @@ never zero by accident; both momenta share one scale because one of them may van
 never share a norm.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
+from symtop.base.numbers import EPSILON
+from symtop.base.validate import one_of
+from symtop.measure.trajectory import CONSTANTS, checked, completed, refuse_other_order, scene_of
 from symtop.model import charts
 from symtop.model.scenes import Scene
+from symtop.model.scenes import scene as find_scene
+from symtop.run.reference import PRECISIONS, reference
 
 QUANTITIES: dict[str, str] = {
     "axis": "angle between axes (rad)",
@@ -25,38 +33,83 @@ QUANTITIES: dict[str, str] = {
 }
 
 
+def errors(
+    run: xr.Dataset | Mapping[str, Any], scene: "str | Scene | None" = None, *, precision: str = "closed-form"
+) -> xr.Dataset:
+    """The errors of a run, or of anybody's trajectory of a scene, at every sample, and how far they can be trusted.
+
+    `run` is a dataset of `simulate` (or one read back from its file), which holds its top and start. With a `scene`
+    (a Scene or a name) it is any Dataset or mapping with ``time`` (n,), elapsed since the start, increasing, and one of
+
+        axis         (n, 3)  unit vectors along the top's axis in the space frame, z up
+        quaternion   (n, 4)  w, x, y, z from body to space, either sign; the body's third axis is the top's
+        theta        (n,)    inclination in [0, pi], rad; with phi, and psi, the other two Euler angles (z-x-z)
+
+    and, where there are any, ``energy``, ``p_phi``, ``p_psi`` (n,), in the units of the scene's top.
+
+    Returns a Dataset over ``time`` with those of ``axis``, ``attitude``, ``theta`` (rad), ``energy``, ``p_phi``,
+    ``p_psi`` (relative, see above) that the data show. ``NAME_bound`` (n,) is the least error that can be told from
+    none: the bound of the reference and the rounding of the compared doubles. Samples that are NaN, as after a failure,
+    stay NaN. `precision` is that of `reference`; the closed form costs a microsecond a sample, and its rounding does
+    not grow with time.
+
+    Raises SymtopError for data that are no such trajectory, an unknown scene, and no scene where the data name none.
+    """
+    one_of("precision", precision, PRECISIONS)
+    foreign = scene is not None and "integrator" not in getattr(run, "attrs", {})
+    chosen = scene_of(run) if scene is None else find_scene(scene)
+    data = checked(run) if foreign or not isinstance(run, xr.Dataset) else run
+    truth = reference(chosen, data["time"].values, precision)
+    if foreign and "quaternion" in data:
+        refuse_other_order(data, truth)
+    data = completed(data) if foreign else data
+    shown = errors_against(chosen, data, truth)
+    for name in list(shown):
+        shown[name].attrs["long_name"] = QUANTITIES[str(name)]
+        shown[f"{name}_bound"] = ("time", _bound(chosen, truth, str(name)))
+    return shown.assign_attrs(title=f"errors on {chosen.name}", scene=chosen.name, precision=truth.attrs["precision"])
+
+
+def _bound(scene: Scene, truth: xr.Dataset, quantity: str) -> charts.Array:
+    """The reference's bound on a quantity and the rounding of the compared doubles, at every sample."""
+    if quantity in CONSTANTS:
+        scale = scene.energy_scale if quantity == "energy" else scene.momentum_scale
+        return np.asarray(4.0 * EPSILON * np.maximum(1.0, np.abs(truth[quantity].values) / scale))
+    bound: charts.Array = truth[f"{quantity}_error_bound"].values + EPSILON
+    if quantity == "attitude":  # phi and psi come as doubles; their rounding is an angle
+        bound = bound + EPSILON * (np.abs(truth["phi"].values) + np.abs(truth["psi"].values))
+    return bound
+
+
 def energy_scale(scene: Scene) -> float:
-    """E0 - min(mgl cos theta): what energy errors are divided by."""
-    return max(scene.top.energy(scene.start) + abs(scene.top.mgl), np.finfo(float).tiny)
+    """Alias for studies: `Scene.energy_scale` says it."""
+    return scene.energy_scale
 
 
 def momentum_scale(scene: Scene) -> float:
-    """The larger of the two conserved momenta: what both momentum errors are divided by."""
-    momenta = scene.top.momenta(scene.start)
-    return max(abs(momenta.p_phi), abs(momenta.p_psi), np.finfo(float).tiny)
+    """Alias for studies: `Scene.momentum_scale` says it."""
+    return scene.momentum_scale
 
 
-def errors(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Dataset:
-    """Error of every quantity the run shows at every sample; NaN where the run had failed.
+def errors_against(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Dataset:
+    """Error of every quantity that a run shows at every sample; NaN where the run had failed.
 
     `truth` holds `axis`, `theta`, `quaternion`, `energy`, `p_phi`, `p_psi` at the same times (see `reference`).
     """
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
-        found = _found(scene, run, truth)
-    return xr.Dataset({name: ("time", values) for name, values in found.items()}, coords={"time": run["time"]})
+        columns = _columns(scene, run, truth)
+    return xr.Dataset({name: ("time", values) for name, values in columns.items()}, coords={"time": run["time"]})
 
 
-def _found(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> dict[str, charts.Array]:
-    found = {
-        "axis": charts.axis_distance(run["axis"].values, truth["axis"].values),
-        "theta": np.abs(run["theta"].values - truth["theta"].values),
-        "energy": np.abs(run["energy"].values - truth["energy"].values) / energy_scale(scene),
-        "p_phi": np.abs(run["p_phi"].values - truth["p_phi"].values) / momentum_scale(scene),
-        "p_psi": np.abs(run["p_psi"].values - truth["p_psi"].values) / momentum_scale(scene),
-    }
+def _columns(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> dict[str, charts.Array]:
+    columns = {"axis": charts.axis_distance(run["axis"].values, truth["axis"].values)} if "axis" in run else {}
+    units = {"theta": 1.0, "energy": scene.energy_scale, "p_phi": scene.momentum_scale, "p_psi": scene.momentum_scale}
+    for name, unit in units.items():
+        if name in run:
+            columns[name] = np.abs(run[name].values - truth[name].values) / unit
     if "quaternion" in run or "psi" in run:
-        found["attitude"] = attitude_error(run, truth)
-    return found
+        columns["attitude"] = attitude_error(run, truth)
+    return columns
 
 
 def attitude_error(run: xr.Dataset, truth: xr.Dataset) -> charts.Array:

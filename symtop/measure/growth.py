@@ -20,7 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from symtop.base.numbers import TINY
 from symtop.measure.order import Fit, power_law
+from symtop.measure.statistics import columns_fitted
 
 LAWS = {0.0: "bounded", 0.5: "random walk", 1.0: "linear", 1.5: "t^3/2", 2.0: "quadratic"}
 DRAWS = 2000
@@ -138,8 +140,7 @@ def change_point(time: ArrayLike, size: ArrayLike, least: int = 5) -> Change | N
     straight = float(np.polyfit(u, v, 1, full=True)[1][0]) if n > 2 else 0.0
     places = u[least - 1 : n - least + 1]
     rest, place, found = min((*broken(place)[:1], place, broken(place)[1]) for place in map(float, places))
-    tiny = np.finfo(float).tiny
-    gain = n * math.log(max(straight, tiny) / max(rest, tiny)) - 2.0 * math.log(n)
+    gain = n * math.log(max(straight, TINY) / max(rest, TINY)) - 2.0 * math.log(n)
     if gain <= 0.0 or rest > 0.5 * straight or abs(found[2]) < 0.25:
         return None
     return Change(math.exp(place), float(found[1]), float(found[1] + found[2]))
@@ -161,15 +162,13 @@ def horizon(time: ArrayLike, error: ArrayLike, tolerance: float) -> Horizon:
     powers = [0, 1, 2]
     while True:
         columns = np.stack([(t / reach) ** k for k in powers], axis=1)
-        found = np.linalg.lstsq(columns, e, rcond=None)[0]
-        rest = e - columns @ found
-        spread = float(rest @ rest) / (t.size - len(powers)) * np.linalg.inv(columns.T @ columns).diagonal()
-        doubt = np.sqrt(spread)
-        weak = [k for k, value, width in zip(powers, found, doubt, strict=True) if k != 1 and abs(value) <= 4.0 * width]
+        fitted, deviations = columns_fitted(columns, e)
+        terms = zip(powers, fitted, deviations, strict=True)
+        weak = [k for k, value, deviation in terms if k != 1 and abs(value) <= 4.0 * deviation]
         if not weak:
             break
         powers.remove(max(weak))
-    a, b, c = (float(found[powers.index(k)]) / reach**k if k in powers else 0.0 for k in range(3))
+    a, b, c = (float(fitted[powers.index(k)]) / reach**k if k in powers else 0.0 for k in range(3))
     times = [
         float(root.real)
         for level in (tolerance, -tolerance)

@@ -81,7 +81,7 @@ def first_guess(scene: Scene, method: Integrator, horizon: float, accuracy: floa
     """A setting to begin with when nothing is known: error about (h/period)^p, or about the tolerance."""
     if method.knob == "tolerance":
         return min(max(0.1 * accuracy, method.least_tolerance * 1.01), LOOSEST)
-    period = scene.nutation_period if math.isfinite(scene.nutation_period) else horizon / 8.0
+    period = scene.time_scale(horizon)
     return float(min(0.2 * period * accuracy ** (1.0 / (method.order or 2)), coarsest_step(scene, horizon)))
 
 

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symtop.measure.statistics import columns_fitted, line, student
+
 LEAST = 5
 LARGEST_ERROR = 1e-2
 FLOOR = 1e3  # times the reference's bound: a finest error beyond it has not met rounding
@@ -37,8 +39,6 @@ class Fit(NamedTuple):
 
 def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:
     """Least squares of log y on log x over the used points; NaN with fewer than three."""
-    from scipy.stats import t as student  # 0.5 s to import
-
     x, y = np.asarray(x, float), np.asarray(y, float)
     mask = np.isfinite(x) & np.isfinite(y) & (x > 0.0) & (y > 0.0)
     if used is not None:
@@ -46,14 +46,10 @@ def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:
     n = int(mask.sum())
     if n < 3:
         return Fit(math.nan, math.nan, math.nan, mask)
-    u, v = np.log(x[mask]), np.log(y[mask])
-    du, dv = u - u.mean(), v - v.mean()
-    spread = float(du @ du)
-    slope = float(du @ dv) / spread
-    residual = dv - slope * du
-    error = math.sqrt(float(residual @ residual) / (n - 2) / spread)
-    constant = math.exp(float(v.mean() - slope * u.mean()))
-    return Fit(slope, float(student.ppf(0.975, n - 2)) * error, constant, mask)
+    fitted = line(np.log(x[mask]), np.log(y[mask]))
+    u_mean, v_mean = fitted.middle
+    constant = math.exp(float(v_mean - fitted.slope * u_mean))
+    return Fit(fitted.slope, student(n - 2) * fitted.error, constant, mask)
 
 
 def order(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, omega: float, claim: int | None = None) -> Fit:
@@ -92,12 +88,8 @@ def _unjudged(used: NDArray[Any], reason: str) -> Fit:
 
 def _bends(h: NDArray[np.float64], e: NDArray[np.float64]) -> bool:
     """Does the slope change by more than `STRAIGHT` over these points, and significantly so?"""
-    from scipy.stats import t as student  # 0.5 s to import
-
     u, v = np.log(h) - np.log(h).mean(), np.log(e)
     matrix = np.stack([np.ones_like(u), u, u * u], axis=1)
-    solution = np.linalg.lstsq(matrix, v, rcond=None)[0]
-    rest = v - matrix @ solution
-    spread = float(rest @ rest) / (u.size - 3) * np.linalg.inv(matrix.T @ matrix)[2, 2]
-    change = 2.0 * abs(float(solution[2])) * (u.max() - u.min())
-    return bool(change > STRAIGHT and abs(solution[2]) > student.ppf(0.975, u.size - 3) * math.sqrt(spread))
+    coefficients, deviations = columns_fitted(matrix, v)
+    change = 2.0 * abs(float(coefficients[2])) * (u.max() - u.min())
+    return bool(change > STRAIGHT and abs(coefficients[2]) > student(u.size - 3) * deviations[2])

@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from symtop.base.numbers import EPSILON
 from symtop.measure.verdicts import STEADY
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
@@ -44,7 +45,6 @@ TABLE = 256  # points of the true curve from which the search for tau starts
 SWEEPS = 4  # of Gauss-Newton: the error falls from 1e-2 to rounding in three
 CLEAR = 0.25  # of the largest sin(theta): nearer to a pole, the branch of phi is taken from the neighbours
 LEAST_RATE = 1e-3  # of omega: below it a mean precession is an accident, and its errors are relative to this
-EPSILON = float(np.finfo(float).eps)
 Array = Any
 
 
@@ -151,6 +151,7 @@ def phase(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> Phase:
     sine = np.maximum(np.sin(run["theta"].values), EPSILON)
     with np.errstate(over="ignore", invalid="ignore"):  # a run may be far from anything
         parts = split(scene, run)
+    # on a separatrix the whole run is the time scale, not `Scene.time_scale`: a rate is judged over what was seen
     period = scene.nutation_period if math.isfinite(scene.nutation_period) else float(t[-1])
     omega, swings, even = 2.0 * math.pi / period, nutates(scene), np.ones(t.size)
     mean_rate = form.phi_per_period / form.nutation_period if math.isfinite(form.nutation_period) else 0.0

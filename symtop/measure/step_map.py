@@ -29,7 +29,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.base.validate import SymtopError
-from symtop.measure.errors import momentum_scale
 from symtop.methods.registry import Integrator, Plan, Run
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
@@ -59,12 +58,11 @@ class StepMap:
 
     def run(self, start: Angles, h: float, steps: int = 1) -> Run:
         """A run of so many steps, sampled at its end; for an adaptive method a run for that time."""
-        end = steps * h
         if self.method.knob == "step_size":
-            plan = Plan(np.array([end]), end, h, np.array([steps]), math.nan)
+            plan = Plan.steps(h, [steps])
         else:
             loose = math.nan if self.method.knob is None else max(LOOSE, self.method.least_tolerance)
-            plan = Plan(np.array([end]), end, math.nan, np.empty(0, dtype=np.int64), loose)
+            plan = Plan.until([steps * h], loose)
         done = solve_plan(self.method, self.chart, self.top, start, plan)
         if done.outcome != "ok" or not np.isfinite(done.states).all():
             raise SymtopError(f"a step of {h:.3g} in the {self.chart} chart ended as {done.outcome}")
@@ -131,9 +129,9 @@ def angles_at(top: SymmetricTop, z: Array) -> Angles:
     return Angles(theta, phi, psi, p_theta / top.I1, phi_dot, p_psi / top.I3 - phi_dot * math.cos(theta))
 
 
-def one_step(method: Integrator, chart: str, where: Scene, h: float) -> StepMap:
+def one_step(method: Integrator, chart: str, scene: Scene, h: float) -> StepMap:
     """The map of a step of a given h."""
-    return StepMap(method, chart, where.top, momentum_scale(where), h)
+    return StepMap(method, chart, scene.top, scene.momentum_scale, h)
 
 
 def generic_start(scene: Scene) -> Angles:
@@ -151,8 +149,7 @@ def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Ang
     Raises SymtopError if no step succeeds.
     """
     start = generic_start(scene)
-    period = scene.nutation_period if math.isfinite(scene.nutation_period) else scene.horizon / 8.0
-    trial = one_step(method, chart, scene, SHARE * period)
+    trial = one_step(method, chart, scene, SHARE * scene.time_scale())
     if method.knob != "step_size":
         return trial, start
     refusal = SymtopError(f"{method.name} makes no step in the {chart} chart")

@@ -18,7 +18,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.measure.errors import energy_scale, momentum_scale
 from symtop.methods.outcomes import OUTCOMES
 from symtop.model.scenes import Scene
 
@@ -66,8 +65,8 @@ def judge(
 
     `outcome` is an index into `OUTCOMES`; `axis_error` the largest over the run, rad; `theta_low` and `theta_high` its
     extreme inclinations; `energy_early` and `energy_late` the largest energy errors of its two halves in units of
-    `energy_scale`; `passed_pole` whether a pole was passed on the other side. `truth` may hold arrays as well. NaN
-    counts as the worst. Numbers of a run that ended early are not looked at.
+    `Scene.energy_scale`; `passed_pole` whether a pole was passed on the other side. `truth` may hold arrays as well.
+    NaN counts as the worst. Numbers of a run that ended early are not looked at.
     """
     ended, early, late = np.asarray(outcome), np.asarray(energy_early), np.asarray(energy_late)
     low, high = np.asarray(theta_low), np.asarray(theta_high)
@@ -85,7 +84,7 @@ def judge(
 def _pole_passed(scene: Scene, run: xr.Dataset) -> NDArray[np.bool_]:
     """At which samples the axis has passed a pole on the side that its momenta forbid."""
     momenta = scene.top.momenta(scene.start)
-    least = ROUNDING * momentum_scale(scene)
+    least = ROUNDING * scene.momentum_scale
     passed = np.zeros(run.sizes["time"], dtype=bool)
     p_phi, p_psi = run["p_phi"].values, run["p_psi"].values
     for gap, now in ((momenta.north, p_phi - p_psi), (momenta.south, p_phi + p_psi)):
@@ -100,7 +99,7 @@ def verdict(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> str:
     if ended:
         return OUTCOMES[ended]
     theta = run["theta"].values
-    energy = np.abs(run["energy"].values - run["energy"].values[0]) / energy_scale(scene)
+    energy = np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     half = energy.size // 2
     found = judge(
         barriers(scene), ended, np.max(axis_error), theta.min(), theta.max(),
@@ -128,7 +127,7 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
     theta = run["theta"].values
     beyond = ~((theta >= truth.highest - truth.margin) & (theta <= truth.lowest + truth.margin))
     passed = _pole_passed(scene, run)
-    energy = np.abs(run["energy"].values - run["energy"].values[0]) / energy_scale(scene)
+    energy = np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     events: dict[str, Any] = {
         "wrong_regime": beyond | passed,
         "drifting": ~(energy <= DRIFT),

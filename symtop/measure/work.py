@@ -44,7 +44,10 @@ STOPS = ("all targets met", "rounding", "budget", "least tolerance", "nothing to
 
 
 def spans(scene: Scene, periods: Sequence[float]) -> list[float]:
-    """Times of so many nutation periods; on a separatrix, of so many tenths of the scene's horizon."""
+    """Times of so many nutation periods; on a separatrix, of so many tenths of the scene's horizon.
+
+    Tenths, not the eighths of `Scene.time_scale`: the horizons of stored studies are made of them.
+    """
     period = scene.nutation_period if math.isfinite(scene.nutation_period) else 0.1 * scene.horizon
     return [count * period for count in periods]
 
@@ -58,7 +61,7 @@ def first_setting(method: Integrator, scene: Scene, horizon: float) -> float:
     """The coarsest setting that is tried at first; incommensurate with the nutation."""
     if method.knob == "tolerance":
         return 1e-2
-    period = scene.nutation_period if math.isfinite(scene.nutation_period) else horizon / 8.0
+    period = scene.time_scale(horizon)
     power = method.order or 2
     return period / (7.37 if power <= 2 else 5.37 if power <= 4 else LEAST_STEPS)
 

@@ -6,9 +6,9 @@ Source: Klein and Sommerfeld, Theory of the Top, chapter 6; see `symtop.exact`.
 import numpy as np
 
 from symtop.methods.registry import Integrator, Plan, Run
-from symtop.methods.taylor import space_momenta
 from symtop.model.closed_form import ClosedForm
 from symtop.model.top import Angles, SymmetricTop
+from symtop.model.view import space_momenta
 
 
 def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:

@@ -37,7 +37,7 @@ import numpy as np
 from symtop.methods.angles import chart_outcome, reduced
 from symtop.methods.compiled import register_jitable
 from symtop.methods.discrete_lagrangian import ROUNDING, SMALLEST
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.fixed_step import fixed_step, inside
 from symtop.methods.loop import driver
 from symtop.methods.outcomes import NOT_CONVERGED
 from symtop.methods.registry import Integrator
@@ -263,3 +263,10 @@ def built_in() -> list[Integrator]:
             reference="marsden-west-2001",
         ),
     ]
+
+
+def is_galerkin(method: Integrator) -> bool:
+    """Is it this integrator, whatever its name?"""
+    solver = method.solvers.get("angles")
+    loop = None if solver is None else inside(solver)
+    return loop is not None and isinstance(loop.rule, Iteration)

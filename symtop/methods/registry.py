@@ -2,36 +2,60 @@
 
 Traits are data. They are *claims* until measured; `None` means that nobody has claimed anything. A record is
 made by a family (`discrete_lagrangian`, `composition`, ...) from a table of numbers, or by hand around any
-function ``solve(top, start, plan) -> Run``.
+function ``solve(top, start, plan) -> Run``. Nothing is decided by an integrator's name: what a measurement needs to
+know of a method is a field of its record.
 """
 
 import importlib
 import importlib.metadata
+import math
 import warnings
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from symtop.base.shown import Catalogue, record_table
 from symtop.base.validate import SymtopError, SymtopWarning, finite, label, one_of, positive, whole
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, Momenta, SymmetricTop
+from symtop.model.view import View
 
 Array = NDArray[np.float64]
 
 
 class Plan(NamedTuple):
-    """What a solver is asked for: the sample times, and the step or the tolerance to reach them with."""
+    """What a solver is asked for: the sample times, and the step or the tolerance to reach them with.
 
-    times: Array  # increasing, the first may be 0
-    horizon: float
-    step_size: float  # horizon / steps exactly; nan for an adaptive method
-    marks: NDArray[np.int64]  # times / step_size; empty for an adaptive method
+    A fixed-step solver makes marks[-1] steps of `step_size` and keeps the states after marks[0], marks[1], ... of
+    them; `times` are the same instants. An adaptive solver has no marks: it keeps the states at `times`, which need not
+    be ends of its steps. The first sample may be the start itself (mark 0, time 0).
+
+    A fixed step may be negative: probes of reversibility ask for one step of -h, and then `times` and `horizon` are
+    negative too. A solver that cannot do that raises SymtopError and is judged by the motion with all rates reversed.
+    """
+
+    times: Array  # (samples,) increasing in size, the first may be 0
+    horizon: float  # elapsed time of the whole run
+    step_size: float  # nan for an adaptive method
+    marks: NDArray[np.int64]  # (samples,) whole steps, increasing; empty for an adaptive method
     tolerance: float  # nan for a fixed-step method
     budget: float | None = None  # of an adaptive method: force evaluations or Taylor steps; None for its own limit
+
+    @classmethod
+    def steps(cls, h: float, marks: ArrayLike, horizon: float | None = None) -> Self:
+        """Steps of h, sampled after `marks` of them; `horizon` if it is not their product to the last bit."""
+        whole_steps = np.asarray(marks, dtype=np.int64)
+        end = float(whole_steps[-1]) * h if horizon is None else horizon
+        return cls(np.multiply(whole_steps, h, dtype=float), end, h, whole_steps, math.nan)
+
+    @classmethod
+    def until(cls, times: ArrayLike, tolerance: float, budget: float | None = None) -> Self:
+        """To the last of `times` at a tolerance (nan for a method that has none), sampled at all of them."""
+        samples = np.asarray(times, dtype=float)
+        return cls(samples, float(samples[-1]), math.nan, np.empty(0, dtype=np.int64), tolerance, budget)
 
     def most(self, limit: float) -> float:
         """The budget, or a method's own limit where nobody gave one."""
@@ -39,11 +63,20 @@ class Plan(NamedTuple):
 
 
 class Run(NamedTuple):
-    """What a solver returns: states of its chart at the sample times, NaN after a failure."""
+    """What a solver returns: states of its chart at the sample times, NaN after a failure.
 
-    states: Array  # (samples, dimension of the chart)
-    p_phi: Array  # (samples,) recomputed from the trajectory
-    p_psi: Array
+        chart      a state
+        angles     theta, p_theta, phi, psi                   radians; phi and psi count whole turns
+        axis       e_x, e_y, e_z, L_x, L_y, L_z               both vectors in the space frame
+        attitude   w, x, y, z of q, and L_x, L_y, L_z         q turns body vectors into space vectors
+
+    p_phi and p_psi are recomputed from the trajectory (by the discrete Legendre transform, or as L_z and L.e) and never
+    copied from the start, so that a method that loses them shows it.
+    """
+
+    states: Array  # (samples, 4, 6 or 7)
+    p_phi: Array  # (samples,)
+    p_psi: Array  # (samples,)
     steps: int
     force_evaluations: int
     newton_iterations: int
@@ -52,11 +85,18 @@ class Run(NamedTuple):
 
 
 Solver = Callable[[SymmetricTop, Angles, Plan], Run]
+ModifiedEnergy = Callable[[View, Momenta, float], Array]  # of states (n, dimension), momenta of the start and h: (n,)
 
 FAMILIES = ("discrete-lagrangian", "splitting", "runge-kutta", "taylor", "library", "exact", "other")
 TIERS = ("compiled", "python")
 KNOBS = ("step_size", "tolerance", None)
 ENERGY_ERRORS = ("kept", "bounded", None)
+CONSERVED = ("energy", "p_phi", "p_psi", "axis_length", "cayley_energy")  # what a method may claim to conserve
+SMALLEST_FIRST = {
+    "nutation": ("angles", "axis", "attitude"),
+    "axis": ("axis", "angles", "attitude"),
+    "attitude": ("angles", "attitude"),
+}  # the charts that show it, in order of preference
 
 
 @dataclass(frozen=True)
@@ -65,7 +105,7 @@ class Integrator:
 
     `solvers` maps a chart (angles, axis, attitude) to a function. `knob` is what a user turns: ``step_size``,
     ``tolerance`` or nothing. `tier` says what executes the inner loop, so that languages are never ranked
-    against each other unsaid. `force_evaluations` is the cost of one step where it is constant.
+    against each other unsaid. Raises SymtopError for a field that makes no sense.
     """
 
     name: str
@@ -83,6 +123,10 @@ class Integrator:
     default_tolerance: float | None = None
     reference: str = ""
     energy_error: str | None = None  # "kept" or "bounded"; None says what follows from the other claims
+    modified_energy: ModifiedEnergy | None = None  # what it conserves to O(h^4) less the energy, in closed form
+    sleeps_from: Callable[[float], float] | None = None  # spin of the sleeping top (I1 = I3 = mgl = 1) at a step h
+    same_steps_as: str | None = None  # a compiled integrator that takes the same steps
+    speed: float = 1.0  # of a step, in units of others of its tier: 0.002 for arithmetic in software
 
     def __post_init__(self) -> None:
         label("name", self.name)
@@ -98,6 +142,12 @@ class Integrator:
         if not given or not set(given) <= {"angles", "axis", "attitude"} or not all(map(callable, given.values())):
             raise SymtopError(f"solvers must map one of angles, axis, attitude to a function, not {self.solvers!r}")
         object.__setattr__(self, "solvers", MappingProxyType(dict(self.solvers)))
+        positive("speed", self.speed)
+        if self.conserves is not None:
+            if isinstance(self.conserves, str) or not isinstance(self.conserves, Collection):
+                raise SymtopError(f"conserves must be a set of names, not {self.conserves!r}")
+            names = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in self.conserves)
+            object.__setattr__(self, "conserves", names)
 
     def _repr_html_(self) -> str:
         return record_table(self, (*_Integrators.columns, "charts", "reference"))
@@ -116,6 +166,26 @@ class Integrator:
     def charts(self) -> tuple[str, ...]:
         """The charts this integrator works in."""
         return tuple(self.solvers)
+
+    def chart_for(self, observe: str, among: Collection[str] | None = None) -> str:
+        """The smallest chart that shows the "nutation", the "axis" or the "attitude", one without poles if two tie.
+
+        `among` leaves out all other charts. Raises SymtopError if no chart is left.
+        """
+        for chart in SMALLEST_FIRST[observe]:
+            if chart in self.solvers and (among is None or chart in among):
+                return chart
+        raise SymtopError(f"{self.name} works in {', '.join(self.solvers)} and cannot show the {observe}")
+
+    def only(self, chart: str) -> "Integrator":
+        """The same integrator with nothing but its solver of one chart."""
+        return replace(self, solvers={chart: self.solvers[chart]})
+
+
+def solve(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+    """Run a method in one of its charts. A run that blows up is data: NumPy says nothing of overflow or NaN."""
+    with np.errstate(all="ignore"):
+        return method.solvers[chart](top, start, plan)
 
 
 _BUILT_IN = (
@@ -154,12 +224,12 @@ def _load_packages() -> None:
     """Integrators that installed packages announce; one that fails is named and left out."""
     for point in importlib.metadata.entry_points(group=ENTRY_POINTS):
         try:
-            found = point.load()
-            for entry in [found] if isinstance(found, Integrator) else found():
+            announced = point.load()
+            for entry in [announced] if isinstance(announced, Integrator) else announced():
                 _shipped.add(register(entry).name)
         except Exception as error:  # noqa: BLE001  (a stranger's package must not take the registry down)
-            said = f"the integrators of {point.value} are left out: {type(error).__name__}: {error}"
-            warnings.warn(said, SymtopWarning, stacklevel=4)
+            sentence = f"the integrators of {point.value} are left out: {type(error).__name__}: {error}"
+            warnings.warn(sentence, SymtopWarning, stacklevel=4)
 
 
 def register(entry: Integrator, *, replace: bool = False) -> Integrator:

@@ -106,6 +106,7 @@ def _entry(method: str, summary: str, order: int | None, reference: str, *, expl
         conserves=frozenset(),
         least_tolerance=LEAST_TOLERANCE,
         reference=reference,
+        same_steps_as="rk45-compiled" if method == "RK45" else None,
     )
 
 

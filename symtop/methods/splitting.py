@@ -13,7 +13,7 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters II.5 a
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from symtop.base.validate import SymtopError, finite, one_of, row
@@ -22,7 +22,7 @@ from symtop.methods import splitting_angles, splitting_space
 from symtop.methods.angles import reduced
 from symtop.methods.coefficients import Table
 from symtop.methods.fixed_step import fixed_step
-from symtop.methods.registry import Integrator
+from symtop.methods.registry import Integrator, ModifiedEnergy
 from symtop.methods.space import on_attitude, on_axis
 from symtop.methods.splitting_loop import Composition, closed
 from symtop.methods.splitting_space import ROTATIONS
@@ -65,6 +65,7 @@ def composition(
         )
     reads_same = all(row == row[::-1] for row in rule[:3])
     integrable = rotation != "exact" and rule.drift == (1.0,) and not any(rule.gradient) and not boost
+    modified, sleeps = _closed_forms(rule, rotation, boost, space=space)
     if space:
         stages = partial(splitting_space.stages, rule, rotation, boost)
         solvers = {
@@ -84,7 +85,25 @@ def composition(
         symmetric=reads_same,
         conserves=frozenset({"p_phi", "p_psi"} | ({"cayley_energy"} if integrable else set())),
         reference=reference,
+        modified_energy=modified,
+        sleeps_from=sleeps,
     )
+
+
+_CLOSED_FORMS: dict[str, tuple[ModifiedEnergy, Callable[[float], float]]] = {
+    "exact": (splitting_space.strang_energy, splitting_space.strang_sleeps_from),
+    "cayley": (splitting_space.cayley_correction, splitting_space.cayley_sleeps_from),
+}  # of kick-drift-kick in the space frame, by the rotation of a drift
+
+
+def _closed_forms(
+    rule: Composition, rotation: str, processor: float, *, space: bool
+) -> tuple[ModifiedEnergy | None, Callable[[float], float] | None]:
+    """The modified energy and the sleeping threshold that are known of a composition."""
+    plain = rule.drift == (1.0,) and rule.kick == (0.5, 0.5) and not any(rule.gradient) and not processor
+    if plain and space:
+        return _CLOSED_FORMS.get(rotation, (None, None))
+    return (splitting_angles.verlet_energy if plain else None), None
 
 
 def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] | None) -> Composition:

@@ -18,9 +18,11 @@ import numpy as np
 from symtop.methods.angles import chart_outcome
 from symtop.methods.compiled import register_jitable
 from symtop.methods.loop import driver
+from symtop.methods.registry import Array
 from symtop.methods.splitting_loop import Composition, Stages, compose
 from symtop.model import top as model
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, Momenta, SymmetricTop
+from symtop.model.view import View
 
 effective_force = register_jitable(model.effective_force)
 
@@ -92,3 +94,14 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 
 
 march = driver(begin, increment, observe)
+
+
+def verlet_energy(seen: View, momenta: Momenta, h: float) -> Array:
+    """What kick-drift-kick conserves to O(h^4), less the energy: h^2 (p^2 V''/12 I1^2 - V'^2/24 I1).
+
+    Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
+    """
+    top, p = seen.top, seen.p_theta
+    slope = top.potential_slope(seen.theta, momenta)
+    bend = (p / top.I1) ** 2 * top.potential_curvature(seen.theta, momenta)
+    return np.asarray(h * h * (bend / 12 - slope**2 / (24 * top.I1)))

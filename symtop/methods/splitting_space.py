@@ -40,12 +40,14 @@ from typing import Any
 
 import numpy as np
 
+from symtop.base.numbers import sign_changes
 from symtop.methods.compiled import register_jitable
 from symtop.methods.loop import driver
 from symtop.methods.registry import Array
 from symtop.methods.space import finite_outcome, observe_attitude, observe_axis
 from symtop.methods.splitting_loop import Composition, Stages, compose
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, Momenta, SymmetricTop
+from symtop.model.view import View, space_energy
 
 # sin(x)/x and (1 - cos(x))/x^2 in powers of -x^2; nine terms leave 1e-17 for |x| < 1
 SINE = tuple(1.0 / math.factorial(2 * k + 1) for k in range(9))
@@ -267,3 +269,34 @@ def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
 
 march_axis = driver(begin_axis, increment_axis, observe_axis, enter_axis, present_axis)
 march_attitude = driver(begin_attitude, increment_attitude, observe_attitude, enter_attitude, present_attitude)
+
+
+# ---- closed forms of kick-drift-kick ---------------------------------------------------------------------------------
+
+
+def strang_energy(seen: View, momenta: Momenta, h: float) -> Array:
+    """What kick-drift-kick with the exact drift conserves to O(h^4), less the energy: h^2 (V_tt/12 - |grad V|^2/24).
+
+    V_tt = mgl (L_z (L.e) - u |L|^2)/I1^2 is the second derivative of V along free motion, u = e_z, and |grad V|^2 =
+    mgl^2 (1 - u^2)/I1. Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
+    """
+    top, e, L = seen.top, seen.axis, seen.momentum
+    u, square = e[:, 2], np.sum(L * L, axis=1)
+    bent = top.mgl * (L[:, 2] * np.sum(L * e, axis=1) - u * square) / top.I1**2
+    return np.asarray(h * h * (bent / 12 - top.mgl**2 * (1.0 - u) * (1.0 + u) / (24 * top.I1)))
+
+
+def cayley_correction(seen: View, momenta: Momenta, h: float) -> Array:
+    """What kick-drift-kick with a Cayley drift conserves exactly (`cayley_energy` / I1), less the energy."""
+    top, e, L = seen.top, seen.axis, seen.momentum
+    return np.asarray(cayley_energy(top, h, 0.5 * h / top.I1, e, L) / top.I1 - space_energy(top, e, L, 0.0))
+
+
+def strang_sleeps_from(h: float) -> float:
+    """The spin w3 from which the upright top of I1 = I3 = mgl = 1 sleeps at a step h: w3 tan(w3 h/4) = h."""
+    return sign_changes(lambda a: a * math.tan(0.25 * a * h) - h, np.array([1.0, min(2.5, 1.9 * math.pi / h)]))[0]
+
+
+def cayley_sleeps_from(h: float) -> float:
+    """The same of a Cayley drift: w3^2 = 4 + h^2."""
+    return math.sqrt(4.0 + h * h)

@@ -22,6 +22,7 @@ from symtop.base.validate import SymtopError
 from symtop.methods.registry import Array, Integrator, Plan, Run, Solver
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop
+from symtop.model.view import space_momenta
 
 EPSILON = float(np.finfo(np.float64).eps)
 MOST_STEPS = {"double": 30_000_000, "longdouble": 5_000_000, "quad": 100_000}  # of one run: about two minutes
@@ -154,15 +155,6 @@ def _padded(values: Any, size: int) -> Array:
     return np.concatenate([shown, missing])
 
 
-def space_momenta(chart: str, states: Any) -> tuple[Any, Any]:
-    """p_phi = L_z and p_psi = L.e of states in a space-frame chart, in the precision of the states."""
-    if chart == "axis":
-        axis, momentum = states[:, :3], states[:, 3:]
-    else:
-        axis, momentum = charts.axis_from_quaternion(states[:, :4]), states[:, 4:]
-    return momentum[:, 2].copy(), (momentum * axis).sum(axis=-1)
-
-
 # beyond double there are no vector units, and quadruple precision is software: a step costs 12 and 500 times as much
 _SUMMARIES = {
     "double": "heyoka's Taylor series on the space-frame equations, without poles",
@@ -207,4 +199,5 @@ def _entry(precision: str, solvers: dict[str, Solver]) -> Integrator:
         least_tolerance=epsilon / 1000.0,
         default_tolerance=epsilon / 100.0,
         reference="biscani-izzo-2021",
+        speed=0.002 if precision == "quad" else 1.0,
     )

@@ -26,7 +26,8 @@ from symtop.model.top import Angles, SymmetricTop
 
 Array = NDArray[np.float64]
 
-CHARTS = ("angles", "axis", "attitude")
+DIMENSIONS = {"angles": 4, "axis": 6, "attitude": 7}  # of a state
+CHARTS = tuple(DIMENSIONS)
 
 
 def axis_from_angles(theta: Any, phi: Any) -> Array:

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from symtop.base.numbers import TINY
 from symtop.base.shown import Catalogue, record_table
 from symtop.base.validate import SymtopError, finite, label, one_of, positive
 from symtop.model.top import Angles, SymmetricTop
@@ -46,6 +47,22 @@ class Scene:
     def nutation_period(self) -> float:
         """Time of one full nutation; infinite on a separatrix."""
         return self.top.nutation_period(self.start)
+
+    def time_scale(self, horizon: float | None = None) -> float:
+        """The time on which the motion changes: a nutation, or an eighth of a horizon (the scene's) on a separatrix."""
+        period = self.nutation_period
+        return period if math.isfinite(period) else (self.horizon if horizon is None else horizon) / 8.0
+
+    @property
+    def energy_scale(self) -> float:
+        """E0 - min(mgl cos theta), what energy errors are divided by: a kinetic energy, never zero by accident."""
+        return max(self.top.energy(self.start) + abs(self.top.mgl), TINY)
+
+    @property
+    def momentum_scale(self) -> float:
+        """The larger of p_phi and p_psi in size, what the errors of both are divided by."""
+        momenta = self.top.momenta(self.start)
+        return max(abs(momenta.p_phi), abs(momenta.p_psi), TINY)
 
     def _repr_html_(self) -> str:
         return record_table(self, ("name", "purpose", "top", "start", "horizon", "nutation_period", "observes"))

@@ -18,14 +18,16 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters X.3 an
 
 import functools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from symtop.methods.registry import Integrator, Plan, Run, integrator
+from symtop.base.numbers import GOLDEN
+from symtop.methods.registry import Integrator, Plan, integrator, solve
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
+from symtop.model.view import view
 
 STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these, 0.05 to 3 ms
 AT_LEAST = 0.25  # of them a probe takes in any case, up to the whole run
@@ -33,11 +35,9 @@ SHARE = 0.1  # of the run, which a probe may always take, but no more than the n
 MOST_NUTATIONS = 20.0
 MOST_STEPS = 20_000  # 0.6 ms of Stormer-Verlet
 POINTS = 300  # of a probe that are compared with the closed form
-GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
 PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
 LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nutation: a few of its steps, milliseconds
-TWINS = {"rk45": "rk45-compiled"}  # takes the same steps in a hundredth of the time
 LEAST_GROWTH = 0.05  # of the error of a piece: less growth from the first to the second is luck
 RESOLVED = 0.3  # rad that the axis may precess in one step at a pole: coarser probes say nothing about the passage
 ASIDE = 1e-5  # rad; how far a step map's starts are set aside, which leaves 1e-10 of its entries
@@ -101,17 +101,6 @@ class Forecast(NamedTuple):
     reached: float
 
 
-def _run(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-    with np.errstate(all="ignore"):
-        return method.solvers[chart](top, start, plan)
-
-
-def _axis(chart: str, states: Any) -> charts.Array:
-    if chart == "angles":
-        return charts.axis_from_angles(states[:, 0], states[:, 2])
-    return states[:, :3] if chart == "axis" else charts.axis_from_quaternion(states[:, :4])
-
-
 def _probe(
     scene: Scene, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
 ) -> Probe:
@@ -124,13 +113,14 @@ def _probe(
     if method.knob == "step_size":
         steps = max(1, round(duration / step))
         marks = np.unique(np.maximum(np.rint(place * (steps / POINTS)).astype(np.int64), 1))
-        piece = Plan(marks * step, steps * step, step, marks, math.nan)
+        piece = Plan.steps(step, marks)
     else:
-        times = duration * (place / POINTS)
-        piece = Plan(times, duration, math.nan, np.empty(0, dtype=np.int64), plan.tolerance)
-    run = _run(method, chart, scene.top, start, piece)
+        piece = Plan.until(duration * (place / POINTS), plan.tolerance)
+    run = solve(method, chart, scene.top, start, piece)
     with np.errstate(all="ignore"):
-        error = charts.axis_distance(_axis(chart, np.asarray(run.states)), form.axis(since + piece.times))
+        error = charts.axis_distance(
+            view(chart, scene.top, np.asarray(run.states)).axis, form.axis(since + piece.times)
+        )
     error[~np.isfinite(error)] = math.inf
     outcome = "not_finite" if run.outcome == "ok" and not np.isfinite(error).all() else run.outcome
     return Probe(piece.times, error, outcome, since + run.reached)
@@ -166,7 +156,7 @@ def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
     period = marks.period if math.isfinite(marks.period) else plan.horizon
     share, twice = min(SHARE * plan.horizon, MOST_NUTATIONS * period), min(2.0 * period, plan.horizon)
     if method.knob == "tolerance":
-        cheap = integrator(TWINS[method.name]) if method.tier == "python" and method.name in TWINS else method
+        cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
         least = twice if cheap.tier == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
         piece = max(share, least)
         partial = piece < min(period, 0.5 * plan.horizon)
@@ -221,15 +211,16 @@ def step_map(scene: Scene, method: Integrator, chart: str, step: float) -> chart
         return None
     columns = []
     size = np.array([1.0, top.I1 * marks.frequency])
-    plan = Plan(np.array([step]), step, step, np.array([1]), math.nan)
+    plan = Plan.steps(step, [1])
     for aside, nod in ((ASIDE, 0.0), (0.0, ASIDE * marks.frequency)):
         ends = []
         for sign in (1.0, -1.0):
             start = _with_momenta(top, theta + sign * aside, sign * nod, momenta.north, momenta.south)
-            run = _run(method, chart, top, start, plan)
+            run = solve(method, chart, top, start, plan)
             if run.outcome != "ok":
                 return None
-            ends.append(_reduced(chart, run.states[0]))
+            seen = view(chart, top, np.asarray(run.states)[0])
+            ends.append(np.array([seen.theta, seen.p_theta]))
         columns.append((ends[0] - ends[1]) / (2.0 * ASIDE * size))
     found = np.stack(columns, axis=1)
     return found if np.isfinite(found).all() else None
@@ -241,12 +232,3 @@ def _with_momenta(top: SymmetricTop, theta: float, theta_dot: float, north: floa
     precession = (north / math.sin(x) ** 2 + south / math.cos(x) ** 2) / (4.0 * top.I1)
     spin = 0.5 * (south - north) / top.I3 - precession * math.cos(theta)
     return Angles(theta, theta_dot=theta_dot, phi_dot=precession, psi_dot=spin)
-
-
-def _reduced(chart: str, state: Any) -> charts.Array:
-    """theta and p_theta of one state."""
-    if chart == "angles":
-        return np.asarray(state[:2], dtype=np.float64)
-    axis, momentum = _axis(chart, np.asarray(state)[None])[0], np.asarray(state)[-3:]
-    phi = charts.phi_from_axis(axis)
-    return np.array([charts.theta_from_axis(axis), momentum[0] * np.cos(phi) + momentum[1] * np.sin(phi)])

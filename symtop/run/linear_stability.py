@@ -17,15 +17,15 @@ sections I.5 and X.4 (stability, resonance); Arnold, Mathematical Methods of Cla
 """
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from symtop.methods.registry import Integrator, Plan, Run
-from symtop.model import charts
+from symtop.base.numbers import sign_changes
+from symtop.methods.registry import Integrator, Plan, Run, integrator, solve
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
+from symtop.model.view import view
 
 NUDGE = 1e-6  # rad: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
 TILT = 1e-5  # rad, of the sleeping top
@@ -34,25 +34,18 @@ STEPS = 4
 
 def few_steps(method: Integrator, chart: str, top: SymmetricTop, start: Angles, h: float, steps: int = STEPS) -> Run:
     """The states after 0, 1, ... `steps` steps, as the chart has them."""
-    marks = np.arange(steps + 1, dtype=np.int64)
-    with np.errstate(all="ignore"):
-        return method.solvers[chart](
-            top, start, Plan(np.multiply(h, marks, dtype=float), h * steps, h, marks, math.nan)
-        )
+    return solve(method, chart, top, start, Plan.steps(h, np.arange(steps + 1)))
 
 
 def chart_of(method: Integrator) -> str:
-    """The smallest chart of a method that shows the axis, one without poles if there is one."""
-    return next(chart for chart in ("axis", "angles", "attitude") if chart in method.solvers)
+    """The smallest chart that shows the axis (alias for studies/stability: `Integrator.chart_for` says it)."""
+    return method.chart_for("axis")
 
 
-def inclination(chart: str, states: np.ndarray) -> np.ndarray:
-    """theta of states of a chart."""
-    if chart == "angles":
-        return np.asarray(states[:, 0])
-    axis = states[:, :3] if chart == "axis" else charts.axis_from_quaternion(states[:, :4])
+def inclination(chart: str, states: np.ndarray, top: SymmetricTop | None = None) -> np.ndarray:
+    """theta of states of a chart (alias for studies/stability: `view` says it)."""
     with np.errstate(over="ignore"):  # a run may have blown up
-        return charts.theta_from_axis(axis)
+        return np.asarray(view(chart, top or SymmetricTop(1.0, 1.0, 1.0), states).theta)
 
 
 def with_momenta(top: SymmetricTop, theta: float, momenta: Momenta) -> Angles:
@@ -83,14 +76,15 @@ NO_TRACE = Trace(math.nan, math.nan, math.nan)
 def trace(method: Integrator, scene: Scene, h: float, rounds: int = 6) -> Trace:
     """The trace of the map of one step h at the fixed point that the method has near a steady precession."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
-    chart, standing = chart_of(method), scene.start.theta
+    chart, standing = method.chart_for("axis"), scene.start.theta
     theta, found, moved = standing, NO_TRACE, math.inf
     for _ in range(rounds):
         if not 1e-3 < theta < math.pi - 1e-3:
             return NO_TRACE
         start = with_momenta(top, theta + NUDGE, momenta)
         run = few_steps(method, chart, top, start, h)
-        y = inclination(chart, run.states) - theta
+        with np.errstate(over="ignore"):  # the run may have blown up
+            y = np.asarray(view(chart, top, run.states).theta) - theta
         if run.outcome != "ok" or not np.isfinite(y).all():
             return NO_TRACE
         t, d, c = _recurrence(y, symmetric=bool(method.symmetric))
@@ -124,7 +118,7 @@ def sleep_margin(method: Integrator, spin: float, h: float, top: SymmetricTop | 
     the top by half a turn), are both simple sign changes.
     """
     body = top or SymmetricTop(1.0, 1.0, 1.0)
-    chart = chart_of(method)
+    chart = method.chart_for("axis")
     p_psi = body.I3 * spin
     if chart == "angles":  # p_phi = p_psi: the axis would pass through the pole, and V is a parabola
         rate = p_psi / (2.0 * body.I1 * math.cos(0.5 * TILT) ** 2)
@@ -142,24 +136,6 @@ def sleep_margin(method: Integrator, spin: float, h: float, top: SymmetricTop | 
     t, d = (z[1] * z[2] - z[0] * z[3]) / base, (z[2] * z[2] - z[1] * z[3]) / base
     x = float((t * t / (4.0 * d)).real)
     return 4.0 * x * (1.0 - x)
-
-
-def sign_changes(function: Callable[[float], float], grid: np.ndarray, tolerance: float = 1e-12) -> list[float]:
-    """Where a function changes its sign between neighbours of a grid, by bisection; jumps through NaN do not count."""
-    values = [function(float(x)) for x in grid]
-    found = []
-    for left, right, low, high in zip(grid[:-1], grid[1:], values[:-1], values[1:], strict=True):
-        if not (math.isfinite(low) and math.isfinite(high)) or (low > 0.0) == (high > 0.0):
-            continue
-        a, b = float(left), float(right)
-        while b - a > tolerance * max(1.0, abs(b)):
-            middle = 0.5 * (a + b)
-            value = function(middle)
-            if not math.isfinite(value):
-                break
-            a, b = (middle, b) if (value > 0.0) == (low > 0.0) else (a, middle)
-        found.append(0.5 * (a + b))
-    return found
 
 
 def sleeping_threshold(method: Integrator, h: float) -> float:
@@ -209,10 +185,10 @@ def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[f
     return limit, third if method.symmetric and not third > limit else math.nan
 
 
-def sleeping_threshold_in_theory(name: str, h: float) -> float:
-    """The threshold of `sleeping_threshold` in closed form, for `strang` and `cayley`; 2 is that of the motion."""
-    if name == "cayley":
-        return math.sqrt(4.0 + h * h)
-    if name != "strang":
-        return 2.0
-    return sign_changes(lambda a: a * math.tan(0.25 * a * h) - h, np.array([1.0, min(2.5, 1.9 * math.pi / h)]))[0]
+def sleeping_threshold_in_theory(method: "str | Integrator", h: float) -> float:
+    """The threshold of `sleeping_threshold` in closed form where one is known (`Integrator.sleeps_from`).
+
+    2, that of the motion, where none is.
+    """
+    sleeps_from = integrator(method).sleeps_from
+    return 2.0 if sleeps_from is None else sleeps_from(h)

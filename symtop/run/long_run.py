@@ -13,7 +13,6 @@ windows end is fixed by the number of steps alone, so that a resumed run has the
 import contextlib
 import hashlib
 import json
-import math
 import signal
 import threading
 import time
@@ -28,17 +27,18 @@ from tqdm import tqdm
 
 from symtop.base import datasets
 from symtop.base.ingredients import Ingredients
+from symtop.base.numbers import GOLDEN
 from symtop.base.validate import SymtopError, positive, whole
-from symtop.measure import modified_energy as shadow
-from symtop.measure.errors import energy_scale, momentum_scale
 from symtop.methods.compiled import cache_root, source_digest
 from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.loop import Loop, Position
 from symtop.methods.outcomes import OK, OUTCOMES, sentence
-from symtop.methods.registry import Integrator, integrator
-from symtop.model import charts
+from symtop.methods.registry import Integrator
+from symtop.methods.registry import integrator as find_integrator
 from symtop.model.scenes import Scene
 from symtop.model.scenes import scene as find_scene
+from symtop.model.view import view
+from symtop.run import modified_energy as modified
 from symtop.run.simulation import MOST_STEPS
 
 Array = np.ndarray
@@ -65,51 +65,51 @@ def windows(steps: int) -> list[int]:
 def scattered(begin: int, end: int, samples: int = SAMPLES) -> Array:
     """At most `samples` whole steps in (begin, end], `end` among them, with strides of no fixed ratio."""
     place = np.arange(samples, dtype=float)
-    place += np.mod(0.5 * (math.sqrt(5.0) - 1.0) * place, 1.0)
+    place += np.mod(GOLDEN * place, 1.0)
     marks = begin + 1 + np.floor(place * ((end - begin) / samples)).astype(np.int64)
     return np.unique(np.append(marks[marks <= end], end))
 
 
 def chart_of(method: Integrator) -> tuple[str, FixedStep]:
     """The smallest chart in which a method has a compiled loop of fixed steps, and the loop."""
-    for chart in ("axis", "angles", "attitude"):
-        found = inside(method.solvers[chart]) if chart in method.solvers else None
-        if found is not None:
-            return chart, found
-    raise SymtopError(f"{method.name} has no compiled loop of fixed steps, so that it cannot be run in stretches")
+    loops = {chart: loop for chart, solver in method.solvers.items() if (loop := inside(solver)) is not None}
+    if not loops:
+        raise SymtopError(f"{method.name} has no compiled loop of fixed steps, so that it cannot be run in stretches")
+    chart = method.chart_for("axis", among=loops)
+    return chart, loops[chart]
 
 
-def watch(where: Scene, method: Integrator, h: float) -> Gauge:
+def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     """Relative changes of energy, modified energy and momenta since the start, and theta, of any samples of a run.
 
-    The oscillation that the modified energy leaves is fitted on the first `FIRST` steps (`shadow`), which are run here.
+    The oscillation that the modified energy leaves is fitted on the first `FIRST` steps, which are run here.
     """
     chart, solver = chart_of(method)
-    par, rule, state = solver.setup(where.top, where.start, h)
+    par, rule, state = solver.setup(scene.top, scene.start, h)
     assert isinstance(solver.loop, Loop)  # noqa: S101
-    scale, unit, start = energy_scale(where), momentum_scale(where), where.top.momenta(where.start)
+    energy_unit, momentum_unit, start = scene.energy_scale, scene.momentum_scale, scene.top.momenta(scene.start)
 
-    def shown(states: Array) -> Array:
+    def presented(states: Array) -> Array:
         return states if solver.present is None else solver.present(par, np.zeros(len(states)), states)
 
-    first = shown(solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES)).states)
+    first = presented(solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES)).states)
     first = first[np.isfinite(first).all(axis=1)]  # a run may fail in its first steps
-    seen = shown(solver.loop(par, rule, state, h, np.array([0])).states)
-    first = first if len(first) else seen
-    energy_start = float(shadow.energy(where, chart, seen)[0])
-    curve = shadow.oscillation(
-        *shadow.section(chart, first), shadow.modified_energy(where, method.name, chart, first, h)
+    at_start = presented(solver.loop(par, rule, state, h, np.array([0])).states)
+    first = first if len(first) else at_start
+    energy_start = float(modified.energy(scene, chart, at_start)[0])
+    curve = modified.oscillation(
+        *modified.section(chart, first), modified.modified_energy(scene, method, chart, first, h)
     )
 
     def gauge(states: Array, momenta: Array) -> dict[str, Array]:
-        states = shown(states)
-        modified = shadow.modified_energy(where, method.name, chart, states, h)
+        states = presented(states)
+        values = modified.modified_energy(scene, method, chart, states, h)
         return {
-            "energy": (shadow.energy(where, chart, states) - energy_start) / scale,
-            "modified_energy": curve.rest(*shadow.section(chart, states), modified) / scale,
-            "p_phi": (momenta[:, 0] - start.p_phi) / unit,
-            "p_psi": (momenta[:, 1] - start.p_psi) / unit,
-            "theta": states[:, 0] if chart == "angles" else charts.theta_from_axis(states[:, :3]),
+            "energy": (modified.energy(scene, chart, states) - energy_start) / energy_unit,
+            "modified_energy": curve.rest(*modified.section(chart, states), values) / energy_unit,
+            "p_phi": (momenta[:, 0] - start.p_phi) / momentum_unit,
+            "p_psi": (momenta[:, 1] - start.p_psi) / momentum_unit,
+            "theta": view(chart, scene.top, states).theta,
         }
 
     return gauge
@@ -117,7 +117,7 @@ def watch(where: Scene, method: Integrator, h: float) -> Gauge:
 
 def long_run(
     scene: "str | Scene",
-    integrator_: "str | Integrator",
+    integrator: "str | Integrator",
     *,
     steps: int,
     step_size: float,
@@ -127,7 +127,7 @@ def long_run(
 ) -> xr.Dataset:
     """Run a fixed-step method for any number of steps and return what it did, window by window.
 
-    Dimension ``window``; ``steps`` is where each ends. For each of energy, modified_energy, p_phi, p_psi (relative
+    Dimension ``window``; ``steps`` is chosen each ends. For each of energy, modified_energy, p_phi, p_psi (relative
     changes since the start) and theta (rad): ``NAME_least``, ``NAME_largest``, ``NAME_mean``. `checkpoint` is a file
     that is written as the run goes on and removed at its end, or True for one in symtop's cache: an interrupted run
     resumes from it.
@@ -135,21 +135,21 @@ def long_run(
 
     Raises SymtopError for a method without a compiled loop and for a checkpoint of another run.
     """
-    where, method = find_scene(scene), integrator(integrator_)
+    chosen, method = find_scene(scene), find_integrator(integrator)
     count, h = whole("steps", steps, 1), positive("step_size", step_size)
     if count > MOST_STEPS:
         raise SymtopError(f"steps must be at most {MOST_STEPS}, not {count}")
     _, solver = chart_of(method)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     loop = solver.loop if compensated else solver.loop.plain()
-    par, rule, state = solver.setup(where.top, where.start, h)
-    book = _Book(checkpoint, _identity(where, method, h, count, compensated))
+    par, rule, state = solver.setup(chosen.top, chosen.start, h)
+    book = _Book(checkpoint, _identity(chosen, method, h, count, compensated))
     at, rows = book.resumed(loop.begun(par, rule, state, h))
     ends, outcome, reached = windows(count), OK, at.k
-    gauge = watch(where, method, h) if len(rows) < len(ends) else None
+    gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
     with (
         book.kept(),
-        tqdm(total=count, initial=at.k, desc=f"{method.name} on {where.name}", unit="step", unit_scale=True,
+        tqdm(total=count, initial=at.k, desc=f"{method.name} on {chosen.name}", unit="step", unit_scale=True,
              disable=quiet or None, leave=False) as bar,
     ):  # fmt: skip
         while gauge is not None and len(rows) < len(ends) and outcome == OK:
@@ -162,15 +162,15 @@ def long_run(
                 book.note(at, rows)
     book.close()
     columns = np.array(rows).reshape(len(rows), len(QUANTITIES), 3)
-    found: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
+    variables: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
     for i, name in enumerate(QUANTITIES):
         for m, part in enumerate(("least", "largest", "mean")):
-            found[f"{name}_{part}"] = ("window", columns[:, i, m])
+            variables[f"{name}_{part}"] = ("window", columns[:, i, m])
     return datasets.describe(
-        xr.Dataset(found),
-        title=f"{method.name} on {where.name}, {count} steps",
+        xr.Dataset(variables),
+        title=f"{method.name} on {chosen.name}, {count} steps",
         integrator=method.name,
-        scene=where.name,
+        scene=chosen.name,
         step_size=h,
         horizon=count * h,
         compensated=str(compensated).lower(),

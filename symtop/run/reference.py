@@ -25,6 +25,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from symtop.base import datasets
+from symtop.base.numbers import EPSILON, TINY
 from symtop.base.validate import SymtopError, SymtopWarning, one_of
 from symtop.methods import taylor
 from symtop.model import charts
@@ -35,7 +36,6 @@ PRECISIONS = ("closed-form", "double", "longdouble", "quad")
 CHECKS = 16
 DIGITS = 40
 SAFETY = 8.0
-EPSILON = float(np.finfo(np.float64).eps)
 OVERLAP = 100.0  # time over which the closed form is compared with an integration each time it is used
 SUSPICIOUS = 1e-12  # a disagreement beyond this is an error of one of them, not rounding
 MOST_CACHED = 200_000  # times; larger results are not kept on disk
@@ -243,7 +243,7 @@ def _bounds(
 ) -> dict[str, charts.Array]:
     """Error bounds from the checks; `overlap` counts in full if the closed form and an integration disagree."""
     doubt = overlap if overlap > SUSPICIOUS else 0.0
-    sine = np.maximum(np.sin(found["theta"]), np.finfo(float).tiny)
+    sine = np.maximum(np.sin(found["theta"]), TINY)
     axis = _envelope(checks, "axis", times) + grain + doubt
     attitude = _envelope(checks, "attitude", times) + grain + doubt
     # an error of the axis turns phi by 1/sin(theta) of it, and psi by the rest of the attitude's error

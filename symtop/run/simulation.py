@@ -15,31 +15,29 @@ import numpy as np
 import xarray as xr
 
 from symtop.base import datasets
+from symtop.base.numbers import GOLDEN
 from symtop.base.validate import SymtopError, SymtopWarning, one_of, positive, whole
 from symtop.methods.outcomes import OUTCOMES, sentence
-from symtop.methods.registry import Integrator, Plan, Run, integrator
+from symtop.methods.registry import Integrator, Plan, Run, integrator, solve
 from symtop.model import charts
 from symtop.model.scenes import OBSERVABLES, Scene, closed_form, scene
 from symtop.model.top import Angles, SymmetricTop
+from symtop.model.view import space_energy, view
 from symtop.run.guard import warning
+
+__all__ = [
+    "as_dataset", "choose_chart", "make_plan", "sample_times", "simulate", "solve_plan",
+    "space_energy",  # alias for studies/stability
+]  # fmt: skip
 
 MOST_STEPS = 20_000_000_000  # ten minutes of the fastest kernel
 MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
 WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
 
-_PREFERENCE = {
-    "nutation": ("angles", "axis", "attitude"),
-    "axis": ("axis", "angles", "attitude"),
-    "attitude": ("angles", "attitude"),
-}
-
 
 def choose_chart(method: Integrator, observe: str) -> str:
-    """The smallest chart of the integrator that shows what is observed."""
-    for chart in _PREFERENCE[observe]:
-        if chart in method.solvers:
-            return chart
-    raise SymtopError(f"{method.name} works in {', '.join(method.solvers)} and cannot show the {observe}")
+    """The smallest chart that shows what is observed (alias for studies and benchmarks of `Integrator.chart_for`)."""
+    return method.chart_for(observe)
 
 
 def _unseen(times: Any, period: float) -> float:
@@ -57,8 +55,7 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
     for dithered in (False, True):
         place: Any = np.arange(samples, dtype=float)
         if dithered:
-            golden = 0.5 * (math.sqrt(5.0) - 1.0)
-            place[1:last] += np.mod(golden * place[1:last], 1.0) - 0.5
+            place[1:last] += np.mod(GOLDEN * place[1:last], 1.0) - 0.5
         if steps is None:
             marks, times = np.empty(0, dtype=np.int64), horizon * (place / last)
         else:
@@ -95,8 +92,8 @@ def make_plan(
                 f"step_size {step!r} asks for {horizon / step:.3g} steps; the limit is {most:.3g} (see budget)"
             )
         steps = max(1, round(horizon / step))
-        times, marks, dithered = sample_times(horizon, samples, period, steps)
-        return Plan(times, horizon, horizon / steps, marks, math.nan), dithered
+        _, marks, dithered = sample_times(horizon, samples, period, steps)
+        return Plan.steps(horizon / steps, marks, horizon), dithered
     if step_size is not None:
         raise SymtopError(f"{method.name} chooses its own steps: give tolerance, not step_size = {step_size!r}")
     if method.knob is None and tolerance is not None:
@@ -107,8 +104,8 @@ def make_plan(
         raise SymtopError(
             f"horizon {horizon!r} is {swings:.3g} swings of the top; an adaptive method may take {MOST_SWINGS:.3g}"
         )
-    times, marks, dithered = sample_times(horizon, samples, period)
-    return Plan(times, horizon, math.nan, marks, bound, budget), dithered
+    times, _, dithered = sample_times(horizon, samples, period)
+    return Plan.until(times, bound, budget), dithered
 
 
 def simulate(
@@ -146,7 +143,7 @@ def simulate(
     count = whole("samples", samples, 2)
     if count > MOST_SAMPLES:
         raise SymtopError(f"samples must be at most {MOST_SAMPLES}, not {count}")
-    chart = choose_chart(method, watched)
+    chart = method.chart_for(watched)
     limit = None if budget is None else positive("budget", budget)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, end, count, limit)
     said = warning(chosen, method, chart, plan) if guard is not False else "off"
@@ -179,14 +176,13 @@ def simulate(
     )
 
 
-DIMENSIONS = {"angles": 4, "axis": 6, "attitude": 7}
 MOST_SAMPLES = 10_000_000
 
 
 def solve_plan(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan, where: str = "") -> Run:
     """What a solver makes of a plan, checked; SymtopError if it breaks or returns something else."""
     try:
-        return _checked(method, chart, plan, method.solvers[chart](top, start, plan))
+        return _checked(method, chart, plan, solve(method, chart, top, start, plan))
     except SymtopError:
         raise
     except Exception as error:
@@ -196,7 +192,7 @@ def solve_plan(method: Integrator, chart: str, top: SymmetricTop, start: Angles,
 
 def _checked(method: Integrator, chart: str, plan: Plan, run: object) -> Run:
     """What a solver returned, if it is what a solver returns; NaN before the end is an outcome of its own."""
-    shape = (plan.times.size, DIMENSIONS[chart])
+    shape = (plan.times.size, charts.DIMENSIONS[chart])
     if not isinstance(run, Run) or np.shape(run.states) != shape or np.iscomplexobj(run.states):
         found = np.shape(run.states) if isinstance(run, Run) else type(run).__name__
         raise SymtopError(f"integrator {method.name} must return a Run with real states of shape {shape}, not {found}")
@@ -218,7 +214,7 @@ _scene, _integrator = scene, integrator  # the public argument names shadow thes
 def as_dataset(scene: Scene, chart: str, plan: Plan, run: Run) -> xr.Dataset:
     """The observables of a run, whatever chart it was computed in."""
     with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up, and that is a result
-        columns = {"angles": _from_angles, "axis": _from_axis, "attitude": _from_attitude}[chart](scene, plan, run)
+        columns = _columns(scene, chart, plan, run)
     components = {"axis": "component", "quaternion": "part"}
     variables = {
         name: (("time", components[name]) if name in components else "time", values) for name, values in columns.items()
@@ -229,60 +225,20 @@ def as_dataset(scene: Scene, chart: str, plan: Plan, run: Run) -> xr.Dataset:
     return xr.Dataset(variables, coords=coordinates)
 
 
-def _from_angles(scene: Scene, plan: Plan, run: Run) -> dict[str, Any]:  # noqa: ARG001
-    theta, p_theta, phi, psi = run.states.T
+def _columns(scene: Scene, chart: str, plan: Plan, run: Run) -> dict[str, Any]:
+    """The variables of a run by name; phi and psi made continuous where the chart has them modulo a turn."""
+    seen = view(chart, scene.top, run.states, run.p_phi, run.p_psi)
+    angles = {"phi": seen.phi} if seen.psi is None else {"phi": seen.phi, "psi": seen.psi}
+    if chart != "angles":
+        truth = closed_form(scene)(plan.times)
+        angles = {name: charts.unwrapped(values, getattr(truth, name)) for name, values in angles.items()}
     return {
-        "theta": theta,
-        "phi": phi,
-        "psi": psi,
-        "axis": charts.axis_from_angles(theta, phi),
-        "energy": scene.top.reduced_energy(theta, p_theta, run.p_phi, run.p_psi),
-        "p_theta": p_theta,
-        "p_phi": run.p_phi,
-        "p_psi": run.p_psi,
-    }
-
-
-def space_energy(top: SymmetricTop, axis: Any, momentum: Any, p_psi: Any) -> Any:
-    """Energy of space-frame states: |L|^2/2 I1 + p_psi^2 (1/I3 - 1/I1)/2 + mgl e_z."""
-    return (
-        np.sum(momentum * momentum, axis=-1) / (2.0 * top.I1)
-        + 0.5 * p_psi**2 * (1.0 / top.I3 - 1.0 / top.I1)
-        + top.mgl * axis[..., 2]
-    )
-
-
-def _from_axis(scene: Scene, plan: Plan, run: Run) -> dict[str, Any]:
-    axis, momentum = run.states[:, :3], run.states[:, 3:]
-    phi = charts.phi_from_axis(axis)
-    node = momentum[:, 0] * np.cos(phi) + momentum[:, 1] * np.sin(phi)
-    truth = closed_form(scene)(plan.times)
-    return {
-        "theta": charts.theta_from_axis(axis),
-        "phi": charts.unwrapped(phi, truth.phi),
-        "axis": axis,
-        "energy": space_energy(scene.top, axis, momentum, run.p_psi),
-        "p_theta": node,
-        "p_phi": run.p_phi,
-        "p_psi": run.p_psi,
-    }
-
-
-def _from_attitude(scene: Scene, plan: Plan, run: Run) -> dict[str, Any]:
-    quaternion, momentum = run.states[:, :4], run.states[:, 4:]
-    theta, phi, psi = charts.angles_from_quaternion(quaternion)
-    node = momentum[:, 0] * np.cos(phi) + momentum[:, 1] * np.sin(phi)  # before phi grows and loses digits
-    truth = closed_form(scene)(plan.times)
-    phi, psi = charts.unwrapped(phi, truth.phi), charts.unwrapped(psi, truth.psi)
-    axis = charts.axis_from_quaternion(quaternion)
-    return {
-        "theta": theta,
-        "phi": phi,
-        "psi": psi,
-        "axis": axis,
-        "quaternion": quaternion,
-        "energy": space_energy(scene.top, axis, momentum, run.p_psi),
-        "p_theta": node,
+        "theta": seen.theta,
+        **angles,
+        "axis": seen.axis,
+        **({"quaternion": seen.quaternion} if chart == "attitude" else {}),
+        "energy": seen.energy,
+        "p_theta": seen.p_theta,
         "p_phi": run.p_phi,
         "p_psi": run.p_psi,
     }

@@ -10,7 +10,7 @@ import symtop
 from symtop.measure import verdicts
 from symtop.measure.accuracy import error_table, ladder
 from symtop.measure.conservation import trend
-from symtop.measure.errors import errors
+from symtop.measure.errors import errors_against
 from symtop.measure.growth import growth
 from symtop.measure.order import order
 from symtop.measure.timing import Timing, timings
@@ -87,7 +87,7 @@ def test_errors_are_scaled_by_what_they_say():
     where = symtop.scene("goldstein")
     run = symtop.simulate(where, "exact", samples=5)
     truth = reference(where, run["time"].values, "closed-form")
-    found = errors(where, run.assign(p_phi=run["p_phi"] + 0.5, energy=run["energy"] + 0.16), truth)
+    found = errors_against(where, run.assign(p_phi=run["p_phi"] + 0.5, energy=run["energy"] + 0.16), truth)
     assert found["p_phi"].values == pytest.approx(0.5 / 5.0, rel=1e-12)  # the larger momentum is p_psi = 5
     assert found["energy"].values == pytest.approx(0.16 / (where.top.energy(where.start) + 2.0), rel=1e-10)
 

@@ -10,7 +10,7 @@ from symtop_studies.stability.mechanisms import family_limits, map_table
 from symtop_studies.stability.outcome_maps import NOT_RUN, family, ladder, outcome_map, row, spin_unit, with_spin
 
 import symtop
-from symtop.measure.errors import errors
+from symtop.measure.errors import errors_against
 from symtop.measure.verdicts import VERDICTS, verdict
 from symtop.methods.registry import integrator, integrators
 from symtop.model.scenes import closed_form, scene
@@ -35,7 +35,7 @@ def test_a_map_says_what_single_runs_say(name):
                 where, name, step_size=value * where.nutation_period, horizon=horizon, samples=241, observe="axis",
                 guard=False,
             )  # fmt: skip
-            error = errors(where, run, reference(where, run["time"].values, "closed-form"))["axis"].values
+            error = errors_against(where, run, reference(where, run["time"].values, "closed-form"))["axis"].values
             mapped = VERDICTS[found.verdict[place, column]]
             single = verdict(where, run, error)
             assert (mapped == "accurate") == (single == "accurate"), (ratio, value, mapped, single)

@@ -1,0 +1,98 @@
+"""Modified energies: what a symplectic method conserves in place of the energy, so that rounding can be seen.
+
+The energy of a method of order 2 oscillates by C h^2 as long as it runs; a drift of 1e-15 drowns in that. Two layers of
+it come off. The first is known in closed form, for kick-drift-kick splittings H = T + V and for the midpoint rule:
+
+    kick-drift-kick       H + h^2 (V_tt / 12 - |grad V|^2 / 24),  V_tt the second derivative of V along free motion
+      stormer-verlet      V_tt = p^2 V''/I1^2,                       |grad V|^2 = V'^2 / I1
+      strang              V_tt = mgl (L_z (L.e) - u |L|^2) / I1^2,   |grad V|^2 = mgl^2 (1 - u^2) / I1
+    midpoint              H - h^2 (p^2 V''/I1^2 + V'^2 / I1) / 24
+    cayley                exactly conserved: `splitting_space.cayley_energy` / I1
+
+and leaves C h^4 (nothing for cayley). Each form stands with its kernel family and is a field of the record,
+`Integrator.modified_energy`. The second is whatever remains: the motion has one degree of freedom, a
+symplectic map stays on a closed curve of its (theta, p_theta), or of (u, u') with u = cos(theta), and any function of
+the state is on that curve a periodic function of the angle about its middle. A Fourier series in that angle, fitted to
+the first nutations of a run, takes it off to 5e-17, which is the rounding of one sample; only what moves the curve
+remains, and the mean of 512 samples shows 2e-18 of it.
+Source of the first layer: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from symtop.methods.registry import Integrator, integrator
+from symtop.model.scenes import Scene
+from symtop.model.view import axis_of, view
+
+Array = np.ndarray
+HARMONICS = 40
+
+
+def energy(scene: Scene, chart: str, states: Array) -> Array:
+    """The energy of kernel states (n, dimension) with the momenta of the start, less its constant parts."""
+    return np.asarray(view(chart, scene.top, states).nutation_energy(scene.top.momenta(scene.start)))
+
+
+def modified_energy(scene: Scene, method: "str | Integrator", chart: str, states: Array, h: float) -> Array:
+    """The modified energy of kernel states (n, dimension) up to O(h^4), less constants; H where none is known."""
+    plain, correction = energy(scene, chart, states), integrator(method).modified_energy
+    if correction is None:
+        return plain
+    return plain + correction(view(chart, scene.top, states), scene.top.momenta(scene.start), h)
+
+
+def section(chart: str, states: Array) -> tuple[Array, Array]:
+    """(theta, p_theta) or (u, I1 u') of kernel states: a plane in which one nutation is a closed curve.
+
+    In the angles chart the series of stormer-verlet needs twice as many harmonics in u as in theta.
+    """
+    if chart == "angles":
+        return states[:, 0], states[:, 1]
+    e, L = axis_of(chart, states), states[:, -3:]
+    return e[:, 2], L[:, 0] * e[:, 1] - L[:, 1] * e[:, 0]
+
+
+class Oscillation(NamedTuple):
+    """A periodic function of the angle about the middle of a closed curve: a level and a Fourier series.
+
+    The level comes in two parts, a large number and what is missing from it. Rounded to one double it would be wrong
+    by up to half a unit in its last place in every window of a run: 3.5e-17 (root mean square) was seen.
+    """
+
+    centre: float
+    width: float
+    height: float
+    coefficients: Array
+    level: float = 0.0
+    missing: float = 0.0
+
+    def angle(self, x: Array, y: Array) -> Array:
+        """The angle about the middle of the curve."""
+        return np.asarray(np.arctan2(y / self.height, (x - self.centre) / self.width))
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """The series, without the level, at points of the curve."""
+        return np.asarray(_harmonics(self.angle(x, y), self.coefficients.size // 2) @ self.coefficients)
+
+    def rest(self, x: Array, y: Array, values: Array) -> Array:
+        """What the function leaves of values at points of the curve."""
+        return (values - self.level) - (self.missing + self(x, y))
+
+
+def _harmonics(angle: Array, count: int) -> Array:
+    turned = np.outer(angle, np.arange(1, count + 1))
+    return np.concatenate([np.cos(turned), np.sin(turned)], axis=1)
+
+
+def oscillation(x: Array, y: Array, values: Array, harmonics: int = HARMONICS) -> Oscillation:
+    """Fit the function to values on the points of a closed curve; too few points give a level and no series."""
+    level = float(values[0])
+    if x.size < 4 * harmonics or np.ptp(x) == 0.0 or not np.any(y):
+        return Oscillation(0.0, 1.0, 1.0, np.zeros(0), level, float((values - level).mean()))
+    least, largest = float(x.min()), float(x.max())
+    curve = Oscillation(0.5 * (least + largest), 0.5 * (largest - least), float(np.abs(y).max()), np.zeros(0))
+    columns = np.concatenate([np.ones((x.size, 1)), _harmonics(curve.angle(x, y), harmonics)], axis=1)
+    found = np.linalg.lstsq(columns, values - level, rcond=None)[0]
+    return curve._replace(coefficients=found[1:], level=level, missing=float(found[0]))

@@ -1,0 +1,172 @@
+"""`symtop.errors`: the errors of a run and of anybody's trajectory, with controls that must and must not show one."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import symtop
+from symtop.base import datasets
+from symtop.measure.errors import QUANTITIES, errors_against
+from symtop.run.reference import reference
+
+TIMES = np.linspace(0.0, 8.0, 41)
+TURN = 1e-3  # rad
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return reference("spheroid", TIMES, "closed-form")
+
+
+def quaternion(truth):
+    return {"time": TIMES, "quaternion": truth["quaternion"].values}
+
+
+def turned_about_the_vertical(quaternions, angle):
+    """Every attitude turned in space: (cos a/2, 0, 0, sin a/2) q."""
+    w, x, y, z = quaternions.T
+    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    return np.stack([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w], axis=-1)
+
+
+@pytest.mark.parametrize(("integrator", "observe"), [("midpoint", "nutation"), ("strang", "axis"), ("strang", None)])
+def test_a_run_needs_no_scene_and_gives_the_errors_of_every_quantity_it_shows(integrator, observe):
+    run = symtop.simulate("spheroid", integrator, step_size=0.01, observe=observe)
+    shown = symtop.errors(run)
+    named = [name for name in QUANTITIES if name != "attitude" or observe != "axis"]
+    assert set(shown.data_vars) == {*named, *(f"{name}_bound" for name in named)}
+    same = errors_against(symtop.scene("spheroid"), run, reference("spheroid", run["time"].values, "closed-form"))
+    for name in named:
+        np.testing.assert_array_equal(shown[name].values, same[name].values)
+        assert np.all(shown[f"{name}_bound"].values < 1e-12)
+        assert np.all(shown[f"{name}_bound"].values > 0.0)
+    assert 1e-5 < float(shown["axis"].max()) < 1e-1
+
+
+def test_the_closed_form_is_within_its_bounds_and_a_coarse_run_is_not():
+    exact, coarse = symtop.simulate("spheroid", "exact"), symtop.simulate("spheroid", "strang", step_size=0.02)
+    for name in ("axis", "attitude", "theta", "energy"):
+        shown = symtop.errors(exact)
+        assert np.all(shown[name].values <= 2.0 * shown[f"{name}_bound"].values)
+        assert float(symtop.errors(coarse)[name].max()) > 1e3 * float(shown[f"{name}_bound"].max())
+
+
+def test_a_run_of_a_scene_that_nobody_registered_is_compared_with_its_own_top():
+    scene = symtop.Scene("mine", symtop.SymmetricTop(2.0, 1.0, 3.0), symtop.Angles(0.7, psi_dot=5.0), 4.0)
+    run = symtop.simulate(scene, "strang", step_size=0.01)
+    assert float(symtop.errors(run)["axis"].max()) < 1e-3
+    assert symtop.errors(run).identical(symtop.errors(run, scene))
+
+
+def test_a_run_that_was_written_and_read_gives_the_same(tmp_path):
+    run = symtop.simulate("spheroid", "strang", step_size=0.01)
+    kept = datasets.read(datasets.write(run, tmp_path / "run.nc"))
+    xr.testing.assert_identical(symtop.errors(run), symtop.errors(kept))
+
+
+def test_samples_after_a_failure_stay_nan():
+    run = symtop.simulate("grazing", "midpoint", step_size=0.2, guard=False)
+    assert run.attrs["outcome"] != "ok"
+    axis = symtop.errors(run)["axis"].values
+    np.testing.assert_array_equal(np.isnan(axis), np.isnan(run["axis"].values).any(axis=1))
+    assert np.isnan(axis[-1])
+    assert np.isfinite(axis[0])
+
+
+def test_three_lines_compare_a_foreign_trajectory(truth):
+    mine = quaternion(truth)
+    for factor in (1.0, -1.0, 1.0002):  # either sign, and a length that single precision would be ashamed of
+        shown = symtop.errors({**mine, "quaternion": factor * mine["quaternion"]}, "spheroid")
+        assert set(shown.data_vars) == {
+            f"{name}{end}" for name in ("axis", "attitude", "theta") for end in ("", "_bound")
+        }
+        for name in ("axis", "attitude", "theta"):
+            assert np.all(shown[name].values <= shown[f"{name}_bound"].values)
+
+
+def test_a_trajectory_that_is_turned_by_a_thousandth_shows_a_thousandth(truth):
+    moved = {"time": TIMES, "quaternion": turned_about_the_vertical(truth["quaternion"].values, TURN)}
+    shown = symtop.errors(moved, symtop.scene("spheroid"))
+    assert shown["attitude"].values == pytest.approx(TURN, rel=1e-9)
+    assert shown["axis"].values == pytest.approx(TURN * np.sin(truth["theta"].values), rel=1e-6)
+    assert np.max(shown["theta"].values) < 1e-14
+
+
+@pytest.mark.parametrize("name", ["axis", "theta"])
+def test_an_axis_or_theta_alone_is_enough(truth, name):
+    shown = symtop.errors(xr.Dataset({name: truth[name]}), "spheroid")
+    assert ("axis" in shown, "attitude" in shown, "theta" in shown) == (name == "axis", False, True)
+    assert np.all(shown["theta"].values <= 4e-16 + shown["theta_bound"].values)
+    moved = symtop.errors({"time": TIMES, "theta": truth["theta"].values + TURN}, "spheroid")
+    assert moved["theta"].values == pytest.approx(TURN, rel=1e-9)
+
+
+def test_euler_angles_show_the_attitude_and_the_axis(truth):
+    mine = {"time": TIMES, **{name: truth[name].values for name in ("theta", "phi", "psi")}}
+    shown = symtop.errors(mine, "spheroid")
+    assert float(shown["attitude"].max()) < 1e-13
+    mine["psi"] = mine["psi"] + TURN
+    assert symtop.errors(mine, "spheroid")["attitude"].values == pytest.approx(TURN, rel=1e-9)
+    assert float(symtop.errors(mine, "spheroid")["axis"].max()) < 1e-13
+
+
+def test_constants_that_the_data_hold_are_judged(truth):
+    scene = symtop.scene("spheroid")
+    mine = {**quaternion(truth), "energy": truth["energy"].values + 1e-3 * scene.energy_scale}
+    shown = symtop.errors(mine, scene)
+    assert shown["energy"].values == pytest.approx(1e-3, rel=1e-9)
+    assert "p_phi" not in shown
+
+
+def test_a_wrong_scene_is_seen(truth):
+    run = symtop.simulate("goldstein", "exact", horizon=8.0, samples=41)
+    assert float(symtop.errors({"time": TIMES, "axis": run["axis"].values}, "spheroid")["axis"].max()) > 0.5
+    assert float(symtop.errors({"time": TIMES, "axis": truth["axis"].values}, "spheroid")["axis"].max()) < 1e-14
+
+
+def test_a_quaternion_in_another_order_is_refused_with_its_reason(truth):
+    with pytest.raises(symtop.SymtopError, match="order w, x, y, z"):
+        symtop.errors({"time": TIMES, "quaternion": np.roll(truth["quaternion"].values, -1, axis=1)}, "spheroid")
+    inverse = truth["quaternion"].values * [1.0, -1.0, -1.0, -1.0]
+    assert float(symtop.errors({"time": TIMES, "quaternion": inverse}, "spheroid")["attitude"].max()) > 1.0
+
+
+def test_nan_rows_of_a_foreign_trajectory_stay_nan(truth):
+    values = truth["quaternion"].values.copy()
+    values[20:] = np.nan
+    shown = symtop.errors({"time": TIMES, "quaternion": values}, "spheroid")
+    assert np.isnan(shown["attitude"].values[20:]).all()
+    assert np.isfinite(shown["attitude"].values[:20]).all()
+
+
+AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
+
+
+@pytest.mark.parametrize(
+    ("data", "scene", "words"),
+    [
+        ({"axis": AXIS}, "spheroid", "must hold time"),
+        ({"time": TIMES}, "spheroid", "one of axis, quaternion, theta"),
+        ({"time": np.where(TIMES > 7.0, np.nan, TIMES), "axis": AXIS}, "spheroid", "time must be finite"),
+        ({"time": TIMES[::-1], "axis": AXIS}, "spheroid", "increase"),
+        ({"time": TIMES - 1.0, "axis": AXIS}, "spheroid", "at least 0"),
+        ({"time": TIMES[:, None], "axis": AXIS}, "spheroid", "time must be a row"),
+        ({"time": ["a"] * 41, "axis": AXIS}, "spheroid", "time must be an array of real numbers"),
+        ({"time": TIMES, "axis": AXIS + 0j}, "spheroid", "axis must be an array of real numbers"),
+        ({"time": TIMES, "axis": AXIS.T}, "spheroid", r"shape \(41, 3\)"),
+        ({"time": TIMES, "quaternion": AXIS}, "spheroid", r"shape \(41, 4\)"),
+        ({"time": TIMES, "axis": AXIS, "energy": TIMES[:5]}, "spheroid", r"energy must have the shape \(41,\)"),
+        ({"time": TIMES, "axis": 2.0 * AXIS}, "spheroid", "length 1 within 0.001"),
+        ({"time": TIMES, "axis": 0.0 * AXIS}, "spheroid", "length is 0 at t = 0"),
+        ({"time": TIMES, "theta": 50.0 + TIMES}, "spheroid", r"radians from the vertical"),
+        ({"time": TIMES, "axis": AXIS}, "spheroyd", "did you mean spheroid"),
+        ({"time": TIMES, "axis": AXIS}, None, r"give errors\(data, scene\)"),
+        (xr.Dataset({"axis": (("time", "c"), AXIS)}, {"time": TIMES}), None, r"give errors\(data, scene\)"),
+        (AXIS, "spheroid", "Dataset or a mapping"),
+        (None, None, "scene is missing"),
+    ],
+)  # fmt: skip
+def test_bad_data_are_refused_in_one_sentence(data, scene, words):
+    with pytest.raises(symtop.SymtopError, match=words) as caught:
+        symtop.errors(data, scene)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,115 @@
+"""No number depends on an integrator's name: a method registered under another one gives the same bits everywhere."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.judge.claims import judge
+from symtop.methods import registry
+from symtop.methods.discrete_lagrangian import is_midpoint
+from symtop.methods.galerkin import is_galerkin
+from symtop.run.forecast import forecast
+from symtop.run.linear_stability import linear_limits, sleeping_threshold, sleeping_threshold_in_theory
+from symtop.run.long_run import long_run
+from symtop.run.modified_energy import modified_energy
+from symtop.run.simulation import make_plan
+
+SCENE = symtop.scene("spheroid")
+MADE = {
+    "stormer-verlet": lambda: symtop.composition("renamed", (1.0,), (0.5, 0.5), order=2),
+    "midpoint": lambda: symtop.discrete_lagrangian("renamed", (0.5,), (1.0,), order=2),
+    "strang": lambda: symtop.composition("renamed", (1.0,), (0.5, 0.5), chart="space", order=2),
+    "cayley": lambda: symtop.composition("renamed", (1.0,), (0.5, 0.5), chart="space", rotation="cayley", order=2),
+}
+
+
+@pytest.fixture(params=["a copy", "made anew"])
+def pairs(request, monkeypatch):
+    """Each method of `MADE` and itself under another name, registered for one test."""
+    monkeypatch.setattr(registry, "_registry", dict(symtop.integrators()))
+
+    def renamed(name):
+        own = symtop.integrator(name)
+        other = dataclasses.replace(own, name="renamed") if request.param == "a copy" else MADE[name]()
+        return own, symtop.register(other, replace=True)
+
+    return renamed
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_long_run_modified_energy_stability_and_forecast_do_not_look_at_the_name(pairs, name):
+    own, other = pairs(name)
+    h = SCENE.nutation_period / 137.3
+    runs = [long_run(SCENE, method.name, steps=20_000, step_size=h, quiet=True) for method in (own, other)]
+    for variable in runs[0]:
+        np.testing.assert_array_equal(runs[0][variable].values, runs[1][variable].values)
+    chart = own.chart_for("axis")
+    states = np.random.default_rng(5).normal(1.0, 0.1, (50, 4 if chart == "angles" else 6))
+    first, second = (modified_energy(SCENE, method, chart, states, h) for method in (own, other))
+    np.testing.assert_array_equal(first, second)
+    assert np.max(np.abs(first - modified_energy(SCENE, "rk4", chart, states, h))) > 1e-6  # it is not the energy itself
+    steady, grid = symtop.scene("steady-fast"), np.linspace(0.02, 0.5, 12)
+    assert linear_limits(own, steady, grid) == pytest.approx(
+        linear_limits(other, steady, grid), rel=0, abs=0, nan_ok=True
+    )
+    assert sleeping_threshold_in_theory(own, 0.4) == sleeping_threshold_in_theory(other, 0.4)
+    assert sleeping_threshold(own, 0.4) == sleeping_threshold(other, 0.4)
+    plans = [make_plan(SCENE, method, h, None, 8.0, 101)[0] for method in (own, other)]
+    assert forecast(SCENE, own, chart, plans[0]) == forecast(SCENE, other, chart, plans[1])
+
+
+def test_closed_forms_belong_to_the_four_methods_they_are_of():
+    known = [name for name, method in symtop.integrators().items() if method.modified_energy is not None]
+    assert sorted(known) == sorted(MADE)
+    assert [name for name, method in symtop.integrators().items() if method.sleeps_from] == ["strang", "cayley"]
+    assert sleeping_threshold_in_theory("takahashi-imada", 0.4) == 2.0
+    assert symtop.composition("other", (0.5, 0.5), (0.25, 0.5, 0.25)).modified_energy is None
+    assert symtop.composition("other", (1.0,), (1.0, 0.0)).modified_energy is None
+    assert symtop.discrete_lagrangian("other", (0.0, 1.0), (0.5, 0.5)).modified_energy is None
+
+
+def test_a_slow_solver_is_forecast_by_its_compiled_twin_whatever_its_name():
+    own = symtop.integrator("rk45")
+    other = dataclasses.replace(own, name="renamed")
+    plain = dataclasses.replace(own, name="renamed", same_steps_as=None)
+    plan, _ = make_plan(SCENE, own, None, 1e-8, 8.0, 101)
+    expected = forecast(SCENE, own, "angles", plan)
+    np.testing.assert_equal(tuple(forecast(SCENE, other, "angles", plan)), tuple(expected))  # some are nan
+    assert (
+        forecast(SCENE, plain, "angles", plan).axis_error != expected.axis_error
+    )  # without it a tenth of the run is all that is probed
+
+
+def test_software_arithmetic_is_judged_over_fewer_steps_whatever_its_name():
+    assert symtop.integrator("taylor-quad").speed == 0.002
+    assert symtop.integrator("taylor").speed == 1.0
+    strang = symtop.integrator("strang")
+    slow = dataclasses.replace(strang, name="renamed", speed=0.02)
+    steps = [int(judge(method, SCENE, quick=True).traces["steps_run"]) for method in (strang, slow)]
+    assert steps[1] == pytest.approx(0.02 * steps[0], rel=0.01)
+
+
+def test_other_ways_to_step_a_rule_know_it_by_its_numbers():
+    assert is_midpoint(symtop.discrete_lagrangian("mine", (0.5,), (1.0,)))
+    assert not is_midpoint(symtop.integrator("trapezoidal"))
+    assert not is_midpoint(symtop.integrator("midpoint-unreduced"))
+    assert is_galerkin(dataclasses.replace(symtop.integrator("galerkin-simpson"), name="mine"))
+    assert not is_galerkin(symtop.integrator("midpoint"))
+
+
+@pytest.mark.parametrize("conserves", [{"charm"}, "energy", 3, {"energy", "p_theta"}])
+def test_what_a_method_may_claim_to_conserve_is_known(conserves):
+    with pytest.raises(symtop.SymtopError, match="conserves"):
+        dataclasses.replace(symtop.integrator("strang"), conserves=conserves)
+    assert dataclasses.replace(symtop.integrator("strang"), conserves=["energy"]).conserves == {"energy"}
+
+
+def test_a_chart_is_chosen_by_what_it_shows_and_only_leaves_one():
+    strang = symtop.integrator("strang")
+    assert [strang.chart_for(what) for what in ("nutation", "axis", "attitude")] == ["axis", "axis", "attitude"]
+    assert strang.chart_for("axis", among=["attitude"]) == "attitude"
+    assert strang.only("attitude").charts() == ("attitude",)
+    with pytest.raises(symtop.SymtopError, match="cannot show the attitude"):
+        strang.only("axis").chart_for("attitude")

@@ -1,0 +1,39 @@
+"""The public face: names, their homes, and the words that their arguments share."""
+
+import importlib
+import inspect
+import pkgutil
+import types
+
+import symtop
+
+
+def test_every_public_name_is_there_and_in_the_block_for_checkers():
+    text = inspect.getsource(symtop)
+    for name in symtop.__all__:
+        assert getattr(symtop, name) is not None
+        assert name == "__version__" or f"import {name} as {name}" in text
+
+
+def test_no_function_has_the_name_of_a_package_beside_it():
+    places = {entry.name for entry in pkgutil.iter_modules(symtop.__path__)}
+    assert not places & set(symtop.__all__)
+    for package in ("base", "model", "methods", "run", "measure", "judge"):
+        module = importlib.import_module(f"symtop.{package}")
+        for entry in pkgutil.iter_modules(module.__path__):
+            assert isinstance(importlib.import_module(f"symtop.{package}.{entry.name}"), types.ModuleType)
+
+
+def test_a_module_imported_by_its_path_is_a_module():
+    import symtop.model.scenes as s
+
+    assert isinstance(s, types.ModuleType)
+    assert symtop.scenes()["spheroid"] is s.scene("spheroid")
+
+
+def test_one_thing_has_one_name_in_every_public_function():
+    for function in (symtop.simulate, symtop.reference, symtop.recommend, symtop.long_run, symtop.errors):
+        names = list(inspect.signature(function).parameters)
+        assert "scene" in names
+        assert not {"where", "integrator_", "method"} & set(names)
+    assert {"integrator"} <= set(inspect.signature(symtop.long_run).parameters)

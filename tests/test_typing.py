@@ -1,0 +1,76 @@
+"""What a type checker sees of the public names: a user's script is typed throughout, and its mistakes are reported."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+GOOD = """
+import symtop
+
+top = symtop.SymmetricTop(I1=2.0, I3=1.0, mgl=26.8658)
+start = symtop.Angles(theta=0.4, phi_dot=10.0)
+scene = symtop.Scene("mine", top, start, horizon=8.0)
+run = symtop.simulate(scene, "midpoint", step_size=0.01)
+truth = symtop.reference(scene, run["time"].values)
+wrong = symtop.errors(run)
+foreign = symtop.errors({"time": run["time"].values, "axis": run["axis"].values}, scene)
+long = symtop.long_run("spheroid", symtop.integrator("strang"), steps=1000, step_size=0.01)
+advice = symtop.recommend("spheroid", accuracy=1e-6)
+mine = symtop.composition("mine", (1.0,), (0.5, 0.5), order=2)
+reveal_type(run)
+reveal_type(truth)
+reveal_type(wrong)
+reveal_type(foreign)
+reveal_type(long)
+reveal_type(advice.expected_error)
+reveal_type(mine.order)
+reveal_type(symtop.scenes()["spheroid"].horizon)
+"""
+SEEN = [*["xarray.core.dataset.Dataset"] * 5, "float", "int | None", "float"]
+
+BAD = """
+import symtop
+
+symtop.simulate("spheroid", "midpoint", stepsize=0.01)
+symtop.composition("mine", (1.0,), (0.5, 0.5), order="2")
+symtop.simluate("spheroid", "midpoint", step_size=0.01)
+symtop.errors(symtop.scene("spheroid"))
+text: str = symtop.simulate("spheroid", "midpoint", step_size=0.01)
+"""
+REPORTED = {4: "stepsize", 5: '"str"', 6: "simluate", 7: "Scene", 8: "Dataset"}
+
+
+def lines(tmp_path, text):
+    """What mypy says of a script, line by line."""
+    script = tmp_path / "script.py"
+    script.write_text(text, encoding="utf-8")
+    words = [sys.executable, "-m", "mypy", "--strict", "--config-file", os.devnull, "--ignore-missing-imports",
+             "--no-error-summary", "--follow-imports=silent", "--cache-dir", str(ROOT / ".mypy_cache"), str(script)]  # fmt: skip
+    done = subprocess.run(
+        words,
+        cwd=tmp_path,
+        env={**os.environ, "MYPYPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    return done.stdout.splitlines(), done.stderr
+
+
+def test_a_script_is_typed_throughout(tmp_path):
+    said, noise = lines(tmp_path, GOOD)
+    revealed = [line.split('"')[1] for line in said if "Revealed type" in line]
+    assert not [line for line in said if ": error:" in line], noise
+    assert [kind.replace("builtins.", "").replace("Union[int, None]", "int | None") for kind in revealed] == SEEN
+
+
+def test_mistakes_are_reported_where_they_are(tmp_path):
+    said, noise = lines(tmp_path, BAD)
+    errors = {int(line.split(":")[1]): line for line in said if ": error:" in line}
+    assert sorted(errors) == sorted(REPORTED), noise
+    for number, word in REPORTED.items():
+        assert word in errors[number]
