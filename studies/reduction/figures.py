@@ -95,8 +95,9 @@ def draw_charts(data: xr.Dataset) -> Picture:
     titles = {"time": "time of a run (ratio)", "error": "error of the axis (ratio)"}
     for axis, (quantity, title) in zip(axes.flat, titles.items(), strict=True):
         for scene, method, ratio in ratios:
+            marker = SCENE_MARKERS[scenes.index(scene) % len(SCENE_MARKERS)]
             axis.plot(
-                getattr(ratio, quantity), methods.index(method), SCENE_MARKERS[scenes.index(scene) % len(SCENE_MARKERS)],
+                getattr(ratio, quantity), methods.index(method), marker,
                 color=CHART_COLORS[ratio.chart], label=f"{ratio.chart} against {ratio.base}, {scene}", ls="none", ms=6,
             )  # fmt: skip
         axis.axvline(1.0, color=style.GREY, lw=0.9)

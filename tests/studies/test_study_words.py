@@ -8,9 +8,10 @@ import xarray as xr
 from symtop_studies.notebook import words as notebook_words
 from symtop_studies.notebook.tables import SOLVER, Column
 from symtop_studies.stability import mechanism_words
+from symtop_studies.truth import words as truth_words
 
 import symtop
-from symtop.measure import conservation
+from symtop.measure import conservation, published
 from symtop.runner import run as runner
 
 
@@ -151,3 +152,29 @@ def test_the_share_of_the_solver_is_read_from_the_numbers(one, energy, momentum,
     (said,) = mechanism_words.solver(data)
     for words in says:
         assert words in said
+
+
+def test_the_truth_study_says_what_the_printed_values_test():
+    def value(ours, tests, kind="printed"):
+        return published.Published("somebody", "something", 1.0, ours, 1e-3, kind, tests=tests)
+
+    values = [value(1.0, published.TRAJECTORY), value(1.1, published.TRAJECTORY), value(1.0, published.START)]
+    sentence = truth_words.published([*values, value(1.0, published.START, "formula")])
+    assert "2 of 3 printed values" in sentence
+    assert (
+        "Only 2 of them test a trajectory of the top (somebody); 1 tests the energy of a start, and 0 belong"
+        in sentence
+    )
+    assert "1 of 1 agree" in sentence
+    everything = truth_words.published()
+    assert "7 of 7 printed values" in everything
+    assert "Only 3 of them test a trajectory" in everything
+
+
+@pytest.mark.parametrize(("bound", "holding"), [(2e-9, 2), (5e-10, 1)])
+def test_the_truth_study_counts_the_bounds_that_an_error_exceeds(bound, holding):
+    data = xr.Dataset({
+        truth_words.Column.ERROR: ("horizon", [1e-9, 1e-9, np.nan, 1e-9]),
+        truth_words.Column.BOUND: ("horizon", [4e-9, bound, 1e-9, np.nan]),
+    })  # fmt: skip
+    assert f"Of 2 claimed bounds {holding} hold" in truth_words.bounds(data)
