@@ -1,13 +1,8 @@
-"""What the notebook that this project began with computed, done again by its own means and beside ours.
+"""What is computed and stored of one integrator on one of the notebook's two scenes.
 
-The notebook integrates the second-order Euler-Lagrange equations in (phi, theta, psi) as they stand, "the hard way",
-and once more with both momenta eliminated: a = p_psi/I1, b = p_phi/I1, beta = 2 mgl/I1 and
-
-    phi' = (b - a cos theta)/sin^2 theta,     psi' = a I1/I3 - phi' cos theta
-    theta'' = (a^2 + b^2) cos theta/sin^3 theta - a b (3 + cos 2 theta)/(2 sin^3 theta) + (beta/2) sin theta
-
-Its second energy is E1 = I1 (theta'^2 + ((b - a cos theta)/sin theta)^2)/2 + mgl cos theta = E - p_psi^2/2 I3, and the
-cubic of the nutation is u'^2 = (1 - u^2)(alpha - beta u) - (b - a u)^2 with u = cos theta and alpha = 2 E1/I1.
+Every integrator has its residuals: how far energy and momenta are from their start. The notebook's own solver has also
+its path, the two derivations integrated side by side, and (second scene) the nutation cubic; two discrete methods
+have their modified energy; the midpoint rule has the frames of a film.
 
 Why a discrete Lagrangian bounds the energy: its map is symplectic, hence the flow of a modified Hamiltonian up to terms
 that are exponentially small in 1/h. To h^2, with the effective potential V(theta) and p = p_theta,
@@ -19,33 +14,72 @@ so that H itself can only oscillate, by O(h^2), and these by O(h^4). Source: Hai
 Integration, chapter IX.
 """
 
-import dataclasses
-import math
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from symtop.base.validate import SymtopError
-from symtop.measure.conservation import CONSTANTS, residuals, trend
+from symtop.measure.conservation import residuals
 from symtop.measure.errors import energy_scale
 from symtop.measure.modified_energy import modified_energy
 from symtop.methods.registry import integrators
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
-from symtop.model.top import SymmetricTop
 from symtop.run.simulation import simulate
 
-Array = NDArray[np.float64]
+from .derivations import easy_way, energies, hard_way, nutation_cubic, rate_of_alpha, six_variables, with_alpha
 
 SOLVER = "lsoda"  # the default solver of the notebook's system is of this family
-NOTEBOOK_FIGURES = {"energy": 5, "p_phi": 6, "p_psi": 6}  # that the notebook reports as constant
-SOLVER_TOLERANCE = 2.6e-7  # chosen so that LSODA keeps that many; `solver_scan` shows what others do
-SCAN = tuple(SOLVER_TOLERANCE * 1.5**k for k in range(-3, 4))
-TIGHT = 1e-13
+SOLVER_TOLERANCE = 2.6e-7  # chosen: at it LSODA keeps as many figures as the notebook reports; its own is not known
+STEPS_A_NUTATION = 118.02  # of every discrete method; no whole number, so that samples and nutation do not lock
+MODIFIED = ("midpoint", "stormer-verlet")  # methods whose modified energy is stored
+FILMED = "midpoint"
+ALPHA = 1.6  # of the second scene, as the notebook prints it
+TIGHT = 1e-13  # tolerance of both derivations
 SAMPLES = 301
+
+
+class Column:
+    """Variables of the dataset, with unit and dimension. NAME stands for energy, p_phi or p_psi."""
+
+    OUTCOME = "outcome"
+    SAMPLE_TIME = "sample_time"  # s; sample. Beside it NAME itself
+    # theta, phi (rad) and theta' (rad/s) of the notebook's solver and of the closed form; path
+    PATH_TIME = "path_time"  # s
+    SOLVER_THETA, SOLVER_PHI, SOLVER_THETA_DOT = "hard_theta", "hard_phi", "hard_theta_dot"
+    TRUE_THETA, TRUE_PHI, TRUE_PSI, TRUE_THETA_DOT = "true_theta", "true_phi", "true_psi", "true_theta_dot"
+    # largest differences of any angle (rad) between derivations and closed form, and the two energies; both
+    BOTH_TIME = "both_time"  # s
+    DERIVATIONS_GAP, HARD_GAP, EASY_GAP = "ways_gap", "hard_gap", "easy_gap"
+    E, E1, ENERGY_GAP = "E", "E1", "energy_gap"  # the gap |E1 + p_psi^2/2 I3 - E| is relative
+    # the cubic u'^2 (1/s^2) against u = cos theta; cubic_point
+    COSINE, CUBIC_AT_REST, CUBIC_PRINTED = "cosine", "cubic_at_rest", "cubic_printed"
+    ALPHA_AT_REST, ALPHA_RATE = "alpha_at_rest", "alpha_rate"  # 1/s^2, rad/s; scalars
+    # theta (rad) of a start at rest and of both starts that the printed alpha allows; alpha_sample
+    ALPHA_TIME = "alpha_time"  # s
+    THETA_AT_REST, THETA_FALLING, THETA_RISING = "theta_at_rest", "theta_falling", "theta_rising"
+    # largest relative changes of the energy and of the modified energy; shadow_setting
+    MODIFIED_STEP = "shadow_step_size"  # s
+    ENERGY_CHANGE, MODIFIED_CHANGE = "energy_swing", "modified_swing"
+    MODIFIED_TIME = "shadow_time"  # s; shadow_sample
+    # attitudes as quaternions; frame, part
+    FRAME_TIME, FRAME_ATTITUDE, TRUE_ATTITUDE = "frame_time", "frame_attitude", "true_attitude"
+
+    @staticmethod
+    def residual(name: str) -> str:
+        """Relative residual of a constant over time; dimension sample."""
+        return f"{name}_residual"
+
+    @staticmethod
+    def largest(name: str) -> str:
+        """The largest of these; a scalar."""
+        return f"{name}_largest"
+
+    @staticmethod
+    def history(name: str) -> str:
+        """Relative change over time, at the first step, of one of the two energies; dimension shadow_sample."""
+        return f"{name}_history"
 
 
 def discrete_methods() -> list[str]:
@@ -53,42 +87,22 @@ def discrete_methods() -> list[str]:
     return [m.name for m in integrators().values() if m.family in ("discrete-lagrangian", "splitting")]
 
 
-def figures_kept(values: Any) -> int:
-    """How many significant figures of a constant stay put while it varies about its mean."""
-    mean = float(np.mean(values))
-    spread = float(np.max(np.abs(np.asarray(values) - mean)))
-    leading = math.floor(math.log10(abs(mean)))
-    return 17 if spread == 0.0 else max(0, math.ceil(leading + 1 - math.log10(spread)) - 1)
+def residual_history(scene: Scene, integrator: str, setting: float, samples: int = SAMPLES) -> xr.Dataset:
+    """Energy, momenta and their relative residuals of one integrator over the scene's horizon; dimension ``sample``.
 
-
-def residual_history(scene: Scene, method: str, setting: float, samples: int = SAMPLES) -> xr.Dataset:
-    """Energy, momenta and their relative residuals of one method over the scene's horizon; dimension ``sample``."""
-    knob = {"step_size": setting} if integrators()[method].knob == "step_size" else {"tolerance": setting}
-    run = simulate(scene, method, observe="nutation", samples=samples, guard=False, **knob)
-    found: dict[str, Any] = {"sample_time": ("sample", run["time"].values), "outcome": run.attrs["outcome"]}
-    for name, values in residuals(scene, run).items():
-        found[name] = ("sample", run[name].values)
-        found[f"{name}_residual"] = ("sample", values)
-        found[f"{name}_largest"] = float(np.nanmax(np.abs(values)))
-    return xr.Dataset(found)
-
-
-def solver_scan(scene: Scene, tolerances: Sequence[float] = SCAN) -> xr.Dataset:
-    """What the notebook's solver keeps at other tolerances, in figures, and where its trends go.
-
-    Dimension ``tolerance_setting``: ``scan_tolerance``, ``scan_NAME_figures``, and ``scan_NAME_rise`` over the run with
-    its 95 % interval ``scan_NAME_doubt``.
+    `setting` is a step size in seconds or a tolerance, whichever the integrator takes.
     """
-    found: dict[str, list[float]] = {"scan_tolerance": [float(value) for value in tolerances]}
-    for tolerance in tolerances:
-        run = residual_history(scene, SOLVER, float(tolerance))
-        for name in CONSTANTS:
-            line = trend(run["sample_time"], run[name])
-            doubt = line.interval * float(run["sample_time"][-1])
-            row = {"figures": float(figures_kept(run[name].values)), "rise": line.rise, "doubt": doubt}
-            for part, value in row.items():
-                found.setdefault(f"scan_{name}_{part}", []).append(value)
-    return xr.Dataset({name: ("tolerance_setting", values) for name, values in found.items()})
+    control = {"step_size": setting} if integrators()[integrator].knob == "step_size" else {"tolerance": setting}
+    run = simulate(scene, integrator, observe="nutation", samples=samples, guard=False, **control)
+    columns: dict[str, Any] = {
+        Column.SAMPLE_TIME: ("sample", run["time"].values),
+        Column.OUTCOME: run.attrs["outcome"],
+    }
+    for name, values in residuals(scene, run).items():
+        columns[name] = ("sample", run[name].values)
+        columns[Column.residual(name)] = ("sample", values)
+        columns[Column.largest(name)] = float(np.nanmax(np.abs(values)))
+    return xr.Dataset(columns)
 
 
 def notebook_path(scene: Scene, samples: int = 1201) -> xr.Dataset:
@@ -97,189 +111,97 @@ def notebook_path(scene: Scene, samples: int = 1201) -> xr.Dataset:
 
     times = np.linspace(0.0, scene.horizon, samples)
     hard = solve_ivp(
-        hard_way(scene), (0.0, scene.horizon), _six(scene), method="LSODA", rtol=SOLVER_TOLERANCE,
+        hard_way(scene), (0.0, scene.horizon), six_variables(scene), method="LSODA", rtol=SOLVER_TOLERANCE,
         atol=SOLVER_TOLERANCE, t_eval=times,
     ).y  # fmt: skip
     truth = closed_form(scene)(times)
-    found = {"path_time": times, "hard_theta": hard[1], "hard_phi": hard[0], "hard_theta_dot": hard[4]}
-    found |= {
-        "true_theta": truth.theta,
-        "true_phi": truth.phi,
-        "true_psi": truth.psi,
-        "true_theta_dot": truth.theta_dot,
+    columns = {
+        Column.PATH_TIME: times,
+        Column.SOLVER_THETA: hard[1],
+        Column.SOLVER_PHI: hard[0],
+        Column.SOLVER_THETA_DOT: hard[4],
+        Column.TRUE_THETA: truth.theta,
+        Column.TRUE_PHI: truth.phi,
+        Column.TRUE_PSI: truth.psi,
+        Column.TRUE_THETA_DOT: truth.theta_dot,
     }
-    return xr.Dataset({name: ("path", values) for name, values in found.items()})
+    return xr.Dataset({name: ("path", values) for name, values in columns.items()})
 
 
-def _six(scene: Scene) -> tuple[float, ...]:
-    at = scene.start
-    return at.phi, at.theta, at.psi, at.phi_dot, at.theta_dot, at.psi_dot
-
-
-def hard_way(scene: Scene) -> Callable[[float, Any], Any]:
-    """y' for y = (phi, theta, psi, phi', theta', psi'): the notebook's three equations, a linear system for q''."""
-    I1, I3, mgl = scene.top.I1, scene.top.I3, scene.top.mgl
-
-    def rates(_: float, y: Any) -> Any:
-        theta, phi_dot, theta_dot, psi_dot = y[1], y[3], y[4], y[5]
-        s, c = math.sin(theta), math.cos(theta)
-        mass = np.array([[I1 * s * s + I3 * c * c, 0.0, I3 * c], [0.0, I1, 0.0], [I3 * c, 0.0, I3]])
-        force = np.array([
-            -s * theta_dot * (2.0 * (I1 - I3) * c * phi_dot - I3 * psi_dot),
-            s * ((I1 - I3) * c * phi_dot**2 - I3 * phi_dot * psi_dot + mgl),
-            I3 * s * theta_dot * phi_dot,
-        ])  # fmt: skip
-        return np.concatenate([y[3:], np.linalg.solve(mass, force)])
-
-    return rates
-
-
-def easy_way(scene: Scene) -> Callable[[float, Any], Any]:
-    """y' for y = (phi, theta, psi, theta'): two first-order equations and one of second order, in a, b and beta."""
-    top = scene.top
-    momenta = top.momenta(scene.start)
-    a, b, beta = momenta.p_psi / top.I1, momenta.p_phi / top.I1, 2.0 * top.mgl / top.I1
-
-    def rates(_: float, y: Any) -> Any:
-        s, c = math.sin(y[1]), math.cos(y[1])
-        turn = (b - a * c) / (s * s)
-        bend = (a * a + b * b) * c / s**3 - 0.5 * a * b * (3.0 + math.cos(2.0 * y[1])) / s**3 + 0.5 * beta * s
-        return np.array([turn, y[3], a * top.I1 / top.I3 - turn * c, bend])
-
-    return rates
-
-
-def both_ways(scene: Scene, samples: int = SAMPLES) -> xr.Dataset:
+def both_derivations(scene: Scene, samples: int = SAMPLES) -> xr.Dataset:
     """The two derivations integrated at 1e-13, their distance, and the two energies; dimension ``both``."""
     from scipy.integrate import solve_ivp  # 0.6 s to import
 
     times = np.linspace(0.0, scene.horizon, samples)
-    span, six = (0.0, scene.horizon), _six(scene)
+    span, six = (0.0, scene.horizon), six_variables(scene)
     options = {"method": "DOP853", "rtol": TIGHT, "atol": TIGHT, "t_eval": times}
     hard = solve_ivp(hard_way(scene), span, six, **options).y
     easy = solve_ivp(easy_way(scene), span, (*six[:3], six[4]), **options).y
     truth = closed_form(scene)(times)
     true = np.array([truth.phi, truth.theta, truth.psi])
-    E, E1, rest = energies(scene, hard)
-    found = {
-        "both_time": times,
-        "ways_gap": np.max(np.abs(hard[:3] - easy[:3]), axis=0),
-        "hard_gap": np.max(np.abs(hard[:3] - true), axis=0),
-        "easy_gap": np.max(np.abs(easy[:3] - true), axis=0),
-        "E": E,
-        "E1": E1,
-        "energy_gap": np.abs(E1 + rest - E) / energy_scale(scene),
+    E, E1, spin = energies(scene, hard)
+    columns = {
+        Column.BOTH_TIME: times,
+        Column.DERIVATIONS_GAP: np.max(np.abs(hard[:3] - easy[:3]), axis=0),
+        Column.HARD_GAP: np.max(np.abs(hard[:3] - true), axis=0),
+        Column.EASY_GAP: np.max(np.abs(easy[:3] - true), axis=0),
+        Column.E: E,
+        Column.E1: E1,
+        Column.ENERGY_GAP: np.abs(E1 + spin - E) / energy_scale(scene),
     }
-    return xr.Dataset({name: ("both", values) for name, values in found.items()})
-
-
-def energies(scene: Scene, states: Array) -> tuple[Array, Array, Array]:
-    """E, E1 and p_psi^2/2 I3 of states (phi, theta, psi, phi', theta', psi'), each from its own formula."""
-    top = scene.top
-    _, theta, _, phi_dot, theta_dot, psi_dot = states
-    s, c = np.sin(theta), np.cos(theta)
-    spin = psi_dot + phi_dot * c
-    E = 0.5 * top.I1 * (theta_dot**2 + (phi_dot * s) ** 2) + 0.5 * top.I3 * spin**2 + top.mgl * c
-    p_psi = top.I3 * spin
-    p_phi = top.I1 * phi_dot * s * s + p_psi * c
-    E1 = 0.5 * top.I1 * (theta_dot**2 + ((p_phi - p_psi * c) / (top.I1 * s)) ** 2) + top.mgl * c
-    return E, E1, 0.5 * p_psi**2 / top.I3
-
-
-class Cubic(NamedTuple):
-    """The nutation cubic of a start: u'^2 = (1 - u^2)(alpha - beta u) - (b - a u)^2."""
-
-    alpha: float
-    beta: float
-    a: float
-    b: float
-
-    def __call__(self, u: Any) -> Any:
-        """u'^2 at the given cosines."""
-        return (1.0 - u * u) * (self.alpha - self.beta * u) - (self.b - self.a * u) ** 2
-
-
-def nutation_cubic(scene: Scene) -> Cubic:
-    """alpha, beta, a, b of a scene's own start."""
-    top, at = scene.top, scene.start
-    momenta = top.momenta(at)
-    beta = 2.0 * top.mgl / top.I1
-    alpha = at.theta_dot**2 + (at.phi_dot * math.sin(at.theta)) ** 2 + beta * math.cos(at.theta)
-    return Cubic(alpha, beta, momenta.p_psi / top.I1, momenta.p_phi / top.I1)
-
-
-def rate_of_alpha(scene: Scene, alpha: float) -> float:
-    """|theta'| that a scene would need at its start for the given alpha; SymtopError if there is none."""
-    cubic = nutation_cubic(scene)._replace(alpha=alpha)
-    u = math.cos(scene.start.theta)
-    square = float(cubic(u)) / (1.0 - u * u)
-    if square < 0.0:
-        raise SymtopError(f"alpha = {alpha!r} is less energy than {scene.name} has at rest")
-    return math.sqrt(square)
-
-
-def with_alpha(scene: Scene, alpha: float, sign: float) -> Scene:
-    """The scene started with the rate theta' of that sign that the given alpha means."""
-    rate = math.copysign(rate_of_alpha(scene, alpha), sign)
-    return dataclasses.replace(scene, start=dataclasses.replace(scene.start, theta_dot=rate))
+    return xr.Dataset({name: ("both", values) for name, values in columns.items()})
 
 
 def alpha_table(scene: Scene, alpha: float, samples: int = 501) -> xr.Dataset:
     """The cubic and theta(t) for a start at rest and for the printed alpha; ``cubic_point`` and ``alpha_sample``."""
     cubic, u = nutation_cubic(scene), np.linspace(0.2, 0.95, 301)
     times = np.linspace(0.0, 20.0, samples)
-    found: dict[str, Any] = {
-        "cosine": ("cubic_point", u),
-        "cubic_at_rest": ("cubic_point", cubic(u)),
-        "cubic_printed": ("cubic_point", cubic._replace(alpha=alpha)(u)),
-        "alpha_time": ("alpha_sample", times),
-        "alpha_at_rest": cubic.alpha,
-        "alpha_rate": rate_of_alpha(scene, alpha),
-        "theta_at_rest": ("alpha_sample", closed_form(scene)(times).theta),
+    columns: dict[str, Any] = {
+        Column.COSINE: ("cubic_point", u),
+        Column.CUBIC_AT_REST: ("cubic_point", cubic(u)),
+        Column.CUBIC_PRINTED: ("cubic_point", cubic._replace(alpha=alpha)(u)),
+        Column.ALPHA_TIME: ("alpha_sample", times),
+        Column.ALPHA_AT_REST: cubic.alpha,
+        Column.ALPHA_RATE: rate_of_alpha(scene, alpha),
+        Column.THETA_AT_REST: ("alpha_sample", closed_form(scene)(times).theta),
     }
-    for name, sign in (("falling", -1.0), ("rising", 1.0)):
-        found[f"theta_{name}"] = ("alpha_sample", closed_form(with_alpha(scene, alpha, sign))(times).theta)
-    return xr.Dataset(found)
+    for name, sign in ((Column.THETA_FALLING, -1.0), (Column.THETA_RISING, 1.0)):
+        columns[name] = ("alpha_sample", closed_form(with_alpha(scene, alpha, sign))(times).theta)
+    return xr.Dataset(columns)
 
 
-def shadow_table(scene: Scene, method: str, steps: Sequence[float]) -> xr.Dataset:
+def modified_energy_table(scene: Scene, integrator: str, steps: Sequence[float]) -> xr.Dataset:
     """Largest change of the energy and of the modified energy at several steps, and both over time at the first.
 
     Dimensions ``shadow_setting`` and ``shadow_sample``; relative to the scale of energies.
     """
-    found: dict[str, list[float]] = {"shadow_step_size": [], "energy_swing": [], "modified_swing": []}
+    largest: dict[str, list[float]] = {Column.MODIFIED_STEP: [], Column.ENERGY_CHANGE: [], Column.MODIFIED_CHANGE: []}
     history: dict[str, Any] = {}
     for step in steps:
-        run = simulate(scene, method, step_size=step, observe="nutation", samples=SAMPLES, guard=False)
+        run = simulate(scene, integrator, step_size=step, observe="nutation", samples=SAMPLES, guard=False)
         h = run.attrs["step_size"]
         states = np.stack([run["theta"].values, run["p_theta"].values], axis=1)
-        shadow = modified_energy(scene, method, "angles", states, h)
-        curves = {"energy_swing": run["energy"].values, "modified_swing": shadow}
-        found["shadow_step_size"].append(h)
+        curves = {
+            Column.ENERGY_CHANGE: run["energy"].values,
+            Column.MODIFIED_CHANGE: modified_energy(scene, integrator, "angles", states, h),
+        }
+        largest[Column.MODIFIED_STEP].append(h)
         for name, values in curves.items():
             change = (values - values[0]) / energy_scale(scene)
-            found[name].append(float(np.max(np.abs(change))))
-            history.setdefault(f"{name}_history", ("shadow_sample", change))
-        history.setdefault("shadow_time", ("shadow_sample", run["time"].values))
-    return xr.Dataset({name: ("shadow_setting", values) for name, values in found.items()} | history)
+            largest[name].append(float(np.max(np.abs(change))))
+            history.setdefault(Column.history(name), ("shadow_sample", change))
+        history.setdefault(Column.MODIFIED_TIME, ("shadow_sample", run["time"].values))
+    return xr.Dataset({name: ("shadow_setting", values) for name, values in largest.items()} | history)
 
 
-def film_table(scene: Scene, method: str, step: float, horizon: float, frames: int) -> xr.Dataset:
+def film_table(scene: Scene, integrator: str, step: float, horizon: float, frames: int) -> xr.Dataset:
     """The attitude of a run and the true one at every frame of an animation; dimension ``frame``."""
-    run = simulate(scene, method, step_size=step, horizon=horizon, observe="attitude", samples=frames, guard=False)
-    q = charts.quaternion_from_angles(run["theta"].values, run["phi"].values, run["psi"].values)
-    truth = closed_form(scene).quaternion(run["time"].values)
+    run = simulate(scene, integrator, step_size=step, horizon=horizon, observe="attitude", samples=frames, guard=False)
+    attitude = charts.quaternion_from_angles(run["theta"].values, run["phi"].values, run["psi"].values)
     return xr.Dataset(
         {
-            "frame_time": ("frame", run["time"].values),
-            "frame_attitude": (("frame", "part"), q),
-            "true_attitude": (("frame", "part"), truth),
+            Column.FRAME_TIME: ("frame", run["time"].values),
+            Column.FRAME_ATTITUDE: (("frame", "part"), attitude),
+            Column.TRUE_ATTITUDE: (("frame", "part"), closed_form(scene).quaternion(run["time"].values)),
         }
     )
-
-
-def notebook_top() -> tuple[SymmetricTop, tuple[float, float]]:
-    """The first top from the notebook's spheroid, and the radii that its inertia gives back."""
-    polar, equatorial = SymmetricTop(2.0, 1.0, 0.0).spheroid_radii(1.0)
-    top = SymmetricTop.from_spheroid(1.0, polar, equatorial, 9.81)
-    return top, top.spheroid_radii(1.0)

@@ -58,7 +58,7 @@ class Oscillator:
 
     @property
     def regime(self) -> str:
-        """What the damping does: undamped, underdamped, critically damped or overdamped."""
+        """Undamped, underdamped, critically damped or overdamped."""
         if self.damping == 0.0:
             return "undamped"
         if self.discriminant == 0.0:
@@ -98,7 +98,7 @@ class Oscillator:
 
 
 class Sums(NamedTuple):
-    """All that a rule contributes to a linear step."""
+    """The four sums over nodes a and weights w, and the two shares of the force, that a linear step needs of a rule."""
 
     left: float  # sum w (1-a)
     right: float  # sum w a
@@ -114,8 +114,8 @@ def rule_sums(rule: "str | Quadrature", left_force: float | None = None) -> Sums
     By virtual work the shares follow from the rule (1/2 and 1/2 for a symmetric one); all of it at the left end is the
     simplest choice in the literature, and of order 1.
     """
-    found = quadrature(*RULES[rule][:2])[0] if isinstance(rule, str) else rule
-    a, w = np.array(found.nodes), np.array(found.weights)
+    numbers = quadrature(*RULES[rule][:2])[0] if isinstance(rule, str) else rule
+    a, w = np.array(numbers.nodes), np.array(numbers.weights)
     left, right = float(np.sum(w * (1.0 - a))), float(np.sum(w * a))
     push = left if left_force is None else finite("left_force", left_force)
     pull = right if left_force is None else 1.0 - push
@@ -159,7 +159,7 @@ _march = driver(_begin, _increment, _observe)
 
 
 def start_momentum(oscillator: Oscillator, rule: Sums, first: float, second: float, h: float) -> float:
-    """p0 = -D1 L_d - F_d^- of the step from one position to the next: how a two-step method enters this form."""
+    """p0 = -D1 L_d - F_d^- of the step from one position to the next: the start of a two-step method in this form."""
     par = _Numbers(oscillator.mass, oscillator.damping, oscillator.stiffness)
     return float(_observe(par, rule, (first, 0.0), (second - first, 0.0), h)[0])
 
@@ -189,7 +189,7 @@ def discrete_path(
 
 
 def discrete_exponents(oscillator: Oscillator, rule: "str | Sums", h: float) -> tuple[complex, complex]:
-    """log(z)/h of the step map's two eigenvalues, the slower decay first: what the discrete motion does instead.
+    """log(z)/h of the two eigenvalues z of the step map, the slower decay first: the exponents of the discrete motion.
 
     In positions alone the step reads A q2 - B q1 + C q0 = 0 with A - C = b, whatever the rule, and the discriminant
     B^2 - 4 A C = (b + h k (r-l))^2 - 4 m k + 4 (h k)^2 (s - r^2) + 4 b h k (f - r), free of cancellation
@@ -205,15 +205,15 @@ def discrete_exponents(oscillator: Oscillator, rule: "str | Sums", h: float) -> 
     root = cmath.sqrt(discriminant)
     if b < 0.5 * first and abs(root) < 0.5 * middle:  # z near 1: its logarithm without cancellation
         mean, half = complex(math.log1p(-b / first) / (2.0 * h)), cmath.atanh(root / middle) / h
-        found = [mean + half, mean - half]
+        exponents = [mean + half, mean - half]
     else:
         eigenvalues = ((middle + root) / (2.0 * first), (middle - root) / (2.0 * first))
-        found = [cmath.log(z) / h if z != 0.0 else complex(-math.inf) for z in eigenvalues]
-    slow, fast = sorted(found, key=lambda exponent: (-exponent.real, -exponent.imag))
+        exponents = [cmath.log(z) / h if z != 0.0 else complex(-math.inf) for z in eigenvalues]
+    slow, fast = sorted(exponents, key=lambda exponent: (-exponent.real, -exponent.imag))
     return slow, fast
 
 
-def seed_update(damping: float, h: float, first: float, second: float, steps: int) -> Array:
+def notebook_update(damping: float, h: float, first: float, second: float, steps: int) -> Array:
     """The notebook's own recurrence for m = k = 1, positions only, shape (steps + 1,).
 
     x[k+2] = ((-4 + 2 b h - h^2) x[k] + 2 (4 - h^2) x[k+1]) / (4 + 2 b h + h^2): the midpoint rule above.
@@ -225,7 +225,7 @@ def seed_update(damping: float, h: float, first: float, second: float, steps: in
     return np.array(x)
 
 
-def seed_guess(damping: float, h: float, first: float, second: float, steps: int) -> Array:
+def notebook_guess(damping: float, h: float, first: float, second: float, steps: int) -> Array:
     """The notebook's guess for the forces, for m = k = 1: dF/dx' where F belongs, and with the sign of V'.
 
     (x[k+1] - 2 x[k] + x[k-1])/h^2 = -(V'(x[k-1/2]) + V'(x[k+1/2]) + 2 dF/dx')/2 with dF/dx' = -b: a constant push
@@ -241,8 +241,8 @@ def relative_energy_error(oscillator: Oscillator, path: Path, position: float, v
     """E_h(t)/E(t) - 1 along a discrete motion."""
     x, v = oscillator.exact(path.times, position, velocity)
     true = oscillator.energy(x, oscillator.mass * v)
-    found: Array = oscillator.energy(path.position, path.momentum) / true - 1.0
-    return found
+    error: Array = oscillator.energy(path.position, path.momentum) / true - 1.0
+    return error
 
 
 def step_counts(horizon: float, steps: Sequence[float]) -> list[int]:

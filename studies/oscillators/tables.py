@@ -1,41 +1,90 @@
-"""What forced discrete Euler-Lagrange equations do to a damped oscillator and to a damped top.
+"""What is computed and stored of the damped oscillator and of the damped top.
 
-The oscillator (m = k = 1, released from x = 1 at rest) has an analytic solution; the damped top has none, and its truth
-is one integration by DOP853 at 1e-13 of the six Euler-Lagrange equations with friction, checked against another one of
-the four equations that remain when both momenta are eliminated by their balance, p = p0 - c (angle - angle0).
+The oscillator (m = k = 1, released from x = 1 at rest; times in units of sqrt(m/k)) has an analytic solution. The
+damped top has none: its truth is a pair of integrations (see `damped_truth`).
 """
 
-import math
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from symtop.base.validate import SymtopError
 from symtop.measure.errors import energy_scale, momentum_scale
-from symtop.methods.euler_lagrange import accelerations
+from symtop.measure.order import Fit, power_law
 from symtop.model.scenes import Scene
 
-from .forced import Friction, damped_run
+from .damped_top import Friction, damped_run
+from .damped_truth import damped_rates, damped_truth, energy, integrate, start_of
 from .oscillator import (
     Array,
     Oscillator,
     Sums,
     discrete_exponents,
     discrete_path,
+    notebook_guess,
+    notebook_update,
     relative_energy_error,
     rule_sums,
-    seed_guess,
-    seed_update,
     start_momentum,
     step_counts,
 )
 
+RULES = ("midpoint", "trapezoidal")
 ONE_SIDED = "force-at-one-end"  # the midpoint rule with the whole force in F_d^-, a negative control of order 1
-RELEASED = (1.0, 0.0)
+RK45 = "rk45"  # SciPy's, on the same equations
+RELEASED = (1.0, 0.0)  # position and velocity of the oscillator
+HORIZON, LONG = 25.0, 250.0  # of the oscillator: for orders, for the energy
+FRICTION = Friction(precession=0.05, spin=0.1)  # of the damped tops
 SAMPLES = 401
-TIGHT = 1e-13
+TOP_TOLERANCE = 1e-6  # of RK45 on the damped top
+LEAST_JUDGED = 1e-9  # errors below do not enter the fit of an order
+ASYMPTOTIC = {"step_size": 0.11, "top_step_size": 0.011}  # largest step that enters the fit
+
+
+class Column:
+    """Variables of the dataset, with unit and dimension. Times of the oscillator are in units of sqrt(m/k)."""
+
+    # errors at several steps; setting
+    STEP = "step_size"
+    POSITION_ERROR, EXPONENT_ERROR = "position_error", "exponent_error"  # absolute (start: 1), relative
+    # relative error of the energy over a long horizon; sample
+    TIME, ENERGY_ERROR = "sample_time", "energy_error"
+    EVALUATIONS = "evaluations"  # of the force; a scalar
+    # positions in the notebook's experiment; seed_step
+    NOTEBOOK_TIME, ANALYTIC = "seed_time", "analytic"
+    NOTEBOOK_UPDATE, NOTEBOOK_GUESS, UPDATE_GAP = "seed_update", "seed_guess", "update_gap"
+    # the damped top: errors of theta (rad) at several steps (s); top_setting
+    TOP_STEP, THETA_ERROR = "top_step_size", "theta_error"
+    TOP_BOUND = "top_bound"  # rad, distance of the two integrations of the truth; a scalar
+    # the damped top over time at the finest step; top_sample
+    TOP_TIME, THETA, TRUE_THETA = "top_time", "theta", "true_theta"  # s, rad, rad
+    P_PHI, P_PSI = "p_phi", "p_psi"
+    BALANCE_PHI, BALANCE_PSI = "balance_phi", "balance_psi"  # relative to the larger momentum
+    TOP_ENERGY, TOP_ENERGY_ERROR = "energy_top", "energy_top_error"  # absolute, relative
+
+
+def scene_name(damping: float) -> str:
+    """The name of an oscillator in the dataset."""
+    return f"damping-{damping:g}"
+
+
+def dampings(data: xr.Dataset) -> dict[str, float]:
+    """The oscillators in a dataset: damping by name."""
+    names = [str(name) for name in data["scene"].values]
+    return {name: float(name.partition("-")[2]) for name in names if name.startswith("damping-")}
+
+
+def tops(data: xr.Dataset) -> list[str]:
+    """Names of the damped tops in a dataset."""
+    return [str(name) for name in data["scene"].values if str(name) not in dampings(data)]
+
+
+def order(data: xr.Dataset, scene: str, method: str, error: str, step: str) -> Fit:
+    """Slope of an error against the step, over the steps that are small enough and the errors above rounding."""
+    cell = data.sel(scene=scene, integrator=method)
+    steps, errors = cell[step].values, cell[error].values
+    return power_law(steps, errors, (steps < ASYMPTOTIC[step]) & (errors > LEAST_JUDGED))
 
 
 def sums_of(method: str) -> Sums:
@@ -47,34 +96,39 @@ def convergence(damping: float, method: str, steps: Sequence[float], horizon: fl
     """Largest error of the position and relative error of the slow exponent; dimension ``setting``."""
     oscillator, rule = Oscillator(damping=damping), sums_of(method)
     slow = oscillator.exponents()[0]
-    found: dict[str, list[float]] = {"step_size": [], "position_error": [], "exponent_error": []}
+    columns: dict[str, list[float]] = {Column.STEP: [], Column.POSITION_ERROR: [], Column.EXPONENT_ERROR: []}
     for count in step_counts(horizon, steps):
         path = discrete_path(oscillator, rule, *RELEASED, horizon, count)
         true, _ = oscillator.exact(path.times, *RELEASED)
-        found["step_size"].append(path.step_size)
-        found["position_error"].append(float(np.max(np.abs(path.position - true))))
-        found["exponent_error"].append(abs(discrete_exponents(oscillator, rule, path.step_size)[0] - slow) / abs(slow))
-    return xr.Dataset({name: ("setting", values) for name, values in found.items()})
+        columns[Column.STEP].append(path.step_size)
+        columns[Column.POSITION_ERROR].append(float(np.max(np.abs(path.position - true))))
+        discrete = discrete_exponents(oscillator, rule, path.step_size)[0]
+        columns[Column.EXPONENT_ERROR].append(abs(discrete - slow) / abs(slow))
+    return xr.Dataset({name: ("setting", values) for name, values in columns.items()})
 
 
 def decay(damping: float, method: str, step: float, horizon: float) -> xr.Dataset:
     """Relative error of the energy over a long horizon, at one force evaluation a step; dimension ``sample``.
 
-    ``rk45`` gets the tolerance with which it needs as many evaluations.
+    ``rk45`` gets the tightest tolerance with which it needs no more evaluations.
     """
     oscillator, count = Oscillator(damping=damping), step_counts(horizon, [step])[0]
-    if method == "rk45":
+    if method == RK45:
         times, error, evaluations = _rk45_at_cost(oscillator, count, horizon)
     else:
         path = discrete_path(oscillator, sums_of(method), *RELEASED, horizon, count, SAMPLES)
         times, error, evaluations = path.times, relative_energy_error(oscillator, path, *RELEASED), count
     return xr.Dataset(
-        {"sample_time": ("sample", times), "energy_error": ("sample", error), "evaluations": float(evaluations)}
+        {
+            Column.TIME: ("sample", times),
+            Column.ENERGY_ERROR: ("sample", error),
+            Column.EVALUATIONS: float(evaluations),
+        }
     )
 
 
 def _rk45_at_cost(oscillator: Oscillator, evaluations: int, horizon: float) -> tuple[Array, Array, int]:
-    """SciPy's RK45 with the relative tolerance whose cost is nearest to `evaluations`, found by bisection."""
+    """SciPy's RK45 with the tightest relative tolerance that takes at most `evaluations`, found by bisection."""
     from scipy.integrate import solve_ivp  # 0.6 s to import
 
     m, b, k = oscillator.mass, oscillator.damping, oscillator.stiffness
@@ -97,7 +151,7 @@ def _rk45_at_cost(oscillator: Oscillator, evaluations: int, horizon: float) -> t
     return times, error, int(done.nfev)
 
 
-def seed_history(damping: float, h: float, horizon: float) -> xr.Dataset:
+def notebook_history(damping: float, h: float, horizon: float) -> xr.Dataset:
     """The notebook's experiment: analytic, its update, ours from the same two positions, and its guess at the forces.
 
     Dimension ``seed_step``. The notebook starts on the slow mode, x = Re exp(lambda t), from two exact positions.
@@ -108,90 +162,15 @@ def seed_history(damping: float, h: float, horizon: float) -> xr.Dataset:
     first, second = float(true[0]), float(true[1])
     momentum = start_momentum(oscillator, rule_sums("midpoint"), first, second, h)
     ours = discrete_path(oscillator, "midpoint", first, momentum, count * h, count, count + 1).position
-    update = seed_update(damping, h, first, second, count)
+    update = notebook_update(damping, h, first, second, count)
     columns = {
-        "seed_time": times,
-        "analytic": true,
-        "seed_update": update,
-        "update_gap": np.abs(update - ours),
-        "seed_guess": seed_guess(damping, h, first, second, count),
+        Column.NOTEBOOK_TIME: times,
+        Column.ANALYTIC: true,
+        Column.NOTEBOOK_UPDATE: update,
+        Column.UPDATE_GAP: np.abs(update - ours),
+        Column.NOTEBOOK_GUESS: notebook_guess(damping, h, first, second, count),
     }
     return xr.Dataset({name: ("seed_step", values) for name, values in columns.items()})
-
-
-class DampedTruth(NamedTuple):
-    """The damped top's motion at given times, and how well it is known."""
-
-    theta: Array
-    phi: Array
-    psi: Array
-    energy: Array
-    bound: float  # rad: largest distance of the two integrations in any angle
-
-
-def damped_rates(scene: Scene, friction: Friction) -> Callable[[float, Any], tuple[float, ...]]:
-    """y' for y = (theta, phi, psi, theta', phi', psi') with friction: M q'' gains (0, -c_phi phi', -c_psi psi')."""
-    top = scene.top
-
-    def rates(_: float, y: Any) -> tuple[float, ...]:
-        theta, _phi, _psi, theta_dot, phi_dot, psi_dot = y
-        nod, swing, spin = accelerations(top.I1, top.I3, top.mgl, theta, theta_dot, phi_dot, psi_dot)
-        s, c = math.sin(theta), math.cos(theta)
-        torque = -friction.spin * psi_dot
-        turn = (-friction.precession * phi_dot - c * torque) / (top.I1 * s * s)
-        return theta_dot, phi_dot, psi_dot, nod, swing + turn, spin + torque / top.I3 - c * turn
-
-    return rates
-
-
-def _balanced_rates(scene: Scene, friction: Friction) -> Callable[[float, Any], tuple[float, ...]]:
-    """y' for y = (theta, phi, psi, p_theta), the momenta eliminated by their balance."""
-    top, start = scene.top, scene.start
-    momenta = top.momenta(start)
-
-    def rates(_: float, y: Any) -> tuple[float, ...]:
-        theta, phi, psi, p_theta = y
-        p_phi = momenta.p_phi - friction.precession * (phi - start.phi)
-        p_psi = momenta.p_psi - friction.spin * (psi - start.psi)
-        s, c = math.sin(theta), math.cos(theta)
-        turn = (p_phi - p_psi * c) / (top.I1 * s * s)
-        return p_theta / top.I1, turn, p_psi / top.I3 - turn * c, s * (turn * (top.I1 * turn * c - p_psi) + top.mgl)
-
-    return rates
-
-
-def _integrate(rates: Any, start: Sequence[float], times: Array, solver: str, tolerance: float) -> Any:
-    from scipy.integrate import solve_ivp  # 0.6 s to import
-
-    return solve_ivp(rates, (0.0, float(times[-1])), start, method=solver, rtol=tolerance, atol=tolerance, t_eval=times)
-
-
-def _rates_of(scene: Scene) -> tuple[float, ...]:
-    at = scene.start
-    return at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot
-
-
-def damped_truth(scene: Scene, friction: Friction, times: Array) -> DampedTruth:
-    """Two integrations at 1e-13, of six equations and of four; SymtopError if either ends early."""
-    at = scene.start
-    first = _integrate(damped_rates(scene, friction), _rates_of(scene), times, "DOP853", TIGHT)
-    reduced = (at.theta, at.phi, at.psi, scene.top.I1 * at.theta_dot)
-    second = _integrate(_balanced_rates(scene, friction), reduced, times, "DOP853", TIGHT)
-    if not (first.success and second.success):
-        raise SymtopError(
-            f"the damped {scene.name} cannot be integrated to t = {times[-1]:g}: {first.message} {second.message}"
-        )
-    bound = float(np.max(np.abs(first.y[:3] - second.y[:3])))
-    theta, phi, psi, *rates = first.y
-    return DampedTruth(theta, phi, psi, _energy(scene, theta, *rates), bound)
-
-
-def _energy(scene: Scene, theta: Array, theta_dot: Array, phi_dot: Array, psi_dot: Array) -> Array:
-    top = scene.top
-    spin = psi_dot + phi_dot * np.cos(theta)
-    across = theta_dot**2 + (phi_dot * np.sin(theta)) ** 2
-    found: Array = 0.5 * top.I1 * across + 0.5 * top.I3 * spin**2 + top.mgl * np.cos(theta)
-    return found
 
 
 def damped_top_table(
@@ -206,14 +185,14 @@ def damped_top_table(
     share = np.unique(np.rint(np.linspace(0.0, counts[0], min(SAMPLES, counts[0] + 1))).astype(np.int64))
     times = share.astype(np.float64) * (horizon / counts[0])
     truth = damped_truth(scene, friction, times)
-    found: dict[str, Any] = {"top_bound": truth.bound}
-    if method == "rk45":
-        done = _integrate(damped_rates(scene, friction), _rates_of(scene), times, "RK45", 1e-6)
+    columns: dict[str, Any] = {Column.TOP_BOUND: truth.bound}
+    if method == RK45:
+        done = integrate(damped_rates(scene, friction), start_of(scene), times, "RK45", TOP_TOLERANCE)
         theta, phi, psi, *rates = done.y
         spin = scene.top.I3 * (rates[2] + rates[1] * np.cos(theta))
         p_phi = scene.top.I1 * rates[1] * np.sin(theta) ** 2 + spin * np.cos(theta)
         history = _history(scene, friction, np.array([theta, phi, psi, p_phi, spin]))
-        history["energy_top"] = _energy(scene, theta, *rates)
+        history[Column.TOP_ENERGY] = energy(scene, theta, *rates)
     else:
         theta_errors = []
         for count in counts:
@@ -221,13 +200,13 @@ def damped_top_table(
             run = damped_run(scene.top, scene.start, friction, method, horizon / count, marks)
             theta_errors.append(float(np.max(np.abs(run.states[:, 0] - truth.theta))))
         states = run.states.T
-        found["top_step_size"] = ("top_setting", [horizon / count for count in counts])
-        found["theta_error"] = ("top_setting", theta_errors)
+        columns[Column.TOP_STEP] = ("top_setting", [horizon / count for count in counts])
+        columns[Column.THETA_ERROR] = ("top_setting", theta_errors)
         history = _history(scene, friction, states[[0, 1, 2, 4, 5]])
-        history["energy_top"] = scene.top.reduced_energy(states[0], states[3], states[4], states[5])
-    history |= {"top_time": times, "theta": history.pop("theta"), "true_theta": truth.theta}
-    history["energy_top_error"] = np.abs(history["energy_top"] - truth.energy) / energy_scale(scene)
-    return xr.Dataset(found | {name: ("top_sample", values) for name, values in history.items()})
+        history[Column.TOP_ENERGY] = scene.top.reduced_energy(states[0], states[3], states[4], states[5])
+    history |= {Column.TOP_TIME: times, Column.THETA: history.pop(Column.THETA), Column.TRUE_THETA: truth.theta}
+    history[Column.TOP_ENERGY_ERROR] = np.abs(history[Column.TOP_ENERGY] - truth.energy) / energy_scale(scene)
+    return xr.Dataset(columns | {name: ("top_sample", values) for name, values in history.items()})
 
 
 def _history(scene: Scene, friction: Friction, states: Array) -> dict[str, Array]:
@@ -235,9 +214,9 @@ def _history(scene: Scene, friction: Friction, states: Array) -> dict[str, Array
     theta, phi, psi, p_phi, p_psi = states
     scale = momentum_scale(scene)
     return {
-        "theta": theta,
-        "p_phi": p_phi,
-        "p_psi": p_psi,
-        "balance_phi": (p_phi - p_phi[0] + friction.precession * (phi - phi[0])) / scale,
-        "balance_psi": (p_psi - p_psi[0] + friction.spin * (psi - psi[0])) / scale,
+        Column.THETA: theta,
+        Column.P_PHI: p_phi,
+        Column.P_PSI: p_psi,
+        Column.BALANCE_PHI: (p_phi - p_phi[0] + friction.precession * (phi - phi[0])) / scale,
+        Column.BALANCE_PSI: (p_psi - p_psi[0] + friction.spin * (psi - psi[0])) / scale,
     }

@@ -12,22 +12,21 @@ two orders agree, and the midpoint rule is moreover the implicit midpoint rule o
 With several nodes the single mean rate dphi/h has to serve nodes that each want their own, the two orders differ
 by O(h^2), and reducing first turns the trapezoidal rule into Stormer-Verlet, which is explicit. The Galerkin
 integrator of order 4 does not commute either (its rates are linear in time, the reduced ones are not): it differs by
-O(h^4). Source: Jalnapurkar,
-Leok, Marsden, West, Discrete Routh reduction, J. Phys. A 39 (2006) 5521.
+O(h^4). Source: Jalnapurkar, Leok, Marsden, West, Discrete Routh reduction, J. Phys. A 39 (2006) 5521.
 
-Plain Python on a few thousand steps: these are witnesses, not integrators.
+The steps that reduce first are plain Python, run for a few thousand steps, and no integrators of the registry. Which
+one belongs to an integrator follows from the kernel and the rule inside its solver, not from its name.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from symtop.base.validate import SymtopError
-from symtop.methods.discrete_lagrangian import Quadrature, is_midpoint, rule_of
+from symtop.methods.discrete_lagrangian import Quadrature, rule_of
 from symtop.methods.galerkin import is_galerkin
-from symtop.methods.registry import Integrator, Plan, integrator
+from symtop.methods.registry import Integrator, Plan
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
@@ -163,7 +162,7 @@ def gap(first: Array, second: Array) -> Gap:
 def commutation_gap(scene: Scene, method: Integrator, h: float, steps: int) -> Gap:
     """Distance between reducing first and discretising first, for a discrete Lagrangian.
 
-    Raises SymtopError for an integrator that is not one of `discrete_lagrangian` or `galerkin`.
+    SymtopError for an integrator that is not one of `discrete_lagrangian` or `galerkin`.
     """
     step = reduced_first(scene, method)
     if step is None:
@@ -171,25 +170,6 @@ def commutation_gap(scene: Scene, method: Integrator, h: float, steps: int) -> G
     return gap(path(scene, step, h, steps), kernel_path(scene, method, h, steps))
 
 
-def midpoint_gap(scene: Scene, h: float, steps: int) -> Gap:
+def hamiltonian_gap(scene: Scene, method: Integrator, h: float, steps: int) -> Gap:
     """Distance between the midpoint discrete Lagrangian and the implicit midpoint rule on (theta, p_theta)."""
-    kernel = kernel_path(scene, integrator("midpoint"), h, steps)
-    return gap(path(scene, implicit_midpoint_step(scene), h, steps), kernel)
-
-
-def commutation_table(scene: Scene, method: Integrator, horizon: float, counts: Sequence[int]) -> xr.Dataset:
-    """How far apart the two orders end up at several step sizes; dimension ``commutation_step``.
-
-    ``commutation_gap`` is the largest difference in theta (radians) over the run; for the midpoint rule
-    ``hamiltonian_gap`` compares with the implicit midpoint rule on (theta, p_theta) as well.
-    """
-    steps = [(horizon / count, count) for count in counts]
-    data = xr.Dataset(
-        {
-            "commutation_step_size": ("commutation_step", [h for h, _ in steps]),
-            "commutation_gap": ("commutation_step", [commutation_gap(scene, method, *step).theta for step in steps]),
-        }
-    )
-    if is_midpoint(method):
-        data["hamiltonian_gap"] = ("commutation_step", [midpoint_gap(scene, *step).theta for step in steps])
-    return data
+    return gap(path(scene, implicit_midpoint_step(scene), h, steps), kernel_path(scene, method, h, steps))

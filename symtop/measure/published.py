@@ -13,6 +13,7 @@ from symtop.model.scenes import closed_form, scene
 from symtop.run.reference import reference
 
 REMARK = "an asymmetric free body: tests the solver beside us, not symtop"
+TRAJECTORY, START, OTHER_BODY = "trajectory", "start", "another body"
 
 
 class Published(NamedTuple):
@@ -25,6 +26,7 @@ class Published(NamedTuple):
     unit: float  # one unit of the last digit that is compared
     kind: str  # printed, formula or consistency
     remark: str = ""
+    tests: str = TRAJECTORY  # what the comparison tests: a trajectory of a top, its start, or another body
 
     @property
     def reproduced(self) -> bool:
@@ -40,7 +42,8 @@ def published_values() -> list[Published]:
 def _simo_wong() -> Published:
     where = scene("simo-wong")
     energy = where.top.energy(where.start)
-    return Published("Simo & Wong 1991; Krysl 2005", "energy of the fast top", 1269.975, energy, 1e-3, "printed")
+    source = "Simo & Wong 1991; Krysl 2005"
+    return Published(source, "energy of the fast top", 1269.975, energy, 1e-3, "printed", tests=START)
 
 
 def _bruls_cardona_arnold() -> list[Published]:
@@ -83,8 +86,8 @@ def _hairer() -> list[Published]:
     momenta = where.top.momenta(where.start)
     source = "Hairer, Lubich & Wanner, figure VII.5.3"
     return [
-        Published(source, "energy", 1.72, where.top.energy(where.start), 1e-12, "consistency"),
-        Published(source, "vertical angular momentum", 1.04, momenta.p_phi, 1e-12, "consistency"),
+        Published(source, "energy", 1.72, where.top.energy(where.start), 1e-12, "consistency", tests=START),
+        Published(source, "vertical angular momentum", 1.04, momenta.p_phi, 1e-12, "consistency", tests=START),
     ]
 
 
@@ -96,10 +99,8 @@ def _detest() -> list[Published]:
         lambda _, y: (y[1] * y[2], -y[0] * y[2], -0.51 * y[0] * y[1]), (0.0, 20.0), (0.0, 1.0, 1.0),
         method="DOP853", rtol=3e-14, atol=1e-15,
     )  # fmt: skip
-    printed = (-0.93965707987, -0.34211777540, 0.74141265962)
+    source, printed = "Enright & Pryce 1987, DETEST B5", (-0.93965707987, -0.34211777540, 0.74141265962)
     return [
-        Published(
-            "Enright & Pryce 1987, DETEST B5", f"y{k + 1}(20)", value, float(done.y[k, -1]), 1e-11, "printed", REMARK
-        )
+        Published(source, f"y{k + 1}(20)", value, float(done.y[k, -1]), 1e-11, "printed", REMARK, OTHER_BODY)
         for k, value in enumerate(printed)
     ]

@@ -1,20 +1,23 @@
 """Reduce, then discretise, against discretise, then reduce."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.optimize import root
 from symtop_studies.reduction import commutation
 from symtop_studies.reduction.commutation import (
     commutation_gap,
-    commutation_table,
     gap,
+    hamiltonian_gap,
     kernel_path,
-    midpoint_gap,
     path,
 )
+from symtop_studies.reduction.tables import Column, commutation_table, unreduced_form, unreduced_gaps
 
 import symtop
 from symtop.measure.order import power_law
+from symtop.methods import registry
 from symtop.methods.discrete_lagrangian import Quadrature, rule_of
 from tests.conftest import random_scenes
 
@@ -22,23 +25,23 @@ SCENES = ("spheroid", "goldstein")
 COUNTS = (100, 200, 400, 800)
 
 
-def commutes(where, method, h=0.02, steps=200):
+def commutes(scene, method, h=0.02, steps=200):
     """Within rounding of two compensated sums."""
-    return commutation_gap(where, method, h, steps).theta < 1e-13
+    return commutation_gap(scene, method, h, steps).theta < 1e-13
 
 
 def slope(scene_name, name):
     """The power of h with which the two orders approach each other over two nutations."""
-    where = symtop.scene(scene_name)
-    table = commutation_table(where, symtop.integrator(name), 2.0 * where.nutation_period, COUNTS)
-    return power_law(table["commutation_step_size"], table["commutation_gap"]).slope
+    scene = symtop.scene(scene_name)
+    table = commutation_table(scene, symtop.integrator(name), 2.0 * scene.nutation_period, COUNTS)
+    return power_law(table[Column.COMMUTATION_STEP], table[Column.COMMUTATION_GAP]).slope
 
 
 @pytest.mark.parametrize("scene_name", SCENES)
 def test_the_midpoint_rule_commutes_with_the_reduction(scene_name):
-    where = symtop.scene(scene_name)
-    assert commutes(where, symtop.integrator("midpoint"))
-    assert midpoint_gap(where, 0.02, 200).theta < 1e-13
+    scene = symtop.scene(scene_name)
+    assert commutes(scene, symtop.integrator("midpoint"))
+    assert hamiltonian_gap(scene, symtop.integrator("midpoint"), 0.02, 200).theta < 1e-13
 
 
 @pytest.mark.parametrize("node", [0.0, 0.3, 1.0])
@@ -61,10 +64,10 @@ def test_galerkin_does_not_commute_either(scene_name):
 
 @pytest.mark.parametrize("scene_name", SCENES)
 def test_the_trapezoidal_routhian_is_stormer_verlet(scene_name):
-    where = symtop.scene(scene_name)
-    verlet = kernel_path(where, symtop.integrator("stormer-verlet"), 0.02, 200)
+    scene = symtop.scene(scene_name)
+    verlet = kernel_path(scene, symtop.integrator("stormer-verlet"), 0.02, 200)
     for rule, same in ((Quadrature((0.0, 1.0), (0.5, 0.5)), True), (Quadrature((0.0, 1.0), (0.4, 0.6)), False)):
-        assert (gap(path(where, commutation.routhian_step(where, rule), 0.02, 200), verlet).theta < 1e-13) is same
+        assert (gap(path(scene, commutation.routhian_step(scene, rule), 0.02, 200), verlet).theta < 1e-13) is same
 
 
 def lobatto_step(top, point, h):
@@ -88,19 +91,19 @@ def lobatto_step(top, point, h):
             [places - theta - h * IIIA @ momenta / top.I1, momenta - p_theta + h * IIIB @ slopes(places)]
         )
 
-    found = root(equations, np.array([theta] * 3 + [p_theta] * 3), tol=1e-14).x
-    return theta + h * weights @ found[3:] / top.I1, p_theta - h * weights @ slopes(found[:3])
+    stages = root(equations, np.array([theta] * 3 + [p_theta] * 3), tol=1e-14).x
+    return theta + h * weights @ stages[3:] / top.I1, p_theta - h * weights @ slopes(stages[:3])
 
 
-@pytest.mark.parametrize("where", random_scenes(4, seed=32), ids=lambda s: s.name)
-def test_lobatto_on_the_whole_top_is_galerkin_on_the_routhian_and_not_on_the_top(where):
+@pytest.mark.parametrize("scene", random_scenes(4, seed=32), ids=lambda s: s.name)
+def test_lobatto_on_the_whole_top_is_galerkin_on_the_routhian_and_not_on_the_top(scene):
     """The two are one method for a constant mass only; the inertia of the top is not constant."""
-    at, momenta, h = where.start, where.top.momenta(where.start), 0.05
-    point = (at.theta, at.phi, at.psi, where.top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi)
-    lobatto = lobatto_step(where.top, point, h)
+    at, momenta, h = scene.start, scene.top.momenta(scene.start), 0.05
+    point = (at.theta, at.phi, at.psi, scene.top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi)
+    lobatto = lobatto_step(scene.top, point, h)
     start = np.array([at.theta, point[3]])
-    first = path(where, commutation.routhian_galerkin_step(where), h, 1)[1]
-    last = kernel_path(where, symtop.integrator("galerkin-simpson"), h, 1)[1]
+    first = path(scene, commutation.routhian_galerkin_step(scene), h, 1)[1]
+    last = kernel_path(scene, symtop.integrator("galerkin-simpson"), h, 1)[1]
     assert first == pytest.approx(lobatto, abs=1e-13)
     assert not np.allclose(last, lobatto, rtol=0.0, atol=1e-12)
     assert np.max(np.abs(last - lobatto)) < 1e-3 * np.max(np.abs(np.array(lobatto) - start))
@@ -110,6 +113,27 @@ def test_a_solver_remembers_its_rule_and_others_have_none():
     assert rule_of(symtop.integrator("midpoint")).nodes == (0.5,)
     for name in ("stormer-verlet", "taylor", "midpoint-unreduced"):
         assert rule_of(symtop.integrator(name)) is None
+
+
+@pytest.mark.parametrize("name", ["midpoint", "trapezoidal", "galerkin-simpson"])
+def test_the_comparison_follows_the_solver_and_not_the_name(name):
+    scene, known = symtop.scene("goldstein"), symtop.integrator(name)
+    renamed = dataclasses.replace(known, name="another-name")
+    tables = [commutation_table(scene, method, scene.nutation_period, COUNTS[:2]) for method in (known, renamed)]
+    assert tables[0].identical(tables[1])
+    assert (Column.HAMILTONIAN_GAP in tables[1]) is (name == "midpoint")
+
+
+def test_an_unreduced_form_steps_the_same_rule_whatever_it_is_called(monkeypatch):
+    known = dict(registry.integrators())
+    known["whole"] = dataclasses.replace(known.pop("midpoint-unreduced"), name="whole")
+    monkeypatch.setattr(registry, "_registry", known)
+    assert unreduced_form("midpoint") == "whole"
+    assert unreduced_form("trapezoidal") == "trapezoidal-unreduced"
+    for name in ("simpson-linear", "galerkin-simpson", "strang", "whole"):
+        assert unreduced_form(name) is None
+    with pytest.raises(symtop.SymtopError, match=r"one with an unreduced form .*, not 'strang'"):
+        unreduced_gaps(symtop.scene("spheroid"), "strang", 1.0, 10)
 
 
 def test_a_method_that_has_no_reduced_twin_is_refused_in_one_sentence():

@@ -6,22 +6,23 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from symtop_studies.oscillators.forced import Friction, damped_run
+from symtop_studies.oscillators.damped_top import Friction, damped_run
+from symtop_studies.oscillators.damped_truth import damped_truth
 from symtop_studies.oscillators.oscillator import (
     Oscillator,
     discrete_exponents,
     discrete_path,
+    notebook_update,
     relative_energy_error,
     rule_sums,
-    seed_update,
 )
 from symtop_studies.oscillators.tables import (
     ONE_SIDED,
+    Column,
     convergence,
     damped_top_table,
-    damped_truth,
     decay,
-    seed_history,
+    notebook_history,
 )
 
 import symtop
@@ -57,13 +58,13 @@ def test_the_exact_motion_is_the_matrix_exponential(damping):
 @pytest.mark.parametrize("damping", DAMPINGS)
 def test_order_two_in_every_regime(damping, method):
     table = convergence(damping, method, STEPS, 25.0)
-    assert power_law(table["step_size"], table["position_error"]).slope == pytest.approx(2.0, abs=0.02)
+    assert power_law(table[Column.STEP], table[Column.POSITION_ERROR]).slope == pytest.approx(2.0, abs=0.02)
 
 
 @pytest.mark.parametrize("damping", DAMPINGS[1:])
 def test_the_whole_force_at_one_end_costs_an_order(damping):
     table = convergence(damping, ONE_SIDED, STEPS[4:], 25.0)
-    assert power_law(table["step_size"], table["position_error"]).slope == pytest.approx(1.0, abs=0.05)
+    assert power_law(table[Column.STEP], table[Column.POSITION_ERROR]).slope == pytest.approx(1.0, abs=0.05)
 
 
 def test_only_the_midpoint_rule_leaves_critical_damping_in_place():
@@ -81,10 +82,10 @@ def test_only_the_midpoint_rule_leaves_critical_damping_in_place():
 def test_the_exponents_are_those_of_the_step_matrix(rule):
     for damping, h in itertools.product((0.0, 0.1, 1.0, 2.0001, 4.0, 7.0), (0.01, 0.3, 1.0)):
         oscillator = Oscillator(1.3, damping, 0.8)
-        found = np.exp(h * np.array(discrete_exponents(oscillator, rule, h)))
+        eigenvalues = np.exp(h * np.array(discrete_exponents(oscillator, rule, h)))
         matrix = step_matrix(oscillator, rule, h)
-        assert found.sum() == pytest.approx(np.trace(matrix), abs=1e-13)
-        assert found.prod() == pytest.approx(np.linalg.det(matrix), abs=1e-13)
+        assert eigenvalues.sum() == pytest.approx(np.trace(matrix), abs=1e-13)
+        assert eigenvalues.prod() == pytest.approx(np.linalg.det(matrix), abs=1e-13)
 
 
 def test_the_path_is_powers_of_the_step_matrix():
@@ -103,19 +104,19 @@ def test_undamped_steps_are_symplectic_and_damped_ones_contract():
 
 def test_the_notebooks_update_is_the_midpoint_rule_and_its_guess_is_not():
     for damping, h in itertools.product(DAMPINGS, (1.0, 0.1, 0.01)):
-        data = seed_history(damping, h, 25.0)
-        assert float(data["update_gap"].max()) < 5e-16 * (25.0 / h) ** 1.5
-        gap = float(np.abs(data["seed_guess"] - data["seed_update"]).max())
+        data = notebook_history(damping, h, 25.0)
+        assert float(data[Column.UPDATE_GAP].max()) < 5e-16 * (25.0 / h) ** 1.5
+        gap = float(np.abs(data[Column.NOTEBOOK_GUESS] - data[Column.NOTEBOOK_UPDATE]).max())
         assert gap < 1e-12 if damping == 0.0 else gap > 0.5 * damping
-    late = seed_history(1.0, 0.1, 25.0)["seed_guess"].values[-70:]
+    late = notebook_history(1.0, 0.1, 25.0)[Column.NOTEBOOK_GUESS].values[-70:]
     assert late.mean() == pytest.approx(1.0, abs=0.1)  # about x = b
     assert np.ptp(late) > 0.9  # and no smaller than at the start
 
 
 def test_one_wrong_coefficient_of_the_update_would_be_seen():
     path = discrete_path(Oscillator(damping=0.5), "midpoint", 1.0, 0.0, 25.0, 250, 251)
-    good = seed_update(0.5, 0.1, *path.position[:2], 250)
-    bad = seed_update(0.5 + 1e-6, 0.1, *path.position[:2], 250)
+    good = notebook_update(0.5, 0.1, *path.position[:2], 250)
+    bad = notebook_update(0.5 + 1e-6, 0.1, *path.position[:2], 250)
     assert np.max(np.abs(good - path.position)) < 1e-12
     assert np.max(np.abs(bad - path.position)) > 1e-8
 
@@ -129,8 +130,8 @@ def test_energy_without_and_with_damping():
     assert 1e-3 < error.max() < 3e-3  # bounded by h^2/4
     assert error[error.size // 2 :].max() < 1.01 * error[: error.size // 2].max()
     rk45 = decay(0.0, "rk45", 0.05, 250.0)
-    assert float(rk45["evaluations"]) == pytest.approx(5000, rel=0.15)
-    loss = np.abs(rk45["energy_error"].values)
+    assert float(rk45[Column.EVALUATIONS]) == pytest.approx(5000, rel=0.15)
+    loss = np.abs(rk45[Column.ENERGY_ERROR].values)
     assert loss[-1] > 5.0 * loss[loss.size // 10]  # a drift
 
 
@@ -148,11 +149,11 @@ FRICTION = Friction(0.05, 0.1)
 
 
 def _run(name, friction, rule, steps, horizon):
-    where = symtop.scene(name)
+    scene = symtop.scene(name)
     marks = np.arange(steps + 1, dtype=np.int64)
-    done = damped_run(where.top, where.start, friction, rule, horizon / steps, marks)
+    done = damped_run(scene.top, scene.start, friction, rule, horizon / steps, marks)
     assert done.outcome == 0
-    return where, done.states
+    return scene, done.states
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -169,8 +170,8 @@ def test_each_step_changes_the_momenta_by_exactly_the_discrete_forces(name, rule
 
 
 def test_without_friction_it_is_the_unreduced_kernel():
-    where, states = _run("spheroid", Friction(0.0, 0.0), "midpoint", 800, 8.0)
-    run = symtop.simulate(where, "midpoint-unreduced", step_size=0.01, samples=801, guard=False)
+    scene, states = _run("spheroid", Friction(0.0, 0.0), "midpoint", 800, 8.0)
+    run = symtop.simulate(scene, "midpoint-unreduced", step_size=0.01, samples=801, guard=False)
     for column, angle in enumerate(("theta", "phi", "psi")):
         assert np.max(np.abs(states[:, column] - run[angle].values)) < 1e-11
 
@@ -178,19 +179,19 @@ def test_without_friction_it_is_the_unreduced_kernel():
 @pytest.mark.parametrize("method", ["midpoint", "trapezoidal"])
 def test_the_damped_top_has_order_two_and_its_truth_a_second_witness(method):
     table = damped_top_table(symtop.scene("goldstein"), FRICTION, method, [500, 1000, 2000, 4000], 20.0)
-    assert power_law(table["top_step_size"], table["theta_error"]).slope == pytest.approx(2.0, abs=0.02)
-    assert float(table["top_bound"]) < 1e-10
+    assert power_law(table[Column.TOP_STEP], table[Column.THETA_ERROR]).slope == pytest.approx(2.0, abs=0.02)
+    assert float(table[Column.TOP_BOUND]) < 1e-10
 
 
 def test_runge_kutta_does_not_keep_the_balance():
     table = damped_top_table(symtop.scene("goldstein"), FRICTION, "rk45", [500], 20.0)
-    assert float(np.abs(table["balance_phi"]).max()) > 1e-8
+    assert float(np.abs(table[Column.BALANCE_PHI]).max()) > 1e-8
 
 
 def test_the_power_of_the_friction_is_what_the_energy_loses():
-    where = symtop.scene("goldstein")
+    scene = symtop.scene("goldstein")
     times = np.linspace(0.0, 10.0, 4001)
-    truth = damped_truth(where, FRICTION, times)
+    truth = damped_truth(scene, FRICTION, times)
     rates = np.gradient(truth.phi, times, edge_order=2), np.gradient(truth.psi, times, edge_order=2)
     power = FRICTION.precession * rates[0] ** 2 + FRICTION.spin * rates[1] ** 2
     spent = np.sum(0.5 * (power[1:] + power[:-1])) * times[1]
@@ -198,11 +199,11 @@ def test_the_power_of_the_friction_is_what_the_energy_loses():
 
 
 def test_bad_friction_is_refused():
-    where = symtop.scene("goldstein")
+    scene = symtop.scene("goldstein")
     for bad in (Friction(-1.0, 0.0), Friction(0.0, math.inf)):
         with pytest.raises(SymtopError, match="friction"):
-            damped_run(where.top, where.start, bad, "midpoint", 0.1, np.array([0, 1]))
+            damped_run(scene.top, scene.start, bad, "midpoint", 0.1, np.array([0, 1]))
     with pytest.raises(SymtopError, match="spin friction"):
-        damped_run(where.top, where.start, Friction(0.0, "sticky"), "midpoint", 0.1, np.array([0, 1]))
+        damped_run(scene.top, scene.start, Friction(0.0, "sticky"), "midpoint", 0.1, np.array([0, 1]))
     with pytest.raises(SymtopError, match="rule"):
-        damped_run(where.top, where.start, FRICTION, "midpont", 0.1, np.array([0, 1]))
+        damped_run(scene.top, scene.start, FRICTION, "midpont", 0.1, np.array([0, 1]))

@@ -5,11 +5,13 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.notebook.tables import NOTEBOOK_FIGURES, SCAN, SOLVER, SOLVER_TOLERANCE, solver_scan
+from symtop_studies.notebook import words as notebook_words
+from symtop_studies.notebook.tables import SOLVER, Column
 from symtop_studies.stability import mechanism_words
+from symtop_studies.truth import words as truth_words
 
 import symtop
-from symtop.measure import conservation
+from symtop.measure import conservation, published
 from symtop.runner import run as runner
 
 
@@ -17,12 +19,6 @@ from symtop.runner import run as runner
 def drift():
     runner.load("drift")
     return sys.modules["symtop_studies.drift.study"]
-
-
-@pytest.fixture(scope="module")
-def notebook():
-    runner.load("notebook")
-    return sys.modules["symtop_studies.notebook.study"]
 
 
 @pytest.mark.parametrize(
@@ -113,29 +109,29 @@ def test_a_loss_that_is_off_by_a_fifth_was_not_foretold(drift):
     assert "It was foretold" not in said(1.3)
 
 
-def test_the_tolerance_of_the_notebooks_solver_was_chosen_and_the_scan_says_so(notebook):
-    found = solver_scan(symtop.scene("spheroid"))
-    data = found.expand_dims(scene=["spheroid"], integrator=[SOLVER])
-    assert np.any(np.isclose(SCAN, SOLVER_TOLERANCE, rtol=1e-12))
-    here = found.isel(tolerance_setting=SCAN.index(SOLVER_TOLERANCE))
-    assert {name: int(here[f"scan_{name}_figures"]) for name in NOTEBOOK_FIGURES} == NOTEBOOK_FIGURES
-    assert "chosen to give the notebook's 5/6/6 figures" in notebook._scan_words(data)
-    assert "2.6e-07" in notebook._scan_words(data)
-    assert "none of 7" in notebook._scan_words(data.assign(scan_energy_figures=data["scan_energy_figures"] + 9.0))
-    assert "energy rises at 7, falls at 0" in notebook._ways_words(data.assign(
-        scan_energy_rise=abs(data["scan_energy_rise"]), scan_energy_doubt=0.0 * data["scan_energy_doubt"]))  # fmt: skip
-
-
-def test_momenta_that_are_lost_are_named(notebook):
+def test_the_notebook_study_names_discrete_methods_that_lose_their_momenta():
     sizes = np.array([[1e-15, 1e-15, 1e-6]])
     coords = {"scene": ["spheroid"], "integrator": ["midpoint", "strang", SOLVER]}
     data = xr.Dataset(
-        {f"{name}_largest": (("scene", "integrator"), sizes) for name in ("p_phi", "p_psi")}, coords=coords
+        {Column.largest(name): (("scene", "integrator"), sizes) for name in notebook_words.MOMENTA}, coords=coords
     )
-    assert "all 2 discrete methods" in notebook._momenta_words(data)
-    lost = data.assign(p_phi_largest=(("scene", "integrator"), [[1e-15, 1e-9, 1e-6]]))
-    assert "of 1 of 2" in notebook._momenta_words(lost)
-    assert "not those of strang" in notebook._momenta_words(lost)
+    assert "With all 2 discrete methods" in notebook_words.momenta(data)
+    lost = data.assign({Column.largest("p_phi"): (("scene", "integrator"), [[1e-15, 1e-9, 1e-6]])})
+    assert "With 1 of 2 discrete methods" in notebook_words.momenta(lost)
+    assert "not with strang" in notebook_words.momenta(lost)
+
+
+def test_the_notebook_study_names_methods_of_order_two_whose_energy_is_worse_than_the_solvers():
+    coords = {"scene": ["spheroid"], "integrator": ["midpoint", "stormer-verlet", SOLVER]}
+    data = xr.Dataset(coords=coords).assign({
+        Column.largest("energy"): (("scene", "integrator"), [[3e-5, 1e-9, 1e-6]]),
+        Column.ENERGY_CHANGE: ("shadow_setting", [4e-4]),
+        Column.MODIFIED_CHANGE: ("shadow_setting", [1e-5]),
+    })  # fmt: skip
+    sentence = notebook_words.energy(data)
+    assert "1 of 2 have a smaller one than the solver (1e-06)" in sentence
+    assert "Not among them: midpoint (3e-05)." in sentence
+    assert "40-fold" in sentence
 
 
 @pytest.mark.parametrize(
@@ -156,3 +152,29 @@ def test_the_share_of_the_solver_is_read_from_the_numbers(one, energy, momentum,
     (said,) = mechanism_words.solver(data)
     for words in says:
         assert words in said
+
+
+def test_the_truth_study_says_what_the_printed_values_test():
+    def value(ours, tests, kind="printed"):
+        return published.Published("somebody", "something", 1.0, ours, 1e-3, kind, tests=tests)
+
+    values = [value(1.0, published.TRAJECTORY), value(1.1, published.TRAJECTORY), value(1.0, published.START)]
+    sentence = truth_words.published([*values, value(1.0, published.START, "formula")])
+    assert "2 of 3 printed values" in sentence
+    assert (
+        "Only 2 of them test a trajectory of the top (somebody); 1 tests the energy of a start, and 0 belong"
+        in sentence
+    )
+    assert "1 of 1 agree" in sentence
+    everything = truth_words.published()
+    assert "7 of 7 printed values" in everything
+    assert "Only 3 of them test a trajectory" in everything
+
+
+@pytest.mark.parametrize(("bound", "holding"), [(2e-9, 2), (5e-10, 1)])
+def test_the_truth_study_counts_the_bounds_that_an_error_exceeds(bound, holding):
+    data = xr.Dataset({
+        truth_words.Column.ERROR: ("horizon", [1e-9, 1e-9, np.nan, 1e-9]),
+        truth_words.Column.BOUND: ("horizon", [4e-9, bound, 1e-9, np.nan]),
+    })  # fmt: skip
+    assert f"Of 2 claimed bounds {holding} hold" in truth_words.bounds(data)

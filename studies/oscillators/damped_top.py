@@ -18,14 +18,13 @@ from typing import Any, NamedTuple
 
 from symtop.base.validate import SymtopError, finite, one_of
 from symtop.methods import unreduced
-from symtop.methods.angles import require_chart
 from symtop.methods.compiled import register_jitable
 from symtop.methods.discrete_lagrangian import RULES, quadrature
 from symtop.methods.loop import March, Marks, driver
-from symtop.methods.unreduced import solved
 from symtop.model.top import Angles, SymmetricTop
 
 begin = unreduced.begin
+solved = unreduced.solved
 observe = unreduced.observe
 
 
@@ -77,13 +76,12 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
 march = driver(begin, increment, observe)
 
 
-def damped_run(
-    top: SymmetricTop, start: Angles, friction: Friction, rule: str, h: float, marks: Marks
-) -> March:  # fmt: skip
-    """States (theta, phi, psi, p_theta, p_phi, p_psi) after the numbers of steps in `marks`, shape (samples, 6)."""
-    require_chart(start)
+def damped_run(top: SymmetricTop, start: Angles, friction: Friction, rule: str, h: float, marks: Marks) -> March:
+    """States (theta, phi, psi, p_theta, p_phi, p_psi) after the numbers of steps in `marks`, shape (samples, 6).
+
+    `rule` is a name of `discrete_lagrangian.RULES`. SymtopError for a pole, an unknown rule or a bad friction.
+    """
     numbers = quadrature(*RULES[one_of("rule", rule, RULES)][:2])[0]
-    momenta = top.momenta(start)
-    state = (start.theta, start.phi, start.psi, top.I1 * start.theta_dot, momenta.p_phi, momenta.p_psi)
+    state = unreduced.whole(top, start)[1]
     par = DampedTop(top.I1, top.I3, top.mgl, *friction.checked())
     return march(par, numbers, state, h, marks)

@@ -1,0 +1,252 @@
+"""Figures of the notebook study: what the notebook drew, beside the truth, in its order."""
+
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure.conservation import CONSTANTS
+from symtop.model.charts import axis_from_angles
+from symtop.model.scenes import scene
+from symtop.report import solid, style
+from symtop.runner.study import Picture
+
+from . import words
+from .tables import ALPHA, FILMED, MODIFIED, SOLVER, STEPS_A_NUTATION, Column
+from .words import cell
+
+PARTS = {"spheroid": "first part", "goldstein": "second part"}  # of the notebook
+NAMED = (SOLVER, "midpoint", "trapezoidal", "stormer-verlet", "strang", "cayley")  # the others are thin grey lines
+LABELS = {"energy": "energy (J)", "p_phi": r"$p_\varphi$ (J s)", "p_psi": r"$p_\psi$ (J s)"}
+NEAREST = 1e-17  # where a difference of exactly zero is drawn
+
+
+def pictures(data: xr.Dataset) -> list[Picture]:
+    """All figures, in the notebook's order."""
+    return [
+        draw_motion(data), draw_derivations(data), draw_residuals(data), draw_spheres(data), draw_film(data),
+        draw_alpha(data), draw_modified_energy(data),
+    ]  # fmt: skip
+
+
+def _largest_so_far(values: Any) -> Any:
+    return np.maximum.accumulate(np.maximum(np.abs(values), NEAREST))
+
+
+def draw_motion(data: xr.Dataset) -> Picture:
+    """Inclination by the notebook's solver, and its difference from the closed form."""
+    figure, axes = style.panels(1, 2, height=3.0)
+    motion, difference = axes.flat
+    first = cell(data, "spheroid", SOLVER)
+    time = first[Column.PATH_TIME].values
+    pairs = (
+        (Column.SOLVER_THETA, Column.TRUE_THETA, r"$\theta$ (rad)", style.BLUE, "-"),
+        (Column.SOLVER_THETA_DOT, Column.TRUE_THETA_DOT, r"$\dot\theta$ (rad/s)", style.VERMILLION, "--"),
+    )
+    for solver, true, label, color, line in pairs:
+        motion.plot(time, first[solver], line, color=color, label=label)
+        gaps = _largest_so_far((first[solver] - first[true]).values)
+        difference.plot(time[1:], gaps[1:], line, color=color, label=label)
+    motion.set(title="the notebook's solver", xlabel="time (s)")
+    difference.set(title="largest difference from the closed form so far", xlabel="time (s)", yscale="log")
+    style.legend_below(figure, axes)
+    gap = float(np.abs(first[Column.SOLVER_THETA] - first[Column.TRUE_THETA]).max())
+    return Picture(
+        "motion",
+        figure,
+        "Inclination theta and its rate in the first scene. Reproduced, left: the notebook's plot, by an LSODA solver "
+        f"on its six variables. Right: theta differs from the closed form by at most {gap:.0e} rad.",
+        "Left, theta and its rate against time, a nutation between 23 and 99 degrees; right, their differences from "
+        "the closed form, growing with time.",
+    )
+
+
+def draw_derivations(data: xr.Dataset) -> Picture:
+    """The two derivations against each other and against the closed form."""
+    figure, axes = style.panels(1, 2, height=3.2, sharey=True)
+    lines = (
+        (Column.DERIVATIONS_GAP, style.BLUE, "-", "hard way against easy way (rad)"),
+        (Column.HARD_GAP, style.VERMILLION, "--", "hard way against closed form (rad)"),
+        (Column.EASY_GAP, style.GREEN, ":", "easy way against closed form (rad)"),
+        (Column.ENERGY_GAP, style.BLACK, "-.", "E1 + p_psi^2/2 I3 against E (relative)"),
+    )
+    for axis, (name, part) in zip(axes.flat, PARTS.items(), strict=True):
+        solver = cell(data, name, SOLVER)
+        for variable, color, line, label in lines:
+            values = _largest_so_far(solver[variable].values)
+            axis.plot(solver[Column.BOTH_TIME].values, values, line, color=color, label=label)
+        axis.set(yscale="log", xlabel="time (s)", title=f"{name} ({part})")
+    axes[0, 0].set_ylabel("largest difference so far")
+    style.legend_below(figure, axes)
+    return Picture(
+        "two-ways",
+        figure,
+        "The notebook's two derivations. Reproduced: the hard way (three equations of second order) and the easy way "
+        "(two of first order, one of second), both integrated at tolerance 1e-13, agree to "
+        f"{float(data[Column.DERIVATIONS_GAP].max()):.0e} rad. Corrected: its two energies are not the same constant. "
+        "The second scene's E1 leaves out the spin, E1 = E - p_psi^2/2 I3, and with it they agree to "
+        f"{float(data[Column.ENERGY_GAP].max()):.0e}.",
+        "Semi-logarithmic plots of differences between derivations: rounding that grows with time.",
+    )
+
+
+def draw_residuals(data: xr.Dataset) -> Picture:
+    """Energy and momenta: the solver's as the notebook drew them, and those of every discrete method."""
+    figure, axes = style.panels(3, 3, width=13.0, height=2.3, sharex="col")
+    solver = cell(data, "spheroid", SOLVER)
+    for axis, name in zip(axes[:, 0], CONSTANTS, strict=True):
+        values = solver[name].values - (solver[name].mean().item() if name == "energy" else solver[name].values[0])
+        axis.plot(solver[Column.SAMPLE_TIME].values, values, color=style.look(SOLVER).color, lw=1.0)
+        axis.set_ylabel(f"residual {LABELS[name]}")
+        axis.ticklabel_format(axis="y", scilimits=(-2, 2))
+    axes[0, 0].set_title("as the notebook drew it, spheroid")
+    for column, name in enumerate(PARTS, start=1):
+        for axis, constant in zip(axes[:, column], CONSTANTS, strict=True):
+            for method in data["integrator"].values:
+                _residual_line(axis, cell(data, name, method), constant, str(method))
+            axis.set(yscale="log")
+        axes[0, column].set_title(f"relative, largest so far, {name}")
+    for axis in axes[-1]:
+        axis.set_xlabel("time (s)")
+    style.legend_below(figure, axes)
+    return Picture(
+        "residuals",
+        figure,
+        f"Energy and both momenta. Left: the solver's residuals. {words.matched()} Corrected: the notebook takes the "
+        "mean of its momenta over a table with a single entry, so that its residuals of momenta count from the start. "
+        f"Right: the solver beside every discrete Lagrangian and splitting at {STEPS_A_NUTATION:.0f} steps a nutation, "
+        f"six of them named; the momenta of all discrete methods stay within {words.largest(data, *words.MOMENTA):.0e}."
+        "",
+        "Left, residuals of the library solver; right, on logarithmic scales, momenta of the discrete methods at "
+        "rounding and their bounded energy errors, below or above the solver's.",
+    )
+
+
+def _residual_line(axis: Any, run: xr.Dataset, constant: str, method: str) -> None:
+    values = _largest_so_far(run[Column.residual(constant)].values)
+    good = np.isfinite(values)
+    time, values = run[Column.SAMPLE_TIME].values[good][1:], values[good][1:]  # all are zero at the start
+    if method not in NAMED:
+        axis.plot(time, values, color="#BBBBBB", lw=0.7, zorder=2, label="other discrete methods")
+        return
+    look = style.look(method)
+    axis.plot(
+        time, values, look.marker + "-", color=look.color, lw=1.6, ms=0.6 * look.size, markevery=0.12, zorder=3,
+        label=method,
+    )  # fmt: skip
+
+
+def draw_spheres(data: xr.Dataset) -> Picture:
+    """The path that the notebook drew and the path of the axis, a quarter turn apart."""
+    figure, axes = solid.solid_panels(1, 2, size=5.0)
+    for axis, name in zip(axes.flat, PARTS, strict=True):
+        run = cell(data, name, SOLVER)
+        drawn = axis_from_angles(run[Column.SOLVER_THETA].values, run[Column.SOLVER_PHI].values + 0.5 * math.pi)
+        true = axis_from_angles(run[Column.TRUE_THETA].values, run[Column.TRUE_PHI].values)
+        solid.sphere(axis, name)
+        lines = ((drawn, style.VERMILLION, "as the notebook drew it"), (true, style.BLACK, "where the axis is"))
+        for path, color, label in lines:
+            early = run[Column.PATH_TIME].values <= 2.0 * scene(name).nutation_period
+            axis.plot(*path.T, color=color, lw=0.6, alpha=0.35)
+            axis.plot(*path[early].T, color=color, lw=2.2, label=label)
+            axis.plot(*path[:1].T, "o", color=color, ms=7.0)
+        for letter, place in zip("xyz", 1.15 * np.eye(3), strict=True):
+            axis.text(*place, letter, ha="center", va="center")
+    style.legend_below(figure, axes)
+    return Picture(
+        "spheres",
+        figure,
+        "Path of the axis on the unit sphere with its coordinate discs, both scenes. Reproduced, red: the notebook's "
+        "curve, which takes phi for the azimuth. Corrected, black: its own rotations (phi about z, theta about the "
+        "line of nodes) carry the axis to (sin theta sin phi, -sin theta cos phi, cos theta), a quarter turn away, so "
+        "that its animated triad and its curve do not meet. Bold: the first two nutations, from the dot on.",
+        "Two unit spheres, each with two looping paths of the same shape; one is the other turned by 90 degrees about "
+        "z.",
+    )
+
+
+def draw_film(data: xr.Dataset) -> Picture:
+    """The turning triad, and the true one."""
+    frames = cell(data, "spheroid", FILMED).dropna("frame", subset=[Column.FRAME_TIME])
+    attitudes = frames[Column.FRAME_ATTITUDE].values, frames[Column.TRUE_ATTITUDE].values
+    film = solid.Film(*attitudes, "midpoint rule, 30 steps a nutation; grey: truth", pause=50)
+    return Picture(
+        "triad",
+        film,
+        "The body-fixed triad over two nutations of the first scene, blue the axis, one frame a step; grey is the "
+        "truth. Reproduced: the notebook's animation. Added: the truth; at the end the axes are "
+        f"{final_lag(*attitudes):.2f} rad apart.",
+        "Animation of three coloured rods turning inside a sphere, a grey ghost just ahead of them.",
+    )
+
+
+def final_lag(attitudes: Any, true: Any) -> float:
+    """Angle (rad) between the last axis of the film and the true one, from two arrays of quaternions."""
+    tips = [solid.columns_of(quaternions[-1])[2] for quaternions in (attitudes, true)]
+    return float(np.arccos(np.clip(tips[0] @ tips[1], -1.0, 1.0)))
+
+
+def draw_alpha(data: xr.Dataset) -> Picture:
+    """What the printed alpha means: the cubic and the motion, against those of a release at rest."""
+    second = cell(data, "goldstein", SOLVER)
+    rest, rate = float(second[Column.ALPHA_AT_REST]), float(second[Column.ALPHA_RATE])
+    figure, axes = style.panels(1, 2, height=3.6)
+    cubic, motion = axes.flat
+    u, start = second[Column.COSINE].values, math.cos(math.radians(43.0))
+    cubic.plot(u, second[Column.CUBIC_AT_REST], color=style.BLUE, label=f"alpha = {rest:.6f}, at rest")
+    cubic.plot(u, second[Column.CUBIC_PRINTED], "--", color=style.VERMILLION, label=f"alpha = {ALPHA:g}, as printed")
+    cubic.axvline(start, color=style.GREY, lw=0.9)
+    cubic.axhline(0.0, color=style.GREY, lw=0.9)
+    cubic.annotate("cos 43 deg ", (start, -0.18), fontsize=8.5, ha="right")
+    cubic.set(xlabel=r"$u = \cos\theta$", ylabel=r"$\dot u^2$ (1/s$^2$)", xlim=(0.2, 0.95), ylim=(-0.2, 0.35))
+    cubic.set_title("the nutation cubic")
+    lines = (
+        (Column.THETA_AT_REST, style.BLUE, "-", "released at rest"),
+        (Column.THETA_FALLING, style.VERMILLION, "--", f"alpha = {ALPHA:g}, theta falling at first"),
+        (Column.THETA_RISING, style.ORANGE, ":", f"alpha = {ALPHA:g}, theta rising at first"),
+    )
+    for column, color, line, label in lines:
+        motion.plot(second[Column.ALPHA_TIME], np.degrees(second[column]), line, color=color, label=label)
+    motion.set(xlabel="time (s)", ylabel="theta (degrees)", title="the motion from each start")
+    for axis in axes.flat:  # the panels share colours, not lines: a legend each
+        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False)
+    return Picture(
+        "alpha",
+        figure,
+        f"The second scene prints alpha = {ALPHA:g} and a release at rest from 43 degrees. Reproduced: its solver "
+        f"never uses alpha and starts at rest. Corrected: at rest alpha is {rest:.6f} 1/s^2, and alpha = {ALPHA:g} "
+        f"means |theta'(0)| = {rate:.6f} rad/s: the dashed cubic u'^2 is not zero at the start. Both are scenes here.",
+        "Left, two cubics, one zero at cos 43 degrees; right, three different nutations.",
+    )
+
+
+def draw_modified_energy(data: xr.Dataset) -> Picture:
+    """Energy and modified energy of two discrete methods, over time and against the step."""
+    figure, axes = style.panels(1, 3, width=13.0, height=3.4)
+    midpoint = cell(data, "spheroid", "midpoint")
+    kinds = ((Column.ENERGY_CHANGE, "energy"), (Column.MODIFIED_CHANGE, "modified energy"))
+    for (column, kind), color in zip(kinds, (style.BLUE, style.BLACK), strict=True):
+        values = midpoint[Column.history(column)]
+        axes[0, 0].plot(midpoint[Column.MODIFIED_TIME], values, color=color, label=f"{kind}, midpoint, over time")
+    axes[0, 0].set(title="spheroid, 40 steps a nutation", xlabel="time (s)", ylabel="relative change since the start")
+    for axis, name in zip(axes[0, 1:], PARTS, strict=True):
+        for method in MODIFIED:
+            look, table = style.look(method), cell(data, name, method)
+            h = table[Column.MODIFIED_STEP].values
+            for (column, kind), line, face in zip(kinds, ("-", "--"), (look.color, "white"), strict=True):
+                axis.plot(h, table[column], look.marker + line, color=look.color, mfc=face, label=f"{kind}, {method}")
+        span = float(np.nanmin(h)), float(np.nanmax(h))
+        for power, (column, _) in zip((2, 4), kinds, strict=True):
+            style.slope_guide(axis, power, span, 0.2 * float(np.nanmin(table[column])), f"$h^{power}$")
+        axis.set(xscale="log", yscale="log", title=name, xlabel="step size (s)", ylabel="largest relative change")
+        axis.xaxis.set_minor_formatter("")
+    style.legend_below(figure, axes)
+    return Picture(
+        "modified-energy",
+        figure,
+        "Why the energy is bounded: the map conserves a modified Hamiltonian, from which the energy H differs by "
+        "O(h^2). H and the modified energy to its first term change with these powers of the step: "
+        f"{words.modified_orders(data)}.",
+        "Left, the energy oscillates and the modified energy hardly; right, log-log plots of slopes 2 and 4.",
+    )

@@ -1,0 +1,130 @@
+"""Sentences and tables of the reduction study, from its dataset."""
+
+import math
+
+import numpy as np
+import xarray as xr
+
+from symtop.methods.registry import integrator
+from symtop.runner.study import Table
+
+from .tables import COMMUTES, COMPARED_STEPS, GAPS, SAME_MAP, Column, Ratio, chart_ratios, commutation_order
+
+HOW_TO_READ = (
+    "Three comparisons. An integrator that works in several charts runs in each of them at the same setting. A reduced "
+    "discrete Lagrangian runs beside its unreduced form, which steps the same rule with nothing eliminated: they "
+    "differ by rounding, or one of them is wrong. And eliminating phi and psi before discretising is compared with "
+    "doing so afterwards: a flat line at 1e-16 means that the order of the two does not matter, a slope of p that the "
+    "results are two different methods, O(h^p) apart."
+)
+
+
+def cells(data: xr.Dataset, variable: str) -> list[tuple[str, str, xr.Dataset]]:
+    """Scene, integrator and data of the cells in which a variable was measured."""
+    if variable not in data:
+        return []
+    every = [
+        (str(scene), str(method), data.sel(scene=scene, integrator=method))
+        for scene in data["scene"].values
+        for method in data["integrator"].values
+    ]
+    return [(scene, method, cell) for scene, method, cell in every if np.isfinite(cell[variable]).any()]
+
+
+def ratios(data: xr.Dataset) -> list[tuple[str, str, Ratio]]:
+    """Scene, integrator and ratio of every chart that is not the smallest."""
+    return [(scene, method, r) for scene, method, cell in cells(data, Column.SECONDS) for r in chart_ratios(cell)]
+
+
+def commuting(data: xr.Dataset) -> str:
+    """Which rules commute with the reduction, and how fast the others approach it."""
+    same: dict[str, float] = {}
+    apart: dict[str, list[str]] = {}
+    for scene, method, cell in cells(data, Column.COMMUTATION_GAP):
+        largest = float(cell[Column.COMMUTATION_GAP].max())
+        if largest < COMMUTES:
+            same[method] = max(largest, same.get(method, 0.0))
+        else:
+            apart.setdefault(method, []).append(f"h^{commutation_order(cell):.2f} on {scene}")
+    commute = ", ".join(f"{method} (to {gap:.1e} rad)" for method, gap in same.items())
+    rest = "; ".join(f"{method} (as {', '.join(powers)})" for method, powers in apart.items())
+    return (
+        f"Rules for which the order of reducing and discretising does not matter: {commute or 'none'}. Rules for which "
+        f"the results differ: {rest or 'none'}."
+    )
+
+
+def largest_gap(data: xr.Dataset) -> float:
+    """The largest difference of any angle between a kernel and its unreduced form, rad."""
+    return max(float(cell[gap].max()) for _, _, cell in cells(data, Column.THETA_GAP) for gap in GAPS)
+
+
+def eliminating(data: xr.Dataset) -> str:
+    """What eliminating phi and psi changes and saves."""
+    compared = cells(data, Column.THETA_GAP)
+    drift = max(float(cell[p].max()) for *_, cell in compared for p in (Column.P_PHI_DRIFT, Column.P_PSI_DRIFT))
+    costs = [cell[Column.SECONDS_A_STEP].values for *_, cell in cells(data, Column.SECONDS_A_STEP)]
+    savings = np.concatenate([cost[1] / cost[0] for cost in costs])
+    largest = largest_gap(data)
+    judged = "which is rounding" if largest < SAME_MAP else "which is more than rounding"
+    return (
+        "The reduced and the unreduced form of a discrete Lagrangian give the same trajectory to "
+        f"{largest:.1e} rad in {COMPARED_STEPS} steps, {judged}; the momenta of the unreduced form, which are part of "
+        f"its state, stay within {drift:.1e}. Eliminating phi and psi makes a step {savings.min():.1f} to "
+        f"{savings.max():.1f} times cheaper."
+    )
+
+
+def larger_charts(data: xr.Dataset) -> list[str]:
+    """What a larger chart costs, one sentence for each family and chart."""
+    groups: dict[tuple[str, str, str], list[tuple[float, str]]] = {}
+    for _, method, ratio in ratios(data):
+        groups.setdefault((integrator(method).family, ratio.chart, ratio.base), []).append((ratio.time, method))
+    sentences = []
+    for (family, chart, base), times in groups.items():
+        names = sorted({name for _, name in times})
+        methods = f"median of {len(names)} {family} methods" if len(names) > 1 else names[0]
+        sentences.append(
+            f"A run in the {chart} chart takes {float(np.median([time for time, _ in times])):.2g} times as long as in "
+            f"{base} ({methods})."
+        )
+    return sentences
+
+
+def tables(data: xr.Dataset) -> list[Table]:
+    """Charts, unreduced forms and the order of reducing and discretising, in numbers."""
+    charts = [
+        [
+            scene, method, ratio.chart, ratio.base, f"{ratio.time:.2f}",
+            f"{ratio.error:.3g}" if math.isfinite(ratio.error) else "",
+        ]
+        for scene, method, ratio in ratios(data)
+    ]  # fmt: skip
+    header = ["scene", "integrator", "chart", "against", "time (ratio)", "axis error (ratio)"]
+    return [Table("A larger chart against the smallest", header, charts), _costs(data), _commutation(data)]
+
+
+def _costs(data: xr.Dataset) -> Table:
+    rows = []
+    for scene, method, cell in cells(data, Column.SECONDS_A_STEP):
+        for k, h in enumerate(cell[Column.COMPARED_STEP].values):
+            reduced, whole = cell[Column.SECONDS_A_STEP].values[:, k] * 1e9
+            iterations = [f"{value:.2f}" for value in cell[Column.ITERATIONS_A_STEP].values[:, k]]
+            rows.append(
+                [scene, method, f"{h:.3g}", f"{reduced:.0f}", f"{whole:.0f}", f"{whole / reduced:.2f}", *iterations]
+            )
+    header = [
+        "scene", "rule", "step (s)", "ns a step", "ns a step, unreduced", "ratio", "iterations a step",
+        "iterations a step, unreduced",
+    ]  # fmt: skip
+    return Table("Reduced kernels and their unreduced forms", header, rows)
+
+
+def _commutation(data: xr.Dataset) -> Table:
+    rows = []
+    for scene, method, cell in cells(data, Column.COMMUTATION_GAP):
+        gap, h = cell[Column.COMMUTATION_GAP].values, cell[Column.COMMUTATION_STEP].values
+        power = "" if np.nanmax(gap) < COMMUTES else f"{commutation_order(cell):.3f}"
+        rows.append([scene, method, f"{np.nanmax(h):.3g}", f"{gap[0]:.2e}", f"{gap[np.isfinite(gap)][-1]:.2e}", power])
+    header = ["scene", "rule", "coarsest step (s)", "difference there (rad)", "at the finest step (rad)", "power of h"]
+    return Table("Reduce first or last: largest difference in theta", header, rows)
