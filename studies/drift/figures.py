@@ -97,10 +97,10 @@ def window_bands(data: xr.Dataset) -> Any:
             axis.step(steps[good], middle, where="pre", color=style.color, lw=1.3)
             axis.set_xscale("log")
             if quantity == BANDS[0]:
-                axis.set_title(f"{name} on {scene}")
+                axis.set_title(name if data["scene"].size == 1 else f"{name} on {scene}")
             if quantity == BANDS[-1]:
                 axis.set_xlabel("steps")
-        row[0].set_ylabel(f"{LABELS[quantity]}\n(relative, {scale:.0e})")
+        row[0].set_ylabel(f"{LABELS[quantity]}\n(relative, in {scale:.0e})")
     return figure
 
 
@@ -169,6 +169,6 @@ def lost_phases(losses: dict[str, PhaseLoss]) -> Any:
     left.plot([], [], "s", color=GREY, ms=4, label="measured")
     right.axvline(0.0, color=GREY, lw=0.8)
     right.set(yticks=range(len(losses)), yticklabels=list(losses), ylim=(len(losses) - 0.5, -0.5))
-    right.set_xlabel("predicted less measured time (% of the measured)")
+    right.set_xlabel("predicted less measured time (%)")
     legend_below(figure, axes)
     return figure

@@ -123,7 +123,7 @@ def residuals(data: xr.Dataset) -> str:
     holding = [name for name, word in behaviours.items() if word in ("kept", "bounded")]
     return (
         "Relative change of energy and of both momenta since the start: samples as dots, the largest of each time "
-        "window as a line with markers. On every scene the energy error is at rounding or bounded (growth exponent "
+        "window as a line with markers, at 1e-17 if smaller; the dashed line rises as t. On every scene the energy error is at rounding or bounded (growth exponent "
         f"nearest to 0, 95 % interval below 1/2) for {', '.join(holding) or 'none'}. The momenta are recomputed from "
         f"the increments of the trajectory. {_shortened_words(data)}"
     ).rstrip()
@@ -272,7 +272,7 @@ def _constant_sentences(histories: xr.Dataset, name: str) -> list[str]:
 def _window_sentence(data: xr.Dataset) -> str:
     energy, modified = moved(data)
     return (
-        f"Over {float(data['steps'].max()):.0e} steps of {', '.join(data['integrator'].values)} the mean energy moves by "
-        f"at most {energy:.0e} of the width of its oscillation, and the mean modified energy by at most "
+        f"Over {float(data['steps'].max()):.0e} steps of {', '.join(data['integrator'].values)} the mean energy moves "
+        f"by at most {energy:.0e} of the width of its oscillation, and the mean modified energy by at most "
         f"{modified:.0e} of the energy's scale."
     )
