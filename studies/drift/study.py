@@ -24,11 +24,7 @@ LEFT_OUT = {  # a million steps of every method take minutes on each scene
     "a small nutation of a fast top, where a step is limited by the spin": ("fast", "simo-wong"),
     "a steady precession has no nutation": ("steady", "kinon-betsch", "steady-fast"),
     "close to a pole, where the angles chart fails": ("bruls-cardona-arnold", "grazing"),
-    "close to the upright top or unstable: errors grow with the motion": (
-        "sleeping",
-        "sleeping-unstable",
-        "separatrix",
-    ),
+    "unstable or nearly so: errors grow with the motion": ("sleeping", "sleeping-unstable", "separatrix"),
 }
 STEPS_A_NUTATION = 118.02  # not commensurate with the nutation
 TOLERANCES = {"rk45": 1e-8, "rk45-compiled": 1e-8}  # 1e-6 for the others

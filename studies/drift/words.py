@@ -123,9 +123,10 @@ def residuals(data: xr.Dataset) -> str:
     holding = [name for name, word in behaviours.items() if word in ("kept", "bounded")]
     return (
         "Relative change of energy and of both momenta since the start: samples as dots, the largest of each time "
-        "window as a line with markers, at 1e-17 if smaller; the dashed line rises as t. On every scene the energy error is at rounding or bounded (growth exponent "
-        f"nearest to 0, 95 % interval below 1/2) for {', '.join(holding) or 'none'}. The momenta are recomputed from "
-        f"the increments of the trajectory. {_shortened_words(data)}"
+        "window as a line with markers, at 1e-17 if smaller; the dashed line rises as t. On every scene the energy "
+        "error is at rounding or bounded (growth exponent nearest to 0, 95 % interval below 1/2) for "
+        f"{', '.join(holding) or 'none'}. The momenta are recomputed from the increments of the trajectory. "
+        f"{_shortened_words(data)}"
     ).rstrip()
 
 
@@ -166,9 +167,9 @@ def windows(data: xr.Dataset) -> str:
     return (
         f"{float(data['steps'].max()):.0e} steps on {', '.join(dict.fromkeys(scene for scene, _, _ in runs))}, "
         f"{PER_NUTATION:.0f} a nutation: the band reaches from the least to the largest relative change in each "
-        "window, the line is its mean. The modified energy is the energy with the h^2 term of the discrete motion, less "
-        "the oscillation of order h^4 that remains. From the first window to the last the mean energy moves by at most "
-        f"{energy:.0e} of the width of its band, and the mean modified energy by at most {modified:.0e} of the "
+        "window, the line is its mean. The modified energy is the energy with the h^2 term of the discrete motion, "
+        "less the oscillation of order h^4 that remains. From the first window to the last the mean energy moves by at "
+        f"most {energy:.0e} of the width of its band, and the mean modified energy by at most {modified:.0e} of the "
         f"energy's scale. The momenta, recomputed inside the step, stay within {worst:.0e}."
     )
 
