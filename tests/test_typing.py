@@ -48,7 +48,7 @@ def lines(tmp_path, text):
     script = tmp_path / "script.py"
     script.write_text(text, encoding="utf-8")
     words = [sys.executable, "-m", "mypy", "--strict", "--config-file", os.devnull, "--ignore-missing-imports",
-             "--no-error-summary", "--follow-imports=silent", "--cache-dir", str(ROOT / ".mypy_cache"), str(script)]  # fmt: skip
+             "--no-error-summary", "--follow-imports=silent", "--cache-dir", str(ROOT / ".mypy_cache"), str(script)]  # fmt: skip  # noqa: E501
     done = subprocess.run(
         words,
         cwd=tmp_path,

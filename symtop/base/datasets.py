@@ -17,7 +17,7 @@ import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 import xarray as xr
@@ -38,6 +38,9 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "p_phi": ("momentum conjugate to phi, recomputed from the trajectory", "kg m2 s-1"),
     "p_psi": ("momentum conjugate to psi, recomputed from the trajectory", "kg m2 s-1"),
 }
+
+Tree = TypeVar("Tree", bound=xr.Dataset | xr.DataTree)
+Row = TypeVar("Row", bound=NamedTuple)
 
 LITTLE = 1_000_000  # bytes of a disk that count as none
 _DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")
@@ -95,11 +98,19 @@ def provenance() -> dict[str, str]:
     return dict(_provenance())
 
 
-def describe(data: xr.Dataset, title: str, **attributes: Any) -> xr.Dataset:
-    """Give the variables their names and units and the dataset its provenance and attributes."""
-    for name, (long_name, units) in VARIABLES.items():
-        if name in data.variables:
-            data[name].attrs.update(long_name=long_name, units=units)
+def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
+    """The datasets of a tree by their paths in it, its root under the empty name; a dataset is a root alone."""
+    if isinstance(data, xr.Dataset):
+        return {"": data}
+    return {node.path.strip("/"): node.to_dataset(inherit=False) for node in data.subtree}
+
+
+def describe(data: Tree, title: str, **attributes: Any) -> Tree:
+    """Give the variables their names and units and the dataset, or a tree's root, its provenance and attributes."""
+    for group in groups(data).values():
+        for name in VARIABLES.keys() & group.variables.keys():
+            long_name, units = VARIABLES[name]
+            group[name].attrs.update(long_name=long_name, units=units)
     plain = {key: _plain(value) for key, value in attributes.items()}
     data.attrs.update({"Conventions": "CF-1.11", "title": title, "source": "symtop", **plain, **provenance()})
     return data
@@ -146,15 +157,23 @@ def sweep(path: Path) -> None:
         left.unlink(missing_ok=True)
 
 
-def write(data: xr.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write a netCDF file so that it is whole or not there, whatever happens meanwhile."""
-    encoding: dict[Any, dict[str, Any]] = {
+def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
+    """No fill value in coordinates; bytes compressed."""
+    plain: dict[Any, dict[str, Any]] = {
         name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"
     }
-    encoding |= {name: {"zlib": True} for name, values in data.data_vars.items() if values.dtype.kind == "u"}
+    return plain | {name: {"zlib": True} for name, values in data.data_vars.items() if values.dtype.kind == "u"}
+
+
+def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
+    """Write a netCDF file so that it is whole or not there, whatever happens meanwhile; a tree as netCDF groups."""
     with replacing(path) as partial:
         try:
-            data.to_netcdf(partial, engine="netcdf4", encoding=encoding)
+            if isinstance(data, xr.Dataset):
+                data.to_netcdf(partial, engine="netcdf4", encoding=_encoding(data))
+            else:
+                parts = {f"/{name}": _encoding(group) for name, group in groups(data).items()}
+                data.to_netcdf(partial, engine="netcdf4", encoding=parts)
         except RuntimeError as error:  # the netCDF library's own word for a disk that is full
             raise OSError(None, _room(partial.parent) or str(error)) from error
     return Path(path)
@@ -187,3 +206,28 @@ def read(path: str | os.PathLike[str]) -> xr.Dataset:
             return data.load()
     except (OSError, ValueError, RuntimeError) as error:
         raise SymtopError(f"cannot read {path} as netCDF: {error}") from error
+
+
+def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:
+    """Load a netCDF file completely into memory and close it: a tree if it has groups, otherwise a dataset."""
+    try:
+        with xr.open_datatree(path, engine="netcdf4") as tree:
+            tree.load()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise SymtopError(f"cannot read {path} as netCDF: {error}") from error
+    return tree if tree.children else tree.to_dataset()
+
+
+def row(kind: type[Row], data: xr.Dataset, prefix: str = "") -> Row:
+    """The variables of a dataset that bear the names of the fields of a NamedTuple, each after `prefix`, as one.
+
+    A variable without dimensions becomes a number or a string, any other one an array. A study defines its columns once
+    in this way: the fields are what it stores, and what its figures and words read. A field with a default may be
+    absent. Raises KeyError for any other variable that is absent.
+    """
+    values: dict[str, Any] = {}
+    for name in kind._fields:
+        if f"{prefix}{name}" in data or name not in kind._field_defaults:
+            variable = data[f"{prefix}{name}"]
+            values[name] = variable.values if variable.ndim else variable.item()
+    return cast("Row", kind(**values))  # type: ignore[call-overload]

@@ -6,13 +6,13 @@ One battery judges every integrator alike, ours and a plug-in's, through nothing
     symplectic     the bracket after one step, in every chart                                          (`step_map`)
     symmetric      one step forth and back, in every chart                                             (`step_map`)
     energy, p_phi, p_psi, axis_length, invariant      a million steps, in every chart                  (`claims_long`)
-    explicit, work, memory                            what a step costs                                (`claims_long`)
+    explicit, work                                    what a step costs                                (`claims_long`)
     pole           the axis passes a pole exactly                                                      (`claims_long`)
 
 A claim is refuted only far beyond what the measurement itself leaves in doubt; both numbers are in the ledger
 (`symtop.judge.ledger`). Nothing claimed of the energy means what the other claims imply: kept if it is among the
 conserved quantities, bounded if the method is symplectic and its step fixed (Benettin, Giorgilli, J. Stat. Phys. 74
-(1994) 1117). Work and iterations are what the solver reports; memory is what NumPy and Python allocate.
+(1994) 1117). Work and iterations are what the solver reports.
 """
 
 import math
@@ -42,7 +42,6 @@ RETURNED = 1e-10  # a return as close as this is exact
 MISSED = 1e-8
 ONE_MAP = 1e-9  # two steps are twice one step within this
 SHOWN = 24  # settings of the order that are kept
-FLAT = 8.0  # bytes a step: less than one number
 
 
 def declared_energy(method: Integrator) -> str:
@@ -60,7 +59,6 @@ def judge(method: Integrator, where: Scene, *, quick: bool = False) -> Ledger:
     findings = {"order": _attempt("order", _yes_no_number(method.order), lambda: _order(method, where, quick, traces))}
     findings |= _structure(method, where, quick, traces)
     findings |= _over_steps(method, where, quick, traces)
-    findings["memory"] = _attempt("memory", "", lambda: _memory(method, where))
     findings["pole"] = _attempt("pole", _pole_claim(method), lambda: _pole(method))
     return Ledger(
         method.name,
@@ -213,7 +211,7 @@ def _over_steps(method: Integrator, where: Scene, quick: bool, traces: dict[str,
             found.append(_unseen(method, str(error)))
             continue
         runs.append(run)
-        rest = [_invariant(method, run), _explicit(method, where, run), _work(method, run)]
+        rest = [_invariant(method, run), _explicit(method, run), _work(method, run)]
         found.append({one.claim: one for one in [*(_kept(method, run, claim) for claim in CONSTANTS), *rest]})
     if runs:
         least = min(runs, key=lambda run: run.steps)
@@ -308,7 +306,7 @@ def _invariant(method: Integrator, run: long.LongRun) -> Finding:
 # ---- cost and chart --------------------------------------------------------------------------------------------------
 
 
-def _explicit(method: Integrator, where: Scene, run: long.LongRun) -> Finding:
+def _explicit(method: Integrator, run: long.LongRun) -> Finding:
     declared = _declared(method, "explicit")
     if method.knob is None:
         return Finding("explicit", declared, "", "inapplicable", "it makes no steps")
@@ -316,16 +314,8 @@ def _explicit(method: Integrator, where: Scene, run: long.LongRun) -> Finding:
         verdict = _agrees(declared=method.explicit, found=False)
         why = f"it reports {run.iterations:.2f} iterations a step"
         return Finding("explicit", declared, "no", verdict, why, run.iterations, 0.0)
-    stages = 0
-    if method.knob == "tolerance" and not run.steady_cost:
-        try:
-            stages = long.cost_of_an_attempt(method, where, run.chart)
-        except SymtopError as error:
-            return undecided("explicit", declared, str(error))
-    if run.steady_cost or stages > 1:
+    if run.steady_cost:
         cost = f"{run.evaluations:.2f} forces a step, always"
-        if stages > 1:
-            cost = f"forces by the {stages}: so many for each step, accepted or rejected"
         if method.explicit is False:
             why = f"it reports no iterations and {cost}; so does a method that solves linear equations"
             return Finding("explicit", declared, "", "undecided", why, 0.0, 0.0)
@@ -341,15 +331,6 @@ def _work(method: Integrator, run: long.LongRun) -> Finding:
     why = f"{run.evaluations:.2f} force evaluations{solves} a step, in {_span(run)}"
     short = f"{run.evaluations:.1f}" + (f" ({run.iterations:.1f} it.)" if run.iterations else "")
     return Finding("work", "", short, "measured", why, run.evaluations, 0.0)
-
-
-def _memory(method: Integrator, where: Scene) -> Finding:
-    if method.knob is None:
-        return Finding("memory", "", "", "inapplicable", "it makes no steps")
-    size = long.memory_a_step(method, where)
-    flat = size < FLAT
-    why = f"{size} bytes for each further step" + (", which is none" if flat else "")
-    return Finding("memory", "", "flat" if flat else f"{size} B a step", "measured", why, float(size), FLAT)
 
 
 def _pole_claim(method: Integrator) -> str:

@@ -15,7 +15,6 @@ Python solvers are too slow for a million steps: they run for as many as `EVALUA
 """
 
 import math
-import tracemalloc
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +43,6 @@ KEPT = 1e-11
 ROUNDING = 2e-13  # a change in one step that may be rounding, where |p| is small beside what makes it up
 BOUNDED = 0.25  # an exponent that exceeds it with its whole interval is growth
 SURE = 8.0
-ATTEMPTS = 12  # runs that show what an attempt at a step costs
 VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
 
 
@@ -170,46 +168,6 @@ def _judged(time: Array, values: Array, every_step: Array, steps: int) -> Consta
     floor = max(KEPT, a_step * math.sqrt(steps)) if a_step <= ROUNDING else KEPT
     largest = float(size.max()) if size.size else math.nan
     return Constant(largest, a_step, power.slope, power.interval, floor, line.rise, sure)
-
-
-def cost_of_an_attempt(method: Integrator, where: Scene, chart: str) -> int:
-    """The number of forces that every step of an adaptive method comes in, rejected ones too; 1 if they vary.
-
-    A run costs the same number for its start and s forces for each attempt of a method with s stages: the costs of
-    `ATTEMPTS` runs to different times at different tolerances differ by multiples of s. Where a solver iterates until
-    it converges, they have no common divisor; by chance they had 2 in one case in 2000.
-    """
-    only, costs = method.only(chart), []
-    for k in range(ATTEMPTS):
-        tolerance = max(10.0 ** (-4.0 - 0.4 * k), method.least_tolerance)
-        horizon = (1.37 + 0.23 * k) * where.time_scale()
-        run = simulate(where, only, tolerance=tolerance, horizon=horizon, samples=2, guard=False)
-        if run.attrs["outcome"] != "ok":
-            return 1
-        costs.append(int(run.attrs["force_evaluations"]))
-    return max(math.gcd(*(cost - costs[0] for cost in costs)), 1) if len(set(costs)) > ATTEMPTS // 2 else 1
-
-
-POINTER = 8  # bytes
-
-
-def memory_a_step(method: Integrator, where: Scene) -> int:
-    """Bytes that a run keeps for each further step, by Python's own count of what NumPy and Python allocate.
-
-    In whole pointers: nothing smaller can be kept, and fractions of one are what Python happens to hold at the moment.
-    """
-    few = max(100, round((4_000 if method.tier == "compiled" else 200) * min(1.0, 20.0 * method.speed)))
-    step = where.time_scale() / STEPS_A_NUTATION
-    peaks, made = [], []
-    _run(method, where, few, step, 11)  # whatever is made once is made here
-    for steps in (few, 6 * few):
-        tracemalloc.start()
-        try:
-            made.append(int(_run(method, where, steps, step, 11).attrs["steps"]))
-            peaks.append(tracemalloc.get_traced_memory()[1])
-        finally:
-            tracemalloc.stop()
-    return POINTER * round(max(peaks[1] - peaks[0], 0) / max(made[1] - made[0], 1) / POINTER)
 
 
 # the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1

@@ -13,7 +13,7 @@ import xarray as xr
 
 CLAIMS = (
     "order", "symplectic", "symmetric", "energy", "p_phi", "p_psi", "axis_length", "invariant", "explicit", "work",
-    "memory", "pole",
+    "pole",
 )  # fmt: skip
 VERDICTS = ("confirmed", "refuted", "measured", "undecided", "inapplicable")
 LONGEST = 240  # characters of somebody else's error message

@@ -290,10 +290,3 @@ def _ending_on_sigterm() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
-def long_windows(where: Scene, method: Integrator, steps: int, per_nutation: float) -> xr.Dataset:
-    """The windows of one long run, resumed if it was begun before: ``window_steps``, ``window_energy_least``, ..."""
-    h = where.nutation_period / per_nutation
-    run = long_run(where, method, steps=steps, step_size=h, checkpoint=True, quiet=True)
-    return run.rename({name: f"window_{name}" for name in run.data_vars}).drop_attrs()

@@ -17,7 +17,7 @@ from symtop.runner.execute import execute
 from symtop.runner.pools import Workers
 from symtop.runner.run import Round
 from symtop.runner.scripts import file_of
-from symtop.runner.study import Case, Study
+from symtop.runner.study import Case, Combined, Study
 from symtop.runner.work import Result, Task
 
 SAMPLE = 5  # cases of each study
@@ -43,8 +43,17 @@ def is_clocked(name: str) -> bool:
     return any(word in name for word in CLOCKED)
 
 
-def differences(stored: xr.Dataset, again: xr.Dataset) -> list[str]:
-    """In what two datasets differ besides measured times and where they were made."""
+def differences(stored: Combined, again: Combined) -> list[str]:
+    """In what two datasets, or trees of them, differ besides measured times and where they were made."""
+    ours, theirs = datasets.groups(stored), datasets.groups(again)
+    return [f"group {name} is in one of them only" for name in sorted(ours.keys() ^ theirs.keys())] + [
+        f"{name}: {difference}" if name else difference
+        for name in sorted(ours.keys() & theirs.keys())
+        for difference in _differences(ours[name], theirs[name])
+    ]
+
+
+def _differences(stored: xr.Dataset, again: xr.Dataset) -> list[str]:
     ours, theirs = set(map(str, stored.variables)), set(map(str, again.variables))
     found = [f"{name} is in one of them only" for name in sorted(ours ^ theirs)]
     for name in sorted(ours & theirs):
@@ -56,6 +65,11 @@ def differences(stored: xr.Dataset, again: xr.Dataset) -> list[str]:
     kept = sorted((set(stored.attrs) | set(again.attrs)) - set(datasets.provenance()) - {"content"})
     pairs = [(key, stored.attrs.get(key), again.attrs.get(key)) for key in kept]
     return [*found, *(f"attribute {key} differs: {one!r} and {other!r}" for key, one, other in pairs if one != other)]
+
+
+def _bare(data: Combined) -> Combined:
+    """Without the attributes."""
+    return data.drop_attrs() if isinstance(data, xr.Dataset) else data.map_over_datasets(xr.Dataset.drop_attrs)
 
 
 def _same(one: xr.DataArray, other: xr.DataArray) -> bool:
@@ -92,8 +106,8 @@ def check(
                 found += [f"{where}: {said}" for said in differences(chosen[original][1], data)]
     whole = results / f"{study.name}.nc"
     if whole.is_file() and len(stored) == len(known.paths):
-        kept = datasets.read(whole).drop_attrs()
-        found += [f"{whole.name}: {said}" for said in differences(kept, known.combined().drop_attrs())]
+        kept, made = _bare(datasets.read_any(whole)), _bare(known.combined())
+        found += [f"{whole.name}: {said}" for said in differences(kept, made)]
     return Checked(study.name, len(stored), len(chosen), found)
 
 

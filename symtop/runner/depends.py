@@ -183,7 +183,7 @@ def digest(study: "Study", case: "Case") -> str:
     scene = Ingredients()
     scene.add(where.get(case.scene) if case.scene != EVERY else where)
     content = [
-        json.dumps([study.name, case.scene, case.integrator, dict(case.settings)], sort_keys=True),
+        json.dumps([study.name, case.scene, case.integrator, case.group, dict(case.settings)], sort_keys=True),
         *basis(study.measure).values,
         *scene.values,
         *(value for name in names for value in (name, *_of_integrator(name, id(known[name]))[0])),

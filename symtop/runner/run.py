@@ -23,7 +23,7 @@ from symtop.runner import depends, plugins, store
 from symtop.runner.execute import execute
 from symtop.runner.pools import Workers
 from symtop.runner.scripts import file_of, folder, load, names
-from symtop.runner.study import Case, Picture, Study
+from symtop.runner.study import Case, Combined, Picture, Study
 from symtop.runner.work import Result, Task
 
 __all__ = ["folder", "load", "names", "run", "status"]
@@ -74,8 +74,8 @@ class Round:
         """Cases and what they measured, in the order of the grid."""
         return [self.done[path] for path in self.paths if path in self.done]
 
-    def combined(self) -> xr.Dataset:
-        """One dataset of all that was measured."""
+    def combined(self) -> Combined:
+        """One dataset of all that was measured, or a tree of one for each group of cases."""
         if not self.done:
             why = self.failures[0] if self.failures else "the grid is empty"
             raise SymtopError(f"study {self.study.name}: no case could be measured; {why}")
@@ -166,7 +166,7 @@ def _conclude(known: Round, stamp: str, *, quick: bool) -> dict[str, Any]:
     return findings
 
 
-def findings_of(study: Study, data: xr.Dataset, results: Path, *, failures: list[str], cases: int) -> dict[str, Any]:
+def findings_of(study: Study, data: Combined, results: Path, *, failures: list[str], cases: int) -> dict[str, Any]:
     """Draw a dataset and say what it shows, as the report wants it."""
     opening = None if study.opening is None else study.opening(data)
     return {

@@ -26,7 +26,7 @@ import xarray as xr
 
 from symtop.base import datasets
 from symtop.base.validate import SymtopError
-from symtop.runner.study import Case, Study
+from symtop.runner.study import Case, Combined, Study
 
 try:
     import fcntl
@@ -166,8 +166,27 @@ def was_begun(path: Path) -> bool:
         return ours
 
 
-def combine(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
-    """One dataset over scene and integrator; a cell nobody measured is NaN (a byte 255, a string empty)."""
+def combine(cases: list[tuple[Case, xr.Dataset]]) -> Combined:
+    """One dataset over scene and integrator, or, of cases in groups, a tree with such a dataset for each group.
+
+    A dataset of a group covers the scenes and integrators of its own cases only. xarray aligns the coordinates of a
+    group with those of the groups above it, so that the root of the tree is empty: all cases are in groups, or none.
+    """
+    groups: dict[str, list[tuple[Case, xr.Dataset]]] = {}
+    for case, data in cases:
+        groups.setdefault(case.group, []).append((case, data))
+    if not groups.keys() - {""}:
+        return _dense(cases)
+    if "" in groups:
+        raise SymtopError(f"case {groups[''][0][0].label} has no group, but others of its study have one")
+    return xr.DataTree.from_dict({group: _dense(members) for group, members in groups.items()})
+
+
+def _dense(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
+    """One dataset over scene and integrator; a cell that was not measured is NaN (a byte 255, a string empty).
+
+    Sizes differ from case to case: each dimension gets the largest one, and a shorter case fills the beginning.
+    """
     cases = [one for case, data in cases for one in _apart(case, data)]
     scenes = list(dict.fromkeys(case.scene for case, _ in cases))
     methods = list(dict.fromkeys(case.integrator for case, _ in cases))

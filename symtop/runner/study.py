@@ -13,6 +13,8 @@ import xarray as xr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Combined = xr.Dataset | xr.DataTree  # what a study measured: a tree if its cases are in groups
+
 
 class Picture(NamedTuple):
     """A figure of the report: its file name, caption and text for those who cannot see it."""
@@ -64,23 +66,30 @@ class Case:
     """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold.
 
     A case may measure several integrators against each other: then its dataset has a dimension ``integrator``,
-    `integrator` names the group and ``settings["integrators"]`` lists them.
+    `integrator` names them together and ``settings["integrators"]`` lists them.
+    A study that measures several different things puts each into a `group` of its own: the study's dataset is then an
+    `xarray.DataTree` with one dataset a group (see `store.combine`), each over the scenes and integrators that it has.
     """
 
     scene: str
     integrator: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     timed: bool = False  # it runs by itself, on a machine that does nothing else
+    group: str = ""
 
     @property
     def label(self) -> str:
         """A name that is safe in a file."""
-        return f"{self.scene}--{self.integrator}".replace("/", "_")
+        return "--".join(filter(None, (self.scene, self.integrator, self.group))).replace("/", "_")
 
 
 @dataclass(frozen=True)
 class Study:
-    """A question and how it is answered."""
+    """A question and how it is answered.
+
+    `pictures`, `verdict`, `tables`, `charts`, `opening` and `follow_up` get everything that was measured: an
+    `xarray.Dataset`, or an `xarray.DataTree` if the cases are in groups.
+    """
 
     name: str
     title: str
@@ -88,14 +97,14 @@ class Study:
     how_to_read: str
     cases: Callable[[bool], list[Case]]  # quick -> grid
     measure: Callable[[Case], xr.Dataset]
-    pictures: Callable[[xr.Dataset], list[Picture]]
-    verdict: Callable[[xr.Dataset], list[str]]
-    tables: Callable[[xr.Dataset], list[Table]] = lambda _: []
-    charts: Callable[[xr.Dataset], list[Chart]] = lambda _: []
-    opening: Callable[[xr.Dataset], Opening] | None = None  # for the first screen of the page
+    pictures: Callable[[Any], list[Picture]]
+    verdict: Callable[[Any], list[str]]
+    tables: Callable[[Any], list[Table]] = lambda _: []
+    charts: Callable[[Any], list[Chart]] = lambda _: []
+    opening: Callable[[Any], Opening] | None = None  # for the first screen of the page
     full: Callable[[], list[Case]] | None = None  # a grid that takes much longer, for `--full`
     timed: bool = False  # all cases are
-    follow_up: Callable[[xr.Dataset], list[Case]] | None = None  # a second round, made from what the first one found
+    follow_up: Callable[[Any], list[Case]] | None = None  # a second round, made from what the first one found
     uses: Callable[[Case], Sequence[str]] | None = None  # integrators a case runs; "*" for all; None: found out
     limit: float = 3600.0  # seconds after which a case counts as hanging
 

@@ -1,24 +1,19 @@
 """Sentences of the studies of long runs, told other numbers: each says something else."""
 
-import sys
+import math
 
 import numpy as np
 import pytest
 import xarray as xr
+from symtop_studies.drift import long_runs, phase_loss, tables, words
 from symtop_studies.notebook import words as notebook_words
 from symtop_studies.notebook.tables import SOLVER, Column
 from symtop_studies.stability import mechanism_words
 from symtop_studies.truth import words as truth_words
 
 import symtop
+from symtop.base import datasets
 from symtop.measure import conservation, published
-from symtop.runner import run as runner
-
-
-@pytest.fixture(scope="module")
-def drift():
-    runner.load("drift")
-    return sys.modules["symtop_studies.drift.study"]
 
 
 @pytest.mark.parametrize(
@@ -31,47 +26,50 @@ def drift():
         ((1e-12, 1e-13), (0.5, 0.5), 0.1, "random walk"),
     ],
 )
-def test_a_quantity_is_what_it_is_on_its_worst_scene(drift, sizes, exponents, interval, word):
+def test_a_quantity_is_what_it_is_on_its_worst_scene(sizes, exponents, interval, word):
     cell = xr.Dataset({
         "outcome": ("scene", ["ok", "ok"]),
         "energy_largest": ("scene", list(sizes)),
         "energy_exponent": ("scene", list(exponents)),
         "energy_exponent_interval": ("scene", [interval] * 2),
     })  # fmt: skip
-    assert drift.kind(cell, "energy") == word
-    assert drift.kind(cell.assign(outcome=("scene", ["ok", "left_chart"])), "energy") == "failed"
+    assert tables.worst_behaviour(cell, "energy") == word
+    assert tables.worst_behaviour(cell.assign(outcome=("scene", ["ok", "left_chart"])), "energy") == "failed"
 
 
-def test_runs_over_a_part_of_the_horizon_are_named(drift):
+def test_runs_over_a_part_of_the_horizon_are_named():
     time = np.linspace(0.0, 1.0, 5) * np.array([1.0, 0.2])[:, None]
     data = xr.Dataset({"sample_time": (("scene", "integrator", "sample"), time[None])},
                       coords={"scene": ["spheroid"], "integrator": ["rk4", "rk45"]})  # fmt: skip
-    assert "rk45 20 %" in drift._shortened(data)
-    assert "rk4 " not in drift._shortened(data)
-    assert drift._shortened(data.sel(integrator=["rk4"])) == ""
+    assert tables.shortened(data) == {"rk45": pytest.approx(0.2)}
+    assert tables.shortened(data.sel(integrator=["rk4"])) == {}
+    assert "rk45 20 %" in words._shortened_words(data)
+    assert words._shortened_words(data.sel(integrator=["rk4"])) == ""
 
 
-def test_a_change_of_law_is_told_above_rounding_only(drift):
+def test_a_change_of_law_is_told_above_rounding_only():
     known = {"exponent": 1.1, "exponent_interval": 0.1, "change": 42.0, "before": 0.1, "after": 2.0, "law": "linear"}
-    cell = xr.Dataset({f"energy_{name}": value for name, value in known.items()})
-    assert drift._law(cell.assign(energy_largest=1e-6), "energy") == "1.10 +- 0.10, linear; t^0.10 to t^2.00 at t = 42"
-    assert drift._law(cell.assign(energy_largest=1e-14), "energy") == "1.10 +- 0.10, linear"
+    cell = xr.Dataset({f"energy_{name}": value for name, value in known.items()}).assign(energy_largest=1e-6)
+    energy = tables.quantity(cell.assign(sample_time=("sample", [0.0, 8.0])), "energy")
+    assert (energy.growth.largest, energy.length) == (1e-6, 8.0)
+    assert words.law(energy, above_rounding=True) == "1.10 +- 0.10, linear; t^0.10 to t^2.00 at t = 42"
+    assert words.law(energy, above_rounding=False) == "1.10 +- 0.10, linear"
 
 
 @pytest.mark.parametrize(("power", "says"), [(0.45, "(agrees with"), (0.8, "(does not agree with")])
-def test_a_walk_of_rounding_is_held_against_one_half(drift, power, says):
-    known = {"exponent": power, "exponent_interval": 0.06, "end": 1e-15, "gain": 100.0}
-    cell = xr.Dataset({f"rounding_{name}": value for name, value in known.items()}, coords={"integrator": "strang"})
-    said = drift._walk(cell)
-    assert f"strang grows as n^{power:.2f} +- 0.06 {says}" in said
-    assert "100 times less" in said
+def test_a_walk_of_rounding_is_held_against_one_half(power, says):
+    columns = dict.fromkeys(long_runs.Rounding._fields, math.nan)
+    columns |= {"exponent": power, "exponent_interval": 0.06, "end": 1e-15, "gain": 100.0}
+    sentence = words.walk_words("strang", long_runs.Rounding(**columns))
+    assert f"strang drifts as n^{power:.2f} +- 0.06 {says}" in sentence
+    assert "100 times less" in sentence
 
 
-def test_a_mean_energy_that_moves_is_said_to(drift):
+def test_a_mean_energy_that_moves_is_said_to():
     means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("integrator", "window"))
-    cells = xr.Dataset({"window_energy_mean": means, "window_modified_energy_mean": means * 1e-10,
-                        "window_energy_largest": means + 5e-5, "window_energy_least": means - 5e-5})  # fmt: skip
-    assert drift._moved(cells) == pytest.approx((0.3, 3e-15))
+    cells = xr.Dataset({"energy_mean": means, "modified_energy_mean": means * 1e-10,
+                        "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
+    assert tables.moved(cells) == pytest.approx((0.3, 3e-15))
 
 
 def test_a_change_of_law_is_found_in_a_run_and_an_oscillation_that_switches_on_is_none(monkeypatch):
@@ -94,19 +92,26 @@ def test_a_change_of_law_is_found_in_a_run_and_an_oscillation_that_switches_on_i
     assert np.isnan(float(found["p_psi_change"]))
 
 
-def test_a_loss_that_is_off_by_a_fifth_was_not_foretold(drift):
-    def said(*ratios):
-        names = [f"method-{k}" for k in range(len(ratios))]
-        known = {"predicted": np.array(ratios) * 250.0, "measured": 250.0, "ratio": ratios, "short": 100.0}
-        known = {
-            f"horizon_{name}": ("integrator", np.broadcast_to(value, len(ratios))) for name, value in known.items()
-        }
-        return drift._horizons(xr.Dataset(known, coords={"integrator": names}))
+def test_a_loss_that_is_off_by_a_fifth_was_not_predicted():
+    def sentence(*ratios):
+        losses = {f"method-{k}": phase_loss.PhaseLoss(100.0, 250.0 * ratio, 100.0, 250.0, ratio)
+                  for k, ratio in enumerate(ratios)}  # fmt: skip
+        return words.prediction_words(losses)
 
-    assert "foretold to 3 % for 2 of 2" in said(1.01, 0.97)
-    assert "Not foretold" not in said(1.01, 0.97)
-    assert "for 1 of 2 methods. Not foretold: method-1 (20% off)" in said(1.01, 1.2)
-    assert "It was foretold" not in said(1.3)
+    assert "right to 3 % for 2 of 2" in sentence(1.01, 0.97)
+    assert "Off by more" not in sentence(1.01, 0.97)
+    assert "for 1 of 2 methods. Off by more than 10%: method-1 (20% off)" in sentence(1.01, 1.2)
+    assert "is right" not in sentence(1.3)
+    assert "method-0 (not reached)" in sentence(math.nan)
+
+
+def test_a_column_is_read_as_it_was_stored():
+    made = phase_loss.PhaseLoss(100.0, 250.0, 100.0)
+    stored = xr.Dataset({"steps": made.steps, "predicted": made.predicted, "short": made.short})
+    assert datasets.row(phase_loss.PhaseLoss, stored)[:3] == made[:3]
+    assert math.isnan(datasets.row(phase_loss.PhaseLoss, stored).measured)
+    with pytest.raises(KeyError, match="predicted"):
+        datasets.row(phase_loss.PhaseLoss, stored.drop_vars("predicted"))
 
 
 def test_the_notebook_study_names_discrete_methods_that_lose_their_momenta():
@@ -150,8 +155,8 @@ def test_the_share_of_the_solver_is_read_from_the_numbers(one, energy, momentum,
         "solver_momentum": ("tolerance_setting", [momentum, 1e-15]),
     }).expand_dims(scene=["goldstein"], integrator=["midpoint"])  # fmt: skip
     (said,) = mechanism_words.solver(data)
-    for words in says:
-        assert words in said
+    for part in says:
+        assert part in said
 
 
 def test_the_truth_study_says_what_the_printed_values_test():

@@ -1,0 +1,93 @@
+"""When a phase error reaches a tolerance: predicted from a thousand nutations, and measured on a run that gets there.
+
+Each method gets a step of its own, chosen so that the phase error reaches `LOST` after a few thousand nutations: from
+the frequency error that a few nutations show and the order that the method declares. A run of `SHORT` nutations then
+predicts when the phase error reaches `LOST` (see `growth.horizon`), and a run a tenth longer than that measures it.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure.clock import Clock
+from symtop.measure.growth import growth, horizon, lost_at
+from symtop.methods.registry import Integrator
+from symtop.model.scenes import Scene
+from symtop.run.simulation import simulate
+
+LOST = 1e-2  # rad
+SHORT = 1000.0  # nutations of the run that predicts
+TARGET = 2500.0  # nutations after which the phase error should reach `LOST`
+MOST_STEPS = 3e7  # of the run that measures
+TRIALS = 6
+TRIAL = 40.0  # nutations
+FEWEST, MOST = 4.37, 8000.37  # steps a nutation
+FIRST = {2: 1500.37, 4: 80.37, 6: 25.37}  # steps a nutation that are tried first, by order
+SAMPLES = 2001
+
+
+class PhaseLoss(NamedTuple):
+    """Columns of the group ``horizons``; those with a default are absent if nothing could be predicted."""
+
+    steps: float  # a nutation
+    predicted: float  # nutations until the phase error reaches `LOST`
+    short: float  # nutations of the run that predicts
+    measured: float = math.nan  # nutations until the phase error reached `LOST`
+    ratio: float = math.nan  # predicted over measured
+    nutations: np.ndarray = np.array([])  # (sample,), of the run that measures
+    phase: np.ndarray = np.array([])  # (sample,), rad, its phase error
+    exponent: float = math.nan  # of the growth of the phase error in the last decade of that run
+    exponent_interval: float = math.nan  # half-width, 95 %
+
+
+def phase_run(scene: Scene, method: Integrator, clock: Clock, per_nutation: float, nutations: float) -> xr.Dataset:
+    """Phase error (rad) of a run: dimension ``time``, variable ``phase``."""
+    period = scene.nutation_period
+    run = simulate(scene, method, step_size=period / per_nutation, horizon=nutations * period, samples=SAMPLES,
+                   observe="nutation", guard=False)  # fmt: skip
+    error = clock.error(run["time"].values, run["theta"].values, run["p_theta"].values / scene.top.I1)
+    return xr.Dataset({"phase": ("time", error)}, coords={"time": run["time"]}, attrs=run.attrs)
+
+
+def steps_for(scene: Scene, method: Integrator, clock: Clock, target: float) -> float:
+    """Steps a nutation with which the phase error is about `LOST` after `target` nutations."""
+    order = method.order or 2
+    steps = FIRST.get(order, 12.37)
+    for _ in range(TRIALS):
+        run = phase_run(scene, method, clock, steps, TRIAL)
+        lost = abs(float(np.polyfit(run["time"] / scene.nutation_period, run["phase"], 1)[0])) * target
+        if run.attrs["outcome"] != "ok" or not math.isfinite(lost):
+            steps *= 2.0
+            continue
+        factor = (lost / LOST) ** (1.0 / order)
+        steps = min(max(steps * min(max(factor, 0.4), 4.0), FEWEST), MOST)
+        if 0.85 < factor < 1.2:
+            break
+    return steps
+
+
+def phase_loss(scene: Scene, method: Integrator, short: float = SHORT, target: float = TARGET) -> xr.Dataset:
+    """When the phase error of a fixed-step method reaches `LOST`: predicted from `short` nutations, and measured.
+
+    Returns a dataset with the columns of `PhaseLoss`.
+    """
+    clock, period = Clock(scene), scene.nutation_period
+    steps = steps_for(scene, method, clock, target)
+    for _ in range(TRIALS):
+        first = phase_run(scene, method, clock, steps, short)
+        predicted = horizon(first["time"], first["phase"], LOST).time / period
+        if predicted > 2.0 * short or steps > MOST:
+            break
+        steps *= 1.3  # the frequency error itself drifts, and a few nutations do not show it
+    if not math.isfinite(predicted):
+        return xr.Dataset({"steps": steps, "predicted": predicted, "short": short})
+    long = phase_run(scene, method, clock, steps, min(1.1 * predicted, MOST_STEPS / steps))
+    fit = growth(long["time"], long["phase"], 1.0)
+    measured = lost_at(long["time"], long["phase"], LOST) / period
+    nutations, phase = long["time"].values / period, long["phase"].values
+    made: dict[str, Any] = PhaseLoss(
+        steps, predicted, short, measured, predicted / measured, nutations, phase, fit.slope, fit.interval
+    )._asdict()
+    return xr.Dataset({name: ("sample" if np.ndim(values) else (), values) for name, values in made.items()})

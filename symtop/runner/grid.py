@@ -1,0 +1,25 @@
+"""Which scenes a study runs: all that are known and suit its question, but for those that it leaves out for a reason.
+
+A study does not list its scenes, so that a scene that is added, to the catalogue or by a user, is in every study whose
+question it suits. What a study leaves out, it names with the reason.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+
+from symtop.base.validate import SymtopError, one_of
+from symtop.model.scenes import Scene, scenes
+
+
+def grid_scenes(left_out: Mapping[str, Iterable[str]], suits: Callable[[Scene], bool] = lambda _: True) -> list[str]:
+    """Names of the scenes of a grid, in the order of the catalogue, a user's own at the end.
+
+    `left_out` maps a reason to the names of the scenes that it keeps out of the study; `suits` says of a scene whether
+    the question makes sense for it. Raises SymtopError for a name of no scene and for one that is left out twice.
+    """
+    known, reasons = scenes(), dict[str, str]()
+    for reason, names in left_out.items():
+        for name in names:
+            if one_of("left_out", name, known) in reasons:
+                raise SymtopError(f"scene {name!r} is left out twice: {reasons[name]!r} and {reason!r}")
+            reasons[name] = reason
+    return [name for name, scene in known.items() if name not in reasons and suits(scene)]

@@ -1,0 +1,84 @@
+"""What integrators cost: the forces of an attempt at a step, and memory that does not grow with the steps."""
+
+import dataclasses
+import math
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.methods.registry import Integrator
+
+SPHEROID = symtop.scene("spheroid")
+ATTEMPTS = 12  # runs that show what an attempt at a step costs
+STEP = SPHEROID.nutation_period / 118.02
+
+
+def forces_of_an_attempt(method: Integrator, chart: str) -> int:
+    """The number of forces that every step of an adaptive method comes in, rejected ones too; 1 if they vary.
+
+    A run costs the same number for its start and s forces for each attempt of a method with s stages: the costs of
+    `ATTEMPTS` runs to different times at different tolerances differ by multiples of s. Where a solver iterates until
+    it converges, they have no common divisor; by chance they had 2 in one case in 2000.
+    """
+    costs = []
+    for k in range(ATTEMPTS):
+        tolerance = max(10.0 ** (-4.0 - 0.4 * k), method.least_tolerance)
+        horizon = (1.37 + 0.23 * k) * SPHEROID.nutation_period
+        run = symtop.simulate(
+            SPHEROID, method.only(chart), tolerance=tolerance, horizon=horizon, samples=2, guard=False
+        )
+        assert run.attrs["outcome"] == "ok"
+        costs.append(int(run.attrs["force_evaluations"]))
+    assert len(set(costs)) > ATTEMPTS // 2
+    return math.gcd(*(cost - costs[0] for cost in costs))
+
+
+def bytes_a_step(method: Integrator) -> float:
+    """Bytes that a run keeps for each further step, by Python's own count of what NumPy and Python allocate."""
+    few = 4000 if method.tier == "compiled" else 200
+    control = {"step_size": STEP} if method.knob == "step_size" else {}
+    if method.knob == "tolerance" and method.default_tolerance is None:
+        control = {"tolerance": 1e-6}
+    peaks, steps = [], []
+    for count in (few, few, 6 * few):  # whatever is made once is made in the first run
+        tracemalloc.start()
+        try:
+            run = symtop.simulate(
+                SPHEROID, method, horizon=count * STEP, samples=11, observe="axis", guard=False, **control
+            )
+            peaks.append(tracemalloc.get_traced_memory()[1])
+            steps.append(int(run.attrs["steps"]))
+        finally:
+            tracemalloc.stop()
+    return (peaks[2] - peaks[1]) / max(steps[2] - steps[1], 1)
+
+
+@pytest.mark.parametrize(("name", "stages"), [("rk45", 6), ("rk45-compiled", 6), ("dop853", 12)])
+def test_an_explicit_adaptive_method_pays_the_same_for_every_attempt(name, stages):
+    method = symtop.integrator(name)
+    assert method.explicit is True
+    assert [forces_of_an_attempt(method, chart) for chart in method.charts()] == [stages] * len(method.charts())
+
+
+@pytest.mark.parametrize("name", ["radau", "lsoda"])
+def test_a_method_that_iterates_does_not(name):
+    assert forces_of_an_attempt(symtop.integrator(name), "angles") == 1
+
+
+# one of each loop: reduced chart, Newton, space frame, stages, two adaptive ones, SciPy's
+@pytest.mark.parametrize("name", ["stormer-verlet", "midpoint", "strang", "gauss-4", "rk45-compiled", "taylor", "rk45"])
+def test_the_memory_of_a_run_does_not_grow_with_its_steps(name):
+    assert bytes_a_step(symtop.integrator(name)) < 8.0  # less than one number a step
+
+
+def test_memory_that_grows_with_the_steps_is_seen():
+    good, kept = symtop.integrator("stormer-verlet"), []
+
+    def hoard(top, start, plan):
+        kept.clear()
+        kept.append(np.zeros(4 * round(plan.horizon / plan.step_size)))
+        return good.solvers["angles"](top, start, plan)
+
+    assert 16.0 < bytes_a_step(dataclasses.replace(good, solvers={"angles": hoard})) < 48.0

@@ -1,0 +1,52 @@
+"""Which scenes the studies run: today's, whatever is added, and nothing that they leave out."""
+
+import dataclasses
+
+import pytest
+
+import symtop
+from symtop.model import scenes as catalogue
+from symtop.runner.grid import grid_scenes
+from symtop.runner.run import load
+
+BUILT_IN = {
+    "convergence": ["spheroid", "goldstein", "loop", "hairer-lubich-wanner"],
+    "drift": ["spheroid", "goldstein"],
+    "claims": ["spheroid"],
+}
+
+
+def scenes_of(study: str, *, quick: bool = False) -> list[str]:
+    return list(dict.fromkeys(case.scene for case in load(study).cases(quick)))
+
+
+@pytest.fixture
+def new_scene(monkeypatch):
+    """A scene that somebody has added to the catalogue of the package."""
+    scene = dataclasses.replace(symtop.scene("loop"), name="brand-new")
+    known = catalogue._catalogue()
+    monkeypatch.setattr(catalogue, "_catalogue", lambda: {**known, scene.name: scene})
+    return scene
+
+
+@pytest.mark.parametrize("study", BUILT_IN)
+def test_the_built_in_scenes_of_a_study_are_these(study):
+    assert scenes_of(study) == BUILT_IN[study]
+
+
+@pytest.mark.parametrize("study", BUILT_IN)
+@pytest.mark.parametrize("quick", [False, True])
+def test_a_scene_that_joins_the_catalogue_is_in_every_study(study, quick, new_scene):
+    assert scenes_of(study, quick=quick)[-1] == new_scene.name
+
+
+def test_a_scene_that_the_question_does_not_suit_stays_out():
+    assert "separatrix" not in grid_scenes({}, lambda scene: scene.nutation_period < 70.0)
+    assert "separatrix" in grid_scenes({})
+
+
+def test_a_scene_that_is_left_out_must_exist_and_once():
+    with pytest.raises(symtop.SymtopError, match="left_out 'sferoid' is unknown; did you mean spheroid"):
+        grid_scenes({"no reason": ["sferoid"]})
+    with pytest.raises(symtop.SymtopError, match="scene 'loop' is left out twice: 'one' and 'two'"):
+        grid_scenes({"one": ["loop"], "two": ["loop"]})

@@ -1,0 +1,73 @@
+"""Studies that measure different things: a dataset a group, on disk, in a check and in a run."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from symtop.base import datasets
+from symtop.base.validate import SymtopError
+from symtop.runner import check, store
+from symtop.runner.study import Case
+
+LONG = xr.Dataset({"energy": ("window", [1.0, 2.0, 3.0]), "outcome": "ok", "steps": 3})
+SHORT = xr.Dataset({"energy": ("window", [4.0]), "outcome": "ok", "steps": 1})
+PHASE = xr.Dataset({"energy": ("sample", np.arange(4, dtype=np.uint8))})
+
+
+def tree(phase: xr.Dataset = PHASE) -> xr.DataTree:
+    return store.combine([
+        (Case("spheroid", "midpoint", group="windows"), LONG),
+        (Case("goldstein", "midpoint", group="windows"), SHORT),
+        (Case("spheroid", "strang", group="phases"), phase),
+    ])  # fmt: skip
+
+
+def test_a_group_covers_its_own_scenes_and_integrators_and_names_may_meet():
+    data = tree()
+    assert isinstance(data, xr.DataTree)
+    assert not data.to_dataset().variables
+    assert dict(data["windows"].sizes) == {"scene": 2, "integrator": 1, "window": 3}
+    assert dict(data["phases"].sizes) == {"scene": 1, "integrator": 1, "sample": 4}
+    short = data["windows/energy"].sel(scene="goldstein", integrator="midpoint").values
+    np.testing.assert_array_equal(short, [4.0, np.nan, np.nan])
+
+
+def test_a_tree_is_read_as_it_was_written(tmp_path):
+    data = datasets.describe(tree(), "Groups", question="Does it come back?")
+    path = datasets.write(data, tmp_path / "groups.nc")
+    again = datasets.read_any(path)
+    assert check.differences(data, again) == []
+    assert again["phases/energy"].dtype == np.uint8
+    assert again.attrs["question"] == "Does it come back?"
+    assert again["windows/energy"].attrs["long_name"] == "total energy"
+    flat = datasets.write(LONG, tmp_path / "flat.nc")
+    assert isinstance(datasets.read_any(flat), xr.Dataset)
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(SymtopError, match="cannot read"):
+        datasets.read_any(path)
+
+
+def test_a_check_names_the_group_that_differs():
+    assert check.differences(tree(), tree()) == []
+    (difference,) = check.differences(tree(), tree(PHASE + np.uint8(1)))
+    assert difference.startswith("phases: energy differs")
+    lost = tree()
+    del lost["phases"]
+    assert check.differences(tree(), lost) == ["group phases is in one of them only"]
+    assert check.differences(LONG, LONG) == []
+
+
+def test_a_case_without_a_group_among_cases_with_one_is_refused():
+    cases = [(Case("spheroid", "midpoint"), LONG), (Case("spheroid", "strang", group="windows"), LONG)]
+    with pytest.raises(SymtopError, match="case spheroid--midpoint has no group"):
+        store.combine(cases)
+
+
+def test_cases_that_differ_in_their_group_alone_have_files_of_their_own(tmp_path):
+    from symtop.runner.run import load
+
+    study = load("drift")
+    cases = [Case("spheroid", "strang", {"steps": 1}, group=group) for group in ("windows", "rounding")]
+    paths = [store.case_path(tmp_path, study, case) for case in cases]
+    assert len({store.label_of(path) for path in paths}) == 2
+    assert len({store.digest_of(path) for path in paths}) == 2
