@@ -8,6 +8,7 @@ It listens on 127.0.0.1 and answers only requests that name this machine as thei
 another origin can use it. Runs take turns: mpmath's precision is one for all threads.
 """
 
+import contextlib
 import json
 import tempfile
 import threading
@@ -59,6 +60,11 @@ class Handler(BaseHTTPRequestHandler):
 
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True
+
+    def handle(self) -> None:
+        """Answer the requests of one connection, until the browser closes it, even in the middle of one."""
+        with contextlib.suppress(ConnectionError):
+            super().handle()
 
     def do_GET(self) -> None:
         """The page, its files and the catalogue."""
