@@ -267,7 +267,8 @@ class _Integrators(dict[str, Integrator]):
         import pandas as pd  # 0.2 s
 
         with pd.option_context("display.max_colwidth", None):
-            return pd.DataFrame([entry.record() for entry in self.values()]).to_html(index=False)
+            html: str = pd.DataFrame([entry.record() for entry in self.values()]).to_html(index=False)
+        return html
 
 
 def integrators() -> dict[str, Integrator]:

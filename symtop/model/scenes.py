@@ -267,7 +267,8 @@ class _Scenes(dict[str, Scene]):
         import pandas as pd  # 0.2 s
 
         with pd.option_context("display.max_colwidth", None):
-            return pd.DataFrame([entry.record() for entry in self.values()]).to_html(index=False)
+            html: str = pd.DataFrame([entry.record() for entry in self.values()]).to_html(index=False)
+        return html
 
 
 def scenes() -> dict[str, Scene]:

@@ -173,7 +173,7 @@ def test_a_browser_that_leaves_during_a_run_leaves_no_traceback(site, capfd):
             browser.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # close with a reset
             browser.sendall(f"{head}\r\n\r\n".encode() + sent)
             while not serving:
-                serving = set(threading.enumerate()) - before
+                serving = {thread for thread in threading.enumerate() if thread.is_alive()} - before
         for thread in serving:
             thread.join(60)
     assert request(site, "GET", "/")[0] == 200
