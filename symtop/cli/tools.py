@@ -14,7 +14,11 @@ from symtop.cli.common import completing, json_option, load_plugins, plugin_opti
 @click.option("--accuracy", type=float, required=True, help="The largest error you accept, for example 1e-6.")
 @click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
-@click.option("--results", type=click.Path(file_okay=False), help="Folder with a stored work-precision study.")
+@click.option(
+    "--results",
+    type=click.Path(file_okay=False),
+    help="Folder with a stored work-precision study; results, if it holds one, by default.",
+)
 @plugin_option
 @json_option
 def recommend(
@@ -35,6 +39,8 @@ def recommend(
     from symtop import advise
 
     load_plugins(plugin_files)
+    if results is None and (Path("results") / advise.STORED_STUDY).is_file():
+        results = "results"
     advice = advise.recommend(scene, accuracy=accuracy, quantity=quantity, horizon=horizon, results=results)
     click.echo(json.dumps(dataclasses.asdict(advice), indent=1) if as_json else str(advice))
     if advice.integrator is None:
