@@ -36,16 +36,16 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, plu
     from symtop.report import markdown as markdown_
 
     load_plugins(plugin_files)
-    methods = [registry.integrator(name)] if name else list(registry.integrators().values())
+    methods = [registry.integrator(name)] if name is not None else list(registry.integrators().values())
     records = [method.record() for method in methods]
     header, rows = list(records[0]), [list(record.values()) for record in records]
     if as_json:
-        click.echo(json.dumps([_described(methods[0])] if name else records, indent=1))
+        click.echo(json.dumps(records if name is None else [_described(methods[0])], indent=1))
     elif markdown:
         click.echo(markdown_.table(header, rows))
     elif wide:
         click.echo(table(header, rows))
-    elif name:
+    elif name is not None:
         click.echo(_integrator_page(methods[0], terminal_width()))
     else:
         short = [[record["name"], _order(method), _flags(method), record["summary"]]
@@ -102,11 +102,11 @@ def scenes(name: str | None, wide: bool, as_json: bool, plugin_files: tuple[str,
     from symtop.model import scenes as catalogue
 
     load_plugins(plugin_files)
-    chosen = [catalogue.scene(name)] if name else list(catalogue.scenes().values())
+    chosen = [catalogue.scene(name)] if name is not None else list(catalogue.scenes().values())
     records = [scene.record() for scene in chosen]
     if as_json:
-        click.echo(json.dumps([_numbers(chosen[0])] if name else records, indent=1))
-    elif name and not wide:
+        click.echo(json.dumps(records if name is None else [_numbers(chosen[0])], indent=1))
+    elif name is not None and not wide:
         click.echo(_scene_page(chosen[0], terminal_width()))
     elif wide:
         click.echo(table(list(records[0]), [list(record.values()) for record in records]))

@@ -37,14 +37,22 @@ for command in (
 @main.command(short_help="Run studies: datasets, figures and findings.")
 @click.argument("names", nargs=-1, shell_complete=completing("studies"))
 @click.option("--all", "every", is_flag=True, help="Run every study.")
-@click.option("--quick", is_flag=True, help="Coarse grids, a few seconds a study; kept apart from the full results.")
-@click.option("--full", is_flag=True, help="The longest grid of a study that has one.")
-@click.option("--fresh", is_flag=True, help="Compute every case again; with --check, check every case.")
-@click.option("--status", "only_status", is_flag=True, help="Say what is done, stale or missing; compute nothing.")
-@click.option("--check", "only_check", is_flag=True, help="Compute stored cases again, elsewhere, and compare.")
-@click.option("--jobs", type=click.IntRange(1), help="Processes for untimed cases; all cores by default.")
-@click.option("--scheduler", metavar="ADDRESS", help="Compute untimed cases on the dask cluster of this scheduler.")
-@click.option("--limit", type=float, metavar="SECONDS", help="Time a case may take; an hour by default.")
+@click.option(
+    "--quick", is_flag=True, help="Coarse grids, a few seconds a study, into the folder quick of the results."
+)
+@click.option("--full", is_flag=True, help="The longest grid, for the studies that have one.")
+@click.option("--fresh", is_flag=True, help="Compute every case again; with --check, compare every case.")
+@click.option("--status", "only_status", is_flag=True, help="Print the state of every case; compute nothing.")
+@click.option(
+    "--check", "only_check", is_flag=True, help="Compute some stored cases again, in another folder, and compare."
+)
+@click.option(
+    "--jobs", type=click.IntRange(1), help="Worker processes for cases that are not timed; one a core by default."
+)
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Compute cases that are not timed on the dask cluster of this scheduler."
+)
+@click.option("--limit", type=float, metavar="SECONDS", help="Longest time of one case; an hour by default.")
 @results_option
 @json_option
 @plugin_option
@@ -55,9 +63,10 @@ def study(
 ) -> None:  # fmt: skip
     """Run studies by NAME: datasets, figures and findings into the results folder.
 
-    A run that is interrupted (code 130) or terminated (143) loses what it was computing and nothing else; the same
-    command goes on from there. Two runs may share a folder. A case that fails is recorded and the others go on (code
-    1). NAME is also a path, for a script of your own anywhere.
+    NAME is the name of a study, or the path of a script of your own. Cases that are stored and up to date are not
+    computed again. A case that fails is recorded and the others are computed (exit code 1). A run that is interrupted
+    (exit code 130) or terminated (143) loses only the cases it was computing, and the same command resumes it. Two
+    runs may share a folder.
 
     \b
     symtop study convergence drift
