@@ -1,9 +1,11 @@
-# make studies   every study: datasets, figures and results/report.html     make test      the fast tests
-# make quick     the same on coarse grids, into results/quick               make test-all  all tests
-# make bench     kernels against C                                          make lint      ruff and mypy
-# make check-results   compute some stored cases again and compare, to the last bit (FRESH=1: every one)
-# make peers     the same tops in other libraries
-# Each target sets up .venv first; the second time that takes no time.
+# make studies         run every study: datasets, figures and results/report.html
+# make quick           the same on coarse grids, into results/quick
+# make report          write results/report.html again from the stored findings
+# make check-results   compute some stored cases again and compare them to the last bit (FRESH=1: every case)
+# make test            run the fast tests            make test-all   run all tests
+# make lint            run ruff and mypy             make clean      delete .venv, caches and stored results
+# make bench           time the kernels against C    make peers      run the same tops in other libraries
+# Each target makes .venv first if it is missing or out of date.
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -14,7 +16,7 @@ PEERS := benchmarks/peers/.venv
 .PHONY: help setup studies quick report check-results test test-all lint bench peers clean
 
 help:
-	@sed -n '1,6s/^# //p' Makefile
+	@sed -n '1,8s/^# //p' Makefile
 
 setup: $(READY)
 
@@ -26,12 +28,12 @@ $(READY): pyproject.toml constraints.txt
 	@touch $(READY)
 
 studies: $(READY)
-	@echo "symtop: running every study; what is on disk and unchanged is not computed again"
+	@echo "symtop: running every study; cases that are stored and up to date are not computed again"
 	@$(BIN)/symtop study --all
 	@$(BIN)/symtop report
 
 quick: $(READY)
-	@echo "symtop: a quick pass of every study into results/quick"
+	@echo "symtop: running every study on a coarse grid, into results/quick"
 	@$(BIN)/symtop study --all --quick
 	@$(BIN)/symtop report --results results/quick
 
@@ -39,11 +41,11 @@ report: $(READY)
 	@$(BIN)/symtop report
 
 check-results: $(READY)
-	@echo "symtop: computing stored cases again, elsewhere, and comparing (FRESH=1 checks every case)"
+	@echo "symtop: computing some stored cases again and comparing them (FRESH=1: every case)"
 	@$(BIN)/symtop study --all --check $(if $(FRESH),--fresh)
 
 test: $(READY)
-	@echo "symtop: running the tests (make test-all runs the slow ones too)"
+	@echo "symtop: running the fast tests (make test-all runs all)"
 	@$(BIN)/python -m pytest -m "not slow"
 
 test-all: $(READY)
@@ -60,7 +62,7 @@ bench: $(READY)
 	@$(BIN)/python -m benchmarks.bench
 
 peers: $(PEERS)/.ready
-	@echo "symtop: the same tops in other libraries (about four minutes; leave the machine alone meanwhile)"
+	@echo "symtop: running the same tops in other libraries (about four minutes; other work on the machine disturbs the times)"
 	@$(PEERS)/bin/python -m benchmarks.peers
 
 $(PEERS)/.ready: pyproject.toml constraints.txt benchmarks/peers/constraints.txt

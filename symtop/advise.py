@@ -1,17 +1,23 @@
-"""Which integrator, with which step: the cheapest method that meets an accuracy, found in stored data and then tried.
+"""`recommend`: the cheapest integrator, with its step or tolerance, that meets an accuracy on a scene.
 
-    1. A stored work-precision study lists the methods that were cheapest on the scene most like this one. Scenes are
-       compared by dimensionless numbers that fix the motion of the axis: cos(theta) of both turning points and both
-       momenta over sqrt(I1 mgl). Without stored data every compiled method is a candidate.
-    2. Each candidate's setting is sought on a dozen nutations of the scene itself, against the closed form, for a
-       target lowered by the law of growth (see `symtop.measure.meet`), and its run is timed.
-    3. The cheapest are run to the whole horizon, as far as a budget of evaluations allows, and their settings
-       corrected.
+    1. Candidates. A stored work-precision study lists the methods that were cheapest on the stored scene nearest to
+       this one. The distance of two scenes is that of four dimensionless numbers which fix the motion of the axis:
+       cos(theta) at both turning points, and both momenta over sqrt(I1 mgl). Without a stored study every compiled
+       method is a candidate.
+    2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself. The
+       error is measured against the closed form. Its target is lowered by the law of growth (`symtop.measure.meet`),
+       and one run is timed.
+    3. Confirmation. The three fastest candidates are run to the whole horizon, if a budget of force evaluations allows
+       it, and their settings are corrected.
 
-Advice that was run to the end and met the accuracy with a margin is ``checked``; if its error and the reference's own
-bound together exceed the accuracy, it is ``at the reference's limit``; what was not run to the end is ``extrapolated``.
-When nothing meets the accuracy there is no integrator and the confidence is ``none``. An accuracy below the reference's
-own bound is refused in the same way, before anything is tried: no run could show it.
+The confidence of the advice is one of:
+
+    checked                    it was run to the end, and its error with the reference's bound is below the accuracy
+    at the reference's limit   it was run to the end, but its error with the reference's bound exceeds the accuracy
+    extrapolated               it was not run to the end
+    none                       no method meets the accuracy; the integrator is None
+
+An accuracy below the bound of the reference is answered with ``none`` before any run, because no run could show it.
 """
 
 import math
@@ -29,29 +35,29 @@ from symtop.measure import meet, ranking
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
 from symtop.methods.registry import Integrator, integrators
-from symtop.model.scenes import Scene, scenes
-from symtop.model.scenes import scene as find_scene
+from symtop.model import scenes
+from symtop.model.scenes import Scene
 from symtop.run.simulation import MOST_STEPS
 
-ASKED = (*QUANTITIES, *FREQUENCIES)
-STORED = Path("results") / "work_precision.nc"
-CANDIDATES = 8  # of the stored study that are tried
-FINALISTS = 3  # that are run to the whole horizon
-TOO_DEAR = 40.0  # times the evaluations of the cheapest candidate so far: not tried
-HOW = {
+KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
+STORED_STUDY = "work_precision.nc"
+CANDIDATES = 8  # methods of the stored study that are tried
+FINALISTS = 3  # methods that are run to the whole horizon
+TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
+CONFIDENCE = {
     "checked": "measured to the end",
     "at the reference's limit": "measured to the end, as far as the reference can tell",
     "extrapolated": "extrapolated from a short run",
 }
-MARGIN = 0.8  # of the accuracy that a checked run must meet at its samples; between them the error may be larger
+MARGIN = 0.8  # fraction of the accuracy that a run must meet at its samples; between them its error may be larger
 
 
 @dataclass(frozen=True)
 class Advice:
-    """What to use: an integrator with its step or tolerance, and how sure that is.
+    """A recommended integrator with its step or tolerance, and how sure that is.
 
-    `expected_error` is the largest error of `quantity` expected over `horizon`, `seconds` the wall time of the bare
-    run on this machine. `fails` says of methods that were tried why they are not the answer.
+    `expected_error` is the largest error of `quantity` expected over `horizon`; `seconds` is the wall time of the bare
+    run on this machine. `fails` says why other methods that were tried were not recommended.
     """
 
     scene: str
@@ -75,12 +81,12 @@ class Advice:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A candidate with its setting, its error as expected at the horizon, and the cost of the whole run."""
+    """A candidate with its setting, the error expected at the horizon, and the wall time of the whole run."""
 
     met: meet.Met
     error: float
     seconds: float
-    confidence: str  # one of HOW
+    confidence: str  # a key of CONFIDENCE
 
     @property
     def name(self) -> str:
@@ -92,7 +98,7 @@ class _Trial:
 
 
 def regime(scene: Scene) -> np.ndarray:
-    """Dimensionless numbers of a scene's motion: cos(theta) of both turning points, both momenta in asinh."""
+    """Four dimensionless numbers of a scene: cos(theta) at both turning points, asinh of both scaled momenta."""
     top, start = scene.top, scene.start
     low, high = sorted(top.turning_cosines(start))
     unit = math.sqrt(top.I1 * max(abs(top.mgl), TINY))
@@ -108,58 +114,55 @@ def recommend(
     horizon: float | None = None,
     results: str | Path | None = None,
 ) -> Advice:
-    """The cheapest method, with its step or tolerance, that keeps the error of `quantity` below `accuracy`.
+    """The cheapest integrator, with its step or tolerance, that keeps the error of `quantity` below `accuracy`.
 
-    `scene` is a Scene or the name of one; `horizon` its own by default; `results` a folder with a stored
-    ``work_precision.nc`` (default: ``results`` if it is there). Raises SymtopError for arguments that make no sense;
-    when no method is good enough, the advice says so. It runs what it recommends, which takes from a tenth of a second
-    to half a minute.
+    `accuracy` is the largest absolute error of `quantity` over the run: radians for ``axis``, ``attitude`` and
+    ``theta``, the units of the scene for others. `horizon` is the scene's own by default. `results` is a folder with a
+    stored ``work_precision.nc``; without it every compiled method is tried. Raises SymtopError for arguments that are
+    out of range. It runs what it recommends, which takes from 0.1 s to half a minute.
     """
-    chosen = find_scene(scene)
-    wanted = positive("accuracy", accuracy)
-    if wanted >= math.pi:
-        raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {wanted!r}")
-    one_of("quantity", quantity, ASKED)
-    end = chosen.horizon if horizon is None else positive("horizon", horizon)
-    data = _stored(results)
-    limit = meet.judgeable(chosen, quantity, end)
-    if wanted < limit:
+    scene = scenes.scene(scene)
+    accuracy = positive("accuracy", accuracy)
+    if accuracy >= math.pi:
+        raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}")
+    one_of("quantity", quantity, KNOWN_QUANTITIES)
+    horizon = scene.horizon if horizon is None else positive("horizon", horizon)
+    data = None if results is None else _stored(Path(results) / STORED_STUDY)
+    limit = meet.judgeable(scene, quantity, horizon)
+    if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
-        return _advice(chosen, wanted, quantity, end, [], (), source)
-    names, source = _candidates(chosen, wanted, quantity, end, data)
+        return _advice(scene, accuracy, quantity, horizon, [], (), source)
+    guesses, source = _candidates(scene, accuracy, quantity, horizon, data)
     trials: list[_Trial] = []
     fails: dict[str, list[str]] = {}
-    known, patience = integrators(), math.inf
-    for name in sorted(names, key=lambda name: -(known[name].order or 0)):  # the cheap ones first, to bound the others
-        found = _try(chosen, known[name], wanted, quantity, end, names[name], patience)
-        if isinstance(found, _Trial):
-            trials.append(found)
-            patience = min(patience, TOO_DEAR * found.met.evaluations)
+    methods, patience = integrators(), math.inf
+    # Methods of high order first: they are the cheapest at most accuracies, and their cost ends the other searches.
+    for name in sorted(guesses, key=lambda name: -(methods[name].order or 0)):
+        trial = _try(scene, methods[name], accuracy, quantity, horizon, guesses[name], patience)
+        if isinstance(trial, _Trial):
+            trials.append(trial)
+            patience = min(patience, TOO_DEAR * trial.met.evaluations)
         else:
-            fails.setdefault(found, []).append(name)
+            fails.setdefault(trial, []).append(name)
     trials.sort(key=lambda trial: trial.seconds)
     ranked: list[_Trial] = []
     for number, trial in enumerate(trials):
         if number >= FINALISTS and ranked:
             break
-        confirmed = _confirm(chosen, trial, wanted, quantity, end)
+        confirmed = _confirm(scene, trial, accuracy, quantity, horizon)
         if isinstance(confirmed, _Trial):
             ranked.append(confirmed)
         else:
             fails.setdefault(confirmed, []).append(trial.name)
     ranked.sort(key=lambda trial: trial.seconds)
-    why = tuple(f"{reason}: {', '.join(which)}." for reason, which in fails.items())
-    return _advice(chosen, wanted, quantity, end, ranked, why, source)
+    sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
+    return _advice(scene, accuracy, quantity, horizon, ranked, sentences, source)
 
 
-def _stored(results: str | Path | None) -> xr.Dataset | None:
-    file = STORED if results is None else Path(results) / STORED.name
+def _stored(file: Path) -> xr.Dataset:
+    """The dataset of the work-precision study; refused with a sentence if it is not there or cannot be read."""
     if not file.is_file():
-        if results is not None:
-            raise SymtopError(
-                f"results holds no {STORED.name}: {str(results)!r}; run symtop study work_precision first"
-            )
-        return None
+        raise SymtopError(f"results holds no {file.name}: {str(file.parent)!r}; run symtop study work_precision first")
     try:
         with xr.open_dataset(file) as data:
             return data.load()
@@ -168,7 +171,7 @@ def _stored(results: str | Path | None) -> xr.Dataset | None:
 
 
 def _usable(quantity: str) -> dict[str, Integrator]:
-    """Methods that can be recommended: compiled, with a knob, showing what is asked."""
+    """Methods that can be recommended: compiled, with a step or tolerance, and able to show the quantity."""
     needed = meet.observed(quantity)
     return {
         name: method
@@ -184,32 +187,33 @@ def _shows_attitude(method: Integrator) -> bool:
 def _candidates(
     scene: Scene, accuracy: float, quantity: str, horizon: float, data: xr.Dataset | None
 ) -> tuple[dict[str, float | None], str]:
-    """Names to try, each with a setting to begin with, and where they came from."""
+    """Names of methods to try, each with a first guess of its setting, and a phrase on their origin."""
     usable = _usable(quantity)
     everyone: dict[str, float | None] = dict.fromkeys(usable)
     if data is None or quantity not in data:
-        return everyone, f"tried all {len(everyone)} compiled methods (no stored study was found)"
-    known = {name: scenes()[name] for name in map(str, data["scene"].values) if name in scenes()}
-    if not known:
+        return everyone, f"tried all {len(everyone)} compiled methods (without a stored study)"
+    catalogue = scenes.scenes()
+    stored = {name: catalogue[name] for name in map(str, data["scene"].values) if name in catalogue}
+    if not stored:
         return everyone, f"tried all {len(everyone)} compiled methods (the stored study holds no known scene)"
-    here = regime(scene)
-    nearest = min(known, key=lambda name: float(np.sum((regime(known[name]) - here) ** 2)))
-    periods = horizon / scene.nutation_period
-    far = int(np.argmin(np.abs(np.log(data["horizon"].values / max(periods, 1e-3)))))
-    cell = data.sel(scene=nearest).isel(horizon=far)
+    numbers = regime(scene)
+    nearest = min(stored, key=lambda name: float(np.sum((regime(stored[name]) - numbers) ** 2)))
+    nutations = horizon / scene.nutation_period
+    column = int(np.argmin(np.abs(np.log(data["horizon"].values / max(nutations, 1e-3)))))
+    cell = data.sel(scene=nearest).isel(horizon=column)
     chosen: dict[str, float | None] = {}
     for place in ranking.cheapest(cell, accuracy, quantity):
         if place.integrator in usable and len(chosen) < CANDIDATES:
             row = cell.sel(integrator=place.integrator).isel(setting=place.setting)
-            chosen[place.integrator] = _setting(row, scene, known[nearest])
+            chosen[place.integrator] = _setting(row, scene, stored[nearest])
     if not chosen:
-        why = f"none met it on {nearest}, the nearest stored scene"
-        return everyone, f"tried all {len(everyone)} compiled methods ({why})"
+        cause = f"none met it on {nearest}, the nearest stored scene"
+        return everyone, f"tried all {len(everyone)} compiled methods ({cause})"
     return chosen, f"tried the {len(chosen)} methods that are cheapest on {nearest}, the nearest stored scene"
 
 
 def _setting(row: xr.Dataset, scene: Scene, stored: Scene) -> float:
-    """A stored setting in the time scale of this scene."""
+    """A stored step, scaled by the ratio of the nutation periods, or a stored tolerance."""
     step = float(row["step_size"])
     if not math.isfinite(step):
         return float(row["tolerance"])
@@ -226,29 +230,32 @@ def _try(
     guess: float | None,
     patience: float,
 ) -> "_Trial | str":
-    """A candidate's setting and cost from a short run, or a sentence on why it has none."""
+    """A candidate's setting and cost from short runs, or the reason why it has none."""
     period = scene.nutation_period
     short = min(horizon, meet.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** meet.growth(method, quantity)
-    found = meet.search(scene, method, accuracy * law, quantity, short, guess, patience)
-    if isinstance(found, meet.Missed):
-        dear = found.why == meet.BUDGET and patience < meet.MOST_EVALUATIONS[method.tier]
-        return f"Not within {TOO_DEAR:g} times the work of the best" if dear else found.why
-    if method.knob == "step_size" and horizon / found.setting > MOST_STEPS:
+    met = meet.search(scene, method, accuracy * law, quantity, short, guess, patience)
+    if isinstance(met, meet.Missed):
+        dear = met.why == meet.BUDGET and patience < meet.MOST_EVALUATIONS[method.tier]
+        return f"Not within {TOO_DEAR:g} times the work of the best" if dear else met.why
+    if method.knob == "step_size" and horizon / met.setting > MOST_STEPS:
         return f"Would need more than {MOST_STEPS:.0e} steps"
-    return _Trial(found, found.error / law, meet.seconds(scene, found, quantity, horizon), "extrapolated")
+    return _Trial(met, met.error / law, meet.seconds(scene, met, quantity, horizon), "extrapolated")
 
 
 def _confirm(scene: Scene, trial: _Trial, accuracy: float, quantity: str, horizon: float) -> "_Trial | str":
-    """The trial run to the whole horizon, its setting corrected; as it was if that is too long, or why it fails."""
-    met = trial.met
-    if met.evaluations * horizon / met.horizon > meet.MOST_EVALUATIONS[met.integrator.tier]:
+    """The trial run to the whole horizon with its setting corrected, or the reason why it fails there.
+
+    A trial that would need too many evaluations is returned as it is.
+    """
+    short = trial.met
+    if short.evaluations * horizon / short.horizon > meet.MOST_EVALUATIONS[short.integrator.tier]:
         return trial
-    found = meet.search(scene, met.integrator, MARGIN * accuracy, quantity, horizon, met.setting)
-    if isinstance(found, meet.Missed):
-        return f"Good enough over a short run but not to the end ({found.why[0].lower()}{found.why[1:]})"
-    confidence = "checked" if found.error + found.bound <= accuracy else "at the reference's limit"
-    return _Trial(found, found.error, meet.seconds(scene, found, quantity, horizon), confidence)
+    met = meet.search(scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting)
+    if isinstance(met, meet.Missed):
+        return f"Good enough over a short run but not to the end ({met.why[0].lower()}{met.why[1:]})"
+    confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
+    return _Trial(met, met.error, meet.seconds(scene, met, quantity, horizon), confidence)
 
 
 def _advice(
@@ -260,21 +267,23 @@ def _advice(
     fails: tuple[str, ...],
     source: str,
 ) -> Advice:
-    asked: dict[str, Any] = {"scene": scene.name, "quantity": quantity, "accuracy": accuracy, "horizon": horizon}
     goal = f"{quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}"
+    question: dict[str, Any] = {"scene": scene.name, "quantity": quantity, "accuracy": accuracy, "horizon": horizon}
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}. The closed form, integrator exact, takes no steps."
         nothing: dict[str, Any] = {"integrator": None, "step_size": None, "tolerance": None, "confidence": "none"}
-        return Advice(**asked, **nothing, expected_error=math.nan, seconds=math.nan, reason=reason, fails=fails)
+        return Advice(**question, **nothing, expected_error=math.nan, seconds=math.nan, reason=reason, fails=fails)
     best = ranked[0]
-    reason = f"{best.words()} meets {goal}: error {best.error:.2g} ({HOW[best.confidence]}) in {best.seconds:.2g} s"
+    reason = (
+        f"{best.words()} meets {goal}: error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
+    )
     reason += f"; {source}."
     runner = ""
     if len(ranked) > 1:
         runner = f"{ranked[1].words()}, {ranked[1].seconds / best.seconds:.2g} times the time."
     step = best.met.integrator.knob == "step_size"
     return Advice(
-        **asked,
+        **question,
         integrator=best.name,
         step_size=best.met.setting if step else None,
         tolerance=None if step else best.met.setting,

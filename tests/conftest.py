@@ -10,11 +10,25 @@ import pytest
 
 os.environ.setdefault("SYMTOP_CACHE", str(Path(__file__).resolve().parent.parent / ".pytest_cache" / "symtop"))
 
+from symtop.methods import registry
+from symtop.model import scenes
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.runner import scripts
+from symtop.runner import plugins, scripts
 
 scripts.install()  # tests import `symtop_studies`
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _registered_for_one_file():
+    """Forget the integrators, scenes and plug-ins that a file of tests registered, so that files run in any order."""
+    registry.integrators()  # the built-in ones are registered first
+    stores = (registry._registry, scenes._added, plugins._loaded, plugins._owners)
+    before = [store.copy() for store in stores]
+    yield
+    for store, entries in zip(stores, before, strict=True):
+        store.clear()
+        store.update(entries)
 
 
 @pytest.fixture(scope="session")
@@ -27,7 +41,7 @@ def truth() -> dict:
 def random_scenes(count: int, seed: int) -> list[Scene]:
     """Ordinary tops in ordinary motion, away from the poles."""
     draw = random.Random(seed)
-    found = []
+    drawn = []
     for k in range(count):
         I1 = draw.uniform(0.3, 4.0)
         top = SymmetricTop(I1, draw.uniform(0.2, 1.9) * I1, draw.uniform(-3.0, 6.0))
@@ -39,5 +53,5 @@ def random_scenes(count: int, seed: int) -> list[Scene]:
             phi_dot=draw.uniform(-2.0, 2.0),
             psi_dot=draw.uniform(-6.0, 6.0),
         )
-        found.append(Scene(f"random-{k}", top, start, 5.0))
-    return found
+        drawn.append(Scene(f"random-{k}", top, start, 5.0))
+    return drawn

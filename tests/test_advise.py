@@ -78,9 +78,9 @@ def test_mean_frequencies_of_a_structured_method_do_not_drift():
 )
 def test_a_search_says_why_it_found_nothing(name, accuracy, patience, why):
     scene, method = symtop.scene("spheroid"), symtop.integrator(name)
-    found = meet.search(scene, method, accuracy, "axis", 5.0, None, patience)
-    assert isinstance(found, meet.Missed)
-    assert found.why == why
+    missed = meet.search(scene, method, accuracy, "axis", 5.0, None, patience)
+    assert isinstance(missed, meet.Missed)
+    assert missed.why == why
 
 
 def few(monkeypatch, count):
@@ -111,7 +111,7 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
 def test_a_run_to_the_end_at_the_references_limit_is_not_called_extrapolated(monkeypatch):
     few(monkeypatch, 1)
     real = meet.attempt
-    monkeypatch.setattr(meet, "attempt", lambda *asked: real(*asked)._replace(bound=0.99e-4))
+    monkeypatch.setattr(meet, "attempt", lambda *question: real(*question)._replace(bound=0.99e-4))
     advice = symtop.recommend("spheroid", accuracy=1e-4, horizon=20.0)
     assert advice.confidence == "at the reference's limit"
     assert "measured to the end" in advice.reason
@@ -140,6 +140,19 @@ def test_the_command_prints_and_refuses(tmp_path, monkeypatch):
     assert '"confidence": "checked"' in result.output
     assert CliRunner().invoke(main, ["recommend", "goldstien", "--accuracy", "1e-3"]).exit_code == 2
     assert CliRunner().invoke(main, ["recommend", "goldstein", "--accuracy", "1e-17"]).exit_code == 1
+
+
+def test_the_answer_does_not_depend_on_the_working_directory(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "work_precision.nc").write_text("no dataset")
+    few(monkeypatch, 1)
+    assert symtop.recommend("spheroid", accuracy=1e-3).integrator == "strang"
+    command = CliRunner().invoke(
+        main, ["recommend", "spheroid", "--accuracy", "1e-3"]
+    )  # the command says what it reads
+    assert command.exit_code == 2
+    assert "work_precision.nc cannot be read" in command.output
 
 
 def test_a_regime_does_not_depend_on_units():
@@ -185,13 +198,13 @@ def test_sixty_random_tops():
             assert good or advice.confidence != "checked", advice
             met.append(good)
             if number % 6 == 0:
-                found = [
+                searches = [
                     meet.search(scene, method, accuracy, "axis", scene.horizon, patience=2e6)
                     for method in symtop.integrators().values()
                     if method.tier == "compiled" and method.knob is not None and method.name != "taylor-quad"
                 ]
                 best = min(
-                    meet.seconds(scene, one, "axis", scene.horizon) for one in found if isinstance(one, meet.Met)
+                    meet.seconds(scene, one, "axis", scene.horizon) for one in searches if isinstance(one, meet.Met)
                 )
                 ratios.append(advice.seconds / best)
     assert np.mean(met) >= 0.97

@@ -1,6 +1,6 @@
-"""The explorer: sliders in a browser, each change one run beside the truth. `answers` computes, `server` speaks HTTP.
+"""The explorer: a page with sliders; each change of one is a run beside the exact motion.
 
-Nothing but the standard library on this side and plain JavaScript on the other: it works without a network, asks no
-other machine for anything, and needs no package beyond symtop's own. A notebook server (marimo) was weighed against it:
-25 more packages, and a page that fetches its front end from a content network.
+`answers` computes, `server` speaks HTTP. The server is of the standard library and the page of plain JavaScript: it
+works without a network and needs no package beyond symtop's own. A notebook server (marimo) would need 25 more packages
+and a page that fetches its front end from a content network.
 """

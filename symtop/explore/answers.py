@@ -1,7 +1,7 @@
-"""What the explorer can be asked: a run beside the truth, the same run as a dataset, and as a script.
+"""The explorer's answers: one run beside the exact motion, the same run as a dataset, and as a script.
 
-A question is a flat mapping of numbers and names, as a page sends it. Every answer is made of the public contract,
-`Scene`, `simulate` and the closed form, so that the script that is handed out gives the same bits.
+The page sends a flat mapping of numbers and names, which `setup` reads. The run is made by the public functions
+(`Scene`, `simulate`, the closed form), so that the script gives the same numbers to the last bit.
 """
 
 import base64
@@ -24,14 +24,14 @@ from symtop.run.simulation import simulate
 
 TOP = ("I1", "I3", "mgl")
 START = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
-MOST_STEPS = 2_000_000  # a quarter of a second of the common kernels
-MOST_WORK = {"compiled": 2e6, "python": 2e5}  # force evaluations of an adaptive run: two seconds at most
-A_NUTATION = 60  # samples, as far as they go
-SAMPLES = (601, 4001)
+MOST_STEPS = 2_000_000  # of one run; the common kernels take a quarter of a second for them
+MOST_WORK = {"compiled": 2e6, "python": 2e5}  # force evaluations of an adaptive run, two seconds at most
+SAMPLES_A_NUTATION = 60
+FEWEST_SAMPLES, MOST_SAMPLES = 601, 4001  # of one run, whatever its nutations
 
 
 @dataclass(frozen=True)
-class Question:
+class Setup:
     """One run: a scene with its horizon, a method, and its step or tolerance."""
 
     scene: Scene
@@ -39,64 +39,66 @@ class Question:
     setting: float | None
 
     def knob(self, name: str) -> float | None:
-        """The setting, if this is the method's knob."""
+        """The setting, if it is the one called `name`; None otherwise."""
         return self.setting if self.method.knob == name else None
 
     @property
     def budget(self) -> float | None:
-        """The work an adaptive run may take; more, and it ends there and says so."""
+        """The most work of an adaptive run, which ends there and says so; None for a fixed step."""
         return MOST_WORK[self.method.tier] if self.method.knob == "tolerance" else None
 
     @property
     def samples(self) -> int:
-        """Enough to see every nutation, as far as a page can draw them."""
+        """The number of samples: 60 a nutation, within what a page can draw."""
         period = self.scene.nutation_period
-        wanted = A_NUTATION * self.scene.horizon / period if np.isfinite(period) and period > 0.0 else SAMPLES[0]
-        return round(min(max(wanted, SAMPLES[0]), SAMPLES[1]))
+        resolved = np.isfinite(period) and period > 0.0
+        wanted = SAMPLES_A_NUTATION * self.scene.horizon / period if resolved else FEWEST_SAMPLES
+        return round(min(max(wanted, FEWEST_SAMPLES), MOST_SAMPLES))
 
 
-def question(fields: Mapping[str, Any]) -> Question:
-    """A question from what a page sent; SymtopError says what is missing or makes no sense."""
+def setup(fields: Mapping[str, Any]) -> Setup:
+    """The run that a page asks for. Raises SymtopError if a field is missing or out of range."""
     if not isinstance(fields, Mapping):
-        raise SymtopError(f"a question must be a mapping of names to values, not {fields!r}")
+        raise SymtopError(f"the question must be a mapping of names to values, not {fields!r}")
     missing = [name for name in (*TOP, *START, "horizon", "integrator") if name not in fields]
     if missing:
         raise SymtopError(f"the question lacks {', '.join(missing)}")
     top = SymmetricTop(*(finite(name, fields[name]) for name in TOP))
     start = Angles(*(finite(name, fields[name]) for name in START))
     method = integrator(str(fields["integrator"]))
-    where = Scene("explored", top, start, positive("horizon", fields["horizon"]))
+    scene = Scene("explored", top, start, positive("horizon", fields["horizon"]))
     if method.knob is None:
-        return Question(where, method, None)
+        return Setup(scene, method, None)
     setting = positive(method.knob, fields.get(method.knob))
-    if method.knob == "step_size" and where.horizon / setting > MOST_STEPS:
+    if method.knob == "step_size" and scene.horizon / setting > MOST_STEPS:
         raise SymtopError(
-            f"step_size must be at least {where.horizon / MOST_STEPS:.3g} here, not {setting!r}: "
+            f"step_size must be at least {scene.horizon / MOST_STEPS:.3g} for this horizon, not {setting!r}: "
             f"the explorer runs at most {MOST_STEPS} steps"
         )
-    return Question(where, method, setting)
+    return Setup(scene, method, setting)
 
 
-def dataset(asked: Question, tell: Callable[[str], object]) -> xr.Dataset:
-    """The run as `simulate` returns it; what its guard has to say goes to `tell`."""
+def dataset(chosen: Setup, warn: Callable[[str], object]) -> xr.Dataset:
+    """The run as `simulate` returns it; `warn` gets the sentence of the guard, if it has one."""
     return simulate(
-        asked.scene, asked.method, step_size=asked.knob("step_size"), tolerance=asked.knob("tolerance"),
-        observe="attitude", samples=asked.samples, guard=tell, budget=asked.budget,
+        chosen.scene, chosen.method, step_size=chosen.knob("step_size"), tolerance=chosen.knob("tolerance"),
+        observe="attitude", samples=chosen.samples, guard=warn, budget=chosen.budget,
     )  # fmt: skip
 
 
-def answer(asked: Question) -> dict[str, Any]:
-    """A run beside the truth: attitudes, residuals, errors, the outcome's sentence and the guard's.
+def answer(chosen: Setup) -> dict[str, Any]:
+    """A run beside the exact motion: attitudes, residuals, errors, and the sentences of the outcome and the guard.
 
     Arrays are base64 of float32, over `time`: ``attitude`` and ``truth`` (w, x, y, z in turn), ``theta``, ``energy``,
-    ``p_phi`` and ``p_psi`` (relative residuals), ``axis_error`` and ``attitude_error`` in radians. NaN after a failure.
+    ``p_phi`` and ``p_psi`` (relative changes since the start), ``axis_error`` and ``attitude_error`` in radians. Values
+    after a failure are NaN.
     """
     began = time.perf_counter()
-    said: list[str] = []
-    run = dataset(asked, said.append)
+    warnings: list[str] = []
+    run = dataset(chosen, warnings.append)
     ran = time.perf_counter()
     times = run["time"].values
-    truth = closed_form(asked.scene).quaternion(times)
+    truth = closed_form(chosen.scene).quaternion(times)
     attitude = _attitude(run)
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
         arrays = {
@@ -104,7 +106,7 @@ def answer(asked: Question) -> dict[str, Any]:
             "attitude": attitude,
             "truth": truth,
             "theta": run["theta"].values,
-            **residuals(asked.scene, run),
+            **residuals(chosen.scene, run),
             "axis_error": charts.axis_distance(run["axis"].values, charts.axis_from_quaternion(truth)),
             "attitude_error": charts.attitude_distance(attitude, truth),
         }
@@ -112,10 +114,10 @@ def answer(asked: Question) -> dict[str, Any]:
     return {
         "outcome": run.attrs["outcome"],
         "message": run.attrs["outcome_message"],
-        "warnings": said,
+        "warnings": warnings,
         "steps": int(run.attrs["steps"]),
         "force_evaluations": int(run.attrs["force_evaluations"]),
-        "period": float(np.nan_to_num(asked.scene.nutation_period, posinf=0.0)),
+        "period": float(np.nan_to_num(chosen.scene.nutation_period, posinf=0.0)),
         "run_ms": 1e3 * (ran - began),
         "all_ms": 1e3 * (time.perf_counter() - began),
         "largest": {name: _largest(arrays[name]) for name in (*CONSTANTS, "axis_error")},
@@ -125,8 +127,8 @@ def answer(asked: Question) -> dict[str, Any]:
 
 def _attitude(run: xr.Dataset) -> charts.Array:
     if "quaternion" in run:
-        found: charts.Array = run["quaternion"].values
-        return found
+        quaternions: charts.Array = run["quaternion"].values
+        return quaternions
     return charts.quaternion_from_angles(run["theta"].values, run["phi"].values, run["psi"].values)
 
 
@@ -139,23 +141,24 @@ def _largest(values: Any) -> float | None:
     return float(good.max()) if good.size else None
 
 
-def script(asked: Question) -> str:
+def script(chosen: Setup) -> str:
     """A Python script that makes the same dataset, to the bit."""
-    top, start, where = asked.scene.top, asked.scene.start, asked.scene
-    shown_top = ", ".join(f"{name}={getattr(top, name)!r}" for name in TOP)
-    shown_start = ", ".join(f"{name}={getattr(start, name)!r}" for name in START)
-    knob = "" if asked.method.knob is None else f", {asked.method.knob}={asked.setting!r}"
-    knob += "" if asked.budget is None else f", budget={asked.budget!r}"
+    scene = chosen.scene
+    top = ", ".join(f"{name}={getattr(scene.top, name)!r}" for name in TOP)
+    start = ", ".join(f"{name}={getattr(scene.start, name)!r}" for name in START)
+    name, samples = chosen.method.name, chosen.samples
+    options = "" if chosen.method.knob is None else f", {chosen.method.knob}={chosen.setting!r}"
+    options += "" if chosen.budget is None else f", budget={chosen.budget!r}"
     return "\n".join(
         [
-            f'"""A run that was found with symtop explore, symtop {__version__}."""',
+            f'"""A run of symtop explore, symtop {__version__}."""',
             "",
             "import symtop",
             "",
-            f"top = symtop.SymmetricTop({shown_top})",
-            f"start = symtop.Angles({shown_start})",
-            f'scene = symtop.Scene("{where.name}", top, start, horizon={where.horizon!r})',
-            f'run = symtop.simulate(scene, "{asked.method.name}"{knob}, observe="attitude", samples={asked.samples})',
+            f"top = symtop.SymmetricTop({top})",
+            f"start = symtop.Angles({start})",
+            f'scene = symtop.Scene("{scene.name}", top, start, horizon={scene.horizon!r})',
+            f'run = symtop.simulate(scene, "{name}"{options}, observe="attitude", samples={samples})',
             'run.to_netcdf("explored.nc")',
             'print(run.attrs["title"] + ": " + run.attrs["outcome_message"])',
             "",
@@ -164,10 +167,10 @@ def script(asked: Question) -> str:
 
 
 def catalogue() -> dict[str, Any]:
-    """The scenes and the integrators that can be chosen, with all that the page's controls need."""
+    """The scenes and integrators that the page offers, with the numbers of its controls."""
     from symtop.report import style  # matplotlib: half a second
 
-    known = [
+    offered = [
         {
             "name": entry.name,
             "purpose": entry.purpose,
@@ -191,4 +194,4 @@ def catalogue() -> dict[str, Any]:
         for entry in integrators().values()
         if {"angles", "attitude"} & set(entry.charts())
     ]
-    return {"version": __version__, "scenes": known, "integrators": methods}
+    return {"version": __version__, "scenes": offered, "integrators": methods}

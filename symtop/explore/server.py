@@ -1,13 +1,15 @@
-"""The explorer's server: a page, three of its files, and three questions, for this machine only.
+"""The explorer's server: a page with its files, and three actions, for this machine only.
 
     GET  /  /explore.js  /draw.js  /style.css     the page
     GET  /catalogue                               scenes and integrators
     POST /run  /netcdf  /script                   one run: as arrays, as a file, as a script
 
-It listens on 127.0.0.1 and answers only requests that name this machine as their host and send JSON, so that no page of
-another origin can use it. Runs take turns: mpmath's precision is one for all threads.
+It listens on 127.0.0.1. It answers only requests that name this machine as their host, and POST requests only if they
+send JSON, so that a page of another origin cannot use it. Runs take turns, because mpmath has one precision for all
+threads.
 """
 
+import contextlib
 import json
 import tempfile
 import threading
@@ -27,27 +29,27 @@ PAGES = {
     "/draw.js": ("draw.js", "text/javascript; charset=utf-8"),
     "/style.css": ("style.css", "text/css; charset=utf-8"),
 }
-LONGEST = 65_536  # bytes of a question
+LONGEST_BODY = 65_536  # bytes of a POST request
 POLICY = "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
-_turn = threading.Lock()
+_one_run = threading.Lock()
 
 
-def _run(asked: answers.Question) -> tuple[bytes, str]:
-    return json.dumps(answers.answer(asked)).encode(), "application/json"
+def _run(chosen: answers.Setup) -> tuple[bytes, str]:
+    return json.dumps(answers.answer(chosen)).encode(), "application/json"
 
 
-def _netcdf(asked: answers.Question) -> tuple[bytes, str]:
+def _netcdf(chosen: answers.Setup) -> tuple[bytes, str]:
     with tempfile.TemporaryDirectory() as folder:
-        path = datasets.write(answers.dataset(asked, str), Path(folder) / "explored.nc")
+        path = datasets.write(answers.dataset(chosen, str), Path(folder) / "explored.nc")
         return path.read_bytes(), "application/x-netcdf"
 
 
-def _script(asked: answers.Question) -> tuple[bytes, str]:
-    return answers.script(asked).encode(), "text/x-python; charset=utf-8"
+def _script(chosen: answers.Setup) -> tuple[bytes, str]:
+    return answers.script(chosen).encode(), "text/x-python; charset=utf-8"
 
 
-QUESTIONS: dict[str, Callable[[answers.Question], tuple[bytes, str]]] = {
+ACTIONS: dict[str, Callable[[answers.Setup], tuple[bytes, str]]] = {
     "/run": _run,
     "/netcdf": _netcdf,
     "/script": _script,
@@ -60,9 +62,14 @@ class Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True
 
+    def handle(self) -> None:
+        """Answer the requests of one connection, until the browser closes it, even in the middle of one."""
+        with contextlib.suppress(ConnectionError):
+            super().handle()
+
     def do_GET(self) -> None:
         """The page, its files and the catalogue."""
-        if not self._ours():
+        if not self._is_local():
             return
         if self.path in PAGES:
             name, kind = PAGES[self.path]
@@ -73,10 +80,10 @@ class Handler(BaseHTTPRequestHandler):
             self._refuse(404, f"there is no {self.path} here")
 
     def do_POST(self) -> None:
-        """One of the questions."""
-        if not self._ours():
+        """One of the actions."""
+        if not self._is_local():
             return
-        if self.path not in QUESTIONS:
+        if self.path not in ACTIONS:
             self._refuse(404, f"there is no {self.path} here")
             return
         if self.headers.get_content_type() != "application/json":
@@ -85,22 +92,22 @@ class Handler(BaseHTTPRequestHandler):
         try:
             given = self.headers.get("Content-Length", "0")
             length = whole("the length of a question", int(given) if given.isdecimal() else given, 0)
-            if length > LONGEST:
-                self._refuse(413, f"a question must be at most {LONGEST} bytes, not {length}")
+            if length > LONGEST_BODY:
+                self._refuse(413, f"a question must be at most {LONGEST_BODY} bytes, not {length}")
                 return
-            asked = answers.question(_parsed(self.rfile.read(length)))
-            with _turn:
-                body, kind = QUESTIONS[self.path](asked)
+            chosen = answers.setup(_parsed(self.rfile.read(length)))
+            with _one_run:
+                body, kind = ACTIONS[self.path](chosen)
         except SymtopError as error:
-            # a sentence is an ordinary answer to a slider that went too far; a file cannot be given instead
+            # The page shows the sentence in place of a run, as an ordinary answer; a file cannot be replaced by it.
             self._refuse(200 if self.path == "/run" else 400, str(error))
-        except Exception as error:  # noqa: BLE001  (a page must hear of it, and the server must go on)
+        except Exception as error:  # noqa: BLE001  (the page shows it, and the server keeps running)
             self._refuse(500, f"the run failed: {type(error).__name__}: {' '.join(str(error).split())}")
         else:
             self._reply(200, body, kind)
 
-    def _ours(self) -> bool:
-        """Does the request name this machine? A page of another name that resolves to it must not get in."""
+    def _is_local(self) -> bool:
+        """Does the request name this machine? The check refuses a foreign name that resolves to 127.0.0.1."""
         host = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host", "")
         if host in ("127.0.0.1", "localhost"):
             return True
@@ -108,7 +115,7 @@ class Handler(BaseHTTPRequestHandler):
         return False
 
     def _refuse(self, status: int, sentence: str) -> None:
-        self.close_connection = self.close_connection or status != 200  # what was sent may not have been read
+        self.close_connection = self.close_connection or status != 200  # the body may be unread
         self._reply(status, json.dumps({"error": sentence}).encode(), "application/json")
 
     def _reply(self, status: int, body: bytes, kind: str) -> None:
@@ -124,7 +131,7 @@ class Handler(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing for each request."""
+        """Print nothing for a request."""
 
 
 def _parsed(body: bytes) -> Any:
@@ -145,5 +152,5 @@ def serve(port: int = 0) -> ThreadingHTTPServer:
 
 
 def address(server: ThreadingHTTPServer) -> str:
-    """Where the page is."""
+    """The address of the page."""
     return f"http://127.0.0.1:{server.server_address[1]}/"

@@ -30,7 +30,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.base.shown import record_table
 from symtop.base.validate import SymtopError, finite, positive
 
 LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
@@ -131,9 +130,6 @@ class SymmetricTop:
             raise SymtopError(
                 f"I3 must be at most 2 I1 (no rigid body exceeds it), not {self.I3!r} with I1 = {self.I1!r}"
             )
-
-    def _repr_html_(self) -> str:
-        return record_table(self, ("I1", "I3", "mgl"))
 
     @classmethod
     def from_spheroid(

@@ -3,7 +3,6 @@
 import base64
 import datetime
 import json
-import math
 from pathlib import Path
 from typing import Any
 
@@ -22,54 +21,16 @@ INTRODUCTION = (
 )
 
 
-def _claim(value: bool | int | None) -> str:
-    if value is None:
-        return "unknown"
-    return str(value) if not isinstance(value, bool) else "yes" if value else "no"
-
-
 def integrator_table() -> tuple[list[str], list[list[str]]]:
     """Header and rows of the table of integrators, from the registry."""
-    header = [
-        "name",
-        "family",
-        "order",
-        "explicit",
-        "symplectic",
-        "symmetric",
-        "conserves",
-        "charts",
-        "knob",
-        "tier",
-        "summary",
-    ]
-    rows = [
-        [
-            entry.name,
-            entry.family,
-            _claim(entry.order),
-            _claim(entry.explicit),
-            _claim(entry.symplectic),
-            _claim(entry.symmetric),
-            "unknown" if entry.conserves is None else ", ".join(sorted(entry.conserves)) or "nothing",
-            ", ".join(entry.charts()),
-            entry.knob or "none",
-            entry.tier,
-            entry.summary,
-        ]
-        for entry in integrators().values()
-    ]
-    return header, rows
+    records = [entry.record() for entry in integrators().values()]
+    return list(records[0]), [list(record.values()) for record in records]
 
 
 def scene_table() -> tuple[list[str], list[list[str]]]:
     """Header and rows of the table of scenes."""
-    rows = []
-    for entry in scenes().values():
-        period = entry.nutation_period
-        shown = f"{period:.6g}" if math.isfinite(period) else "infinite"
-        rows.append([entry.name, f"{entry.horizon:g}", shown, entry.observes, entry.purpose])
-    return ["name", "horizon (s)", "nutation period (s)", "observes", "purpose"], rows
+    records = [entry.record() for entry in scenes().values()]
+    return list(records[0]), [list(record.values()) for record in records]
 
 
 def _embedded(path: Path) -> str:

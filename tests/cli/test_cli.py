@@ -45,10 +45,10 @@ def test_tables_are_complete_and_json_is_json():
     [
         (["run", "sferoid", "midpoint", "--step-size", "0.1"], "did you mean spheroid"),
         (["run", "spheroid", "midpont", "--step-size", "0.1"], "did you mean midpoint"),
-        (["run", "spheroid", "midpoint"], "needs step_size"),
-        (["run", "spheroid", "midpoint", "--step-size", "0"], "step_size must be above zero"),
-        (["run", "spheroid", "midpoint", "--step-size", "nan"], "step_size must be a finite number"),
-        (["run", "spheroid", "midpoint", "--step-size", "-1"], "step_size must be above zero"),
+        (["run", "spheroid", "midpoint"], "needs --step-size"),
+        (["run", "spheroid", "midpoint", "--step-size", "0"], "--step-size must be above zero"),
+        (["run", "spheroid", "midpoint", "--step-size", "nan"], "--step-size must be a finite number"),
+        (["run", "spheroid", "midpoint", "--step-size", "-1"], "--step-size must be above zero"),
         (["run", "spheroid", "midpoint", "--step-size", "1e-300"], "the limit is"),
         (["study", "convergence", "--status", "--limit", "-5"], "limit must be"),
         (["run", "spheroid", "midpoint", "--step-size", "99"], "at most the horizon"),
@@ -104,10 +104,10 @@ def test_a_run_is_drawn_and_printed_as_json(tmp_path):
     command = ["run", "spheroid", "midpoint", "--step-size", "0.01", "--figure", str(picture), "--json"]
     result = CliRunner().invoke(main, command)
     assert result.exit_code == 0
-    found = json.loads(result.output)
-    assert found["steps"] == 800
-    assert 1e-3 < found["errors"]["axis"]["largest"] < 2e-2
-    assert found["errors"]["p_psi"]["largest"] < 1e-14
+    run = json.loads(result.output)
+    assert run["steps"] == 800
+    assert 1e-3 < run["errors"]["axis"]["largest"] < 2e-2
+    assert run["errors"]["p_psi"]["largest"] < 1e-14
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

@@ -1,4 +1,4 @@
-"""``symtop doctor``: sound here, and each ailment that can be had is found, named and treated."""
+"""``symtop doctor``: no fault here, and each fault that can be made is found, named and given advice."""
 
 import importlib.metadata
 import json
@@ -12,14 +12,14 @@ from symtop.cli.main import main
 from symtop.measure import published
 
 
-def ill(findings):
+def faults(findings):
     return {finding.topic: finding for finding in findings if not finding.healthy}
 
 
 def test_all_is_well_here_and_it_says_what_it_saw(tmp_path):
     done = CliRunner().invoke(main, ["doctor", "--results", str(tmp_path), "--json"])
     assert done.exit_code == 0, done.output
-    topics = {entry["topic"]: entry["found"] for entry in json.loads(done.output)}
+    topics = {entry["topic"]: entry["result"] for entry in json.loads(done.output)}
     assert {"python", "numba", "cache", "kernels cache", "reference cache", "studies", "published values"} <= set(
         topics
     )
@@ -38,34 +38,58 @@ def test_a_package_that_is_missing_or_too_old(monkeypatch):
         return "0.1" if name == "numba" else real(name)
 
     monkeypatch.setattr(importlib.metadata, "version", version)
-    found = ill(doctor._packages())
-    assert set(found) == {"tqdm", "numba"}
-    assert found["tqdm"].advice.startswith("pip install 'tqdm")
-    assert "or newer" in found["numba"].advice
+    findings = faults(doctor._packages())
+    assert set(findings) == {"tqdm", "numba"}
+    assert findings["tqdm"].advice.startswith("pip install 'tqdm>=")
+    assert "needs >=0." in findings["numba"].advice
+
+
+@pytest.mark.parametrize(
+    ("requirement", "result", "healthy"),
+    [
+        ("numpy[some-extra]>=2.0", "2.4.6", True),
+        ("numpy[some-extra]>=3.0", "2.4.6", False),
+        ("numpy~=2.0", "2.4.6", True),
+        ("numpy~=1.26", "2.4.6", False),
+        ("numpy<2", "2.4.6", False),
+        ("numpy>=2,!=2.4.6", "2.4.6", False),
+        ("no-such-package", "absent", False),
+        ("no-such-package; extra == 'peers'", "absent, an extra", True),
+        ("numpy<2; extra == 'peers'", "2.4.6", False),
+        ("no-such-package; sys_platform == 'amiga'", None, True),
+        ("no-such-package; extra == 'peers' and sys_platform == 'amiga'", None, True),
+        ("no-such-package; python_version >= '3.8'", "absent", False),
+    ],
+)
+def test_every_form_of_a_requirement_is_read(monkeypatch, requirement, result, healthy):
+    real = importlib.metadata.version
+    monkeypatch.setattr(importlib.metadata, "requires", lambda _: [requirement])
+    monkeypatch.setattr(importlib.metadata, "version", lambda name: "2.4.6" if name == "numpy" else real(name))
+    findings = doctor._packages()
+    assert [(finding.result, finding.healthy) for finding in findings] == ([(result, healthy)] if result else [])
 
 
 def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "file" / "cache"))
-    found = ill(doctor._caches())
-    assert "SYMTOP_CACHE" in found["cache"].advice
-    assert set(ill(doctor._results(Path("/proc/none")))) == {"results"}
+    assert "SYMTOP_CACHE" in faults(doctor._caches())["cache"].advice
+    assert set(faults(doctor._results(Path("/proc/none")))) == {"results"}
 
 
 def test_a_disk_without_room(tmp_path, monkeypatch):
-    monkeypatch.setattr(doctor, "LITTLE", 1e30)
-    assert "make room" in ill(doctor._results(tmp_path))["results"].advice
+    monkeypatch.setattr(doctor, "LEAST_SPACE", 1e30)
+    assert "make room" in faults(doctor._results(tmp_path))["results"].advice
 
 
 def test_a_wrong_number_is_seen(monkeypatch):
     wrong = published.Published("somebody", "something", 1.0, 1.1, 1e-3, "printed")
     monkeypatch.setattr(published, "published_values", lambda: [wrong])
-    found = ill(doctor._self_check())
-    assert "not somebody, something" in found["published values"].found
-    assert set(found) == {"published values"}
+    findings = faults(doctor._self_check())
+    assert "not somebody, something" in findings["published values"].result
+    assert set(findings) == {"published values"}
 
 
-def test_a_look_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path):
+def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path):
     def trouble():
         raise OSError("the tools are gone")
 

@@ -6,6 +6,8 @@ import json
 import os
 import re
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -31,9 +33,11 @@ from tests.browser import Browser
 def fields(name="spheroid", integrator="midpoint", **changes):
     """What the page sends for a scene of the catalogue."""
     entry = symtop.scene(name)
-    found = {name: getattr(entry.top, name) for name in answers.TOP}
-    found |= {name: getattr(entry.start, name) for name in answers.START}
-    return found | {"horizon": entry.horizon, "integrator": integrator, "step_size": 0.02, "tolerance": 1e-6} | changes
+    numbers = {name: getattr(entry.top, name) for name in answers.TOP}
+    numbers |= {name: getattr(entry.start, name) for name in answers.START}
+    return (
+        numbers | {"horizon": entry.horizon, "integrator": integrator, "step_size": 0.02, "tolerance": 1e-6} | changes
+    )
 
 
 def unpacked(text):
@@ -42,38 +46,38 @@ def unpacked(text):
 
 @pytest.mark.parametrize("method", ["midpoint", "gauss-4", "rk45", "exact"])
 def test_an_answer_is_the_run_beside_the_truth(method):
-    asked = answers.question(fields(integrator=method))
-    found, run = answers.answer(asked), answers.dataset(asked, str)
-    arrays = {name: unpacked(text) for name, text in found["arrays"].items()}
+    chosen = answers.setup(fields(integrator=method))
+    answer, run = answers.answer(chosen), answers.dataset(chosen, str)
+    arrays = {name: unpacked(text) for name, text in answer["arrays"].items()}
     assert np.array_equal(arrays["time"], run["time"].values.astype(np.float32))
     assert np.array_equal(arrays["theta"], run["theta"].values.astype(np.float32))
-    truth = closed_form(asked.scene).quaternion(run["time"].values)
+    truth = closed_form(chosen.scene).quaternion(run["time"].values)
     assert np.array_equal(arrays["truth"].reshape(-1, 4), truth.astype(np.float32))
     error = charts.axis_distance(run["axis"].values, charts.axis_from_quaternion(truth))
-    assert found["largest"]["axis_error"] == error.max()
+    assert answer["largest"]["axis_error"] == error.max()
     assert np.array_equal(arrays["axis_error"], error.astype(np.float32))
     # the drawn attitude has the axis of the run
     drawn = charts.axis_from_quaternion(arrays["attitude"].reshape(-1, 4).astype(float))
     assert np.max(charts.axis_distance(drawn, run["axis"].values)) < 1e-6
     energy = run["energy"].values
     assert np.max(np.abs(arrays["energy"])) == pytest.approx(
-        np.max(np.abs(energy - energy[0])) / (energy[0] + asked.scene.top.mgl), rel=1e-5
+        np.max(np.abs(energy - energy[0])) / (energy[0] + chosen.scene.top.mgl), rel=1e-5
     )
-    assert found["outcome"] == "ok"
+    assert answer["outcome"] == "ok"
 
 
 def test_a_failing_run_is_an_answer_with_its_sentence():
-    found = answers.answer(answers.question(fields(step_size=0.6)))
-    assert found["outcome"] == "left_chart"
-    assert "theta left (0, pi)" in found["message"]
-    assert np.isnan(unpacked(found["arrays"]["theta"])[-1])
-    json.loads(json.dumps(found, allow_nan=False))
+    answer = answers.answer(answers.setup(fields(step_size=0.6)))
+    assert answer["outcome"] == "left_chart"
+    assert "theta left (0, pi)" in answer["message"]
+    assert np.isnan(unpacked(answer["arrays"]["theta"])[-1])
+    json.loads(json.dumps(answer, allow_nan=False))
 
 
 def test_the_guard_is_heard():
-    (said,) = answers.answer(answers.question(fields(step_size=0.05)))["warnings"]
-    assert "expect an axis error" in said
-    assert answers.answer(answers.question(fields(step_size=1e-4)))["warnings"] == []
+    (warning,) = answers.answer(answers.setup(fields(step_size=0.05)))["warnings"]
+    assert "expect an axis error" in warning
+    assert answers.answer(answers.setup(fields(step_size=1e-4)))["warnings"] == []
 
 
 @pytest.mark.parametrize(
@@ -87,39 +91,39 @@ def test_the_guard_is_heard():
 )  # fmt: skip
 def test_bad_questions_are_refused_in_one_sentence(changes, word):
     with pytest.raises(SymtopError, match=word):
-        answers.question(fields(**changes))
+        answers.setup(fields(**changes))
 
 
 def test_a_question_that_lacks_something_says_what():
     whole = fields()
     del whole["theta"]
     with pytest.raises(SymtopError, match="lacks theta"):
-        answers.question(whole)
+        answers.setup(whole)
     with pytest.raises(SymtopError, match="mapping"):
-        answers.question(["spheroid"])
+        answers.setup(["spheroid"])
 
 
 @pytest.mark.parametrize("method", ["trapezoidal", "rk45", "exact"])
 def test_the_script_makes_the_same_dataset_to_the_bit(method, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    asked = answers.question(fields("goldstein", method, theta=0.7123456789))
+    chosen = answers.setup(fields("goldstein", method, theta=0.7123456789))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SymtopWarning)  # the guard's, which the page has shown
-        exec(compile(answers.script(asked), "explored.py", "exec"), {})
-    assert datasets.read(tmp_path / "explored.nc").equals(answers.dataset(asked, str))
+        exec(compile(answers.script(chosen), "explored.py", "exec"), {})
+    assert datasets.read(tmp_path / "explored.nc").equals(answers.dataset(chosen, str))
     assert "reached t = 70" in capsys.readouterr().out
 
 
 def test_a_hundred_thousand_steps_take_less_than_a_tenth_of_a_second():
     """Processor time of this thread, so that other processes do not count; each change is a new motion."""
-    answers.answer(answers.question(fields(horizon=60.0, step_size=6e-4)))
+    answers.answer(answers.setup(fields(horizon=60.0, step_size=6e-4)))
     spent = []
     for k in range(12):
-        asked = answers.question(fields(horizon=60.0, step_size=6e-4, theta=0.41 + 0.01 * k))
+        chosen = answers.setup(fields(horizon=60.0, step_size=6e-4, theta=0.41 + 0.01 * k))
         before = time.thread_time()
-        found = answers.answer(asked)
+        answer = answers.answer(chosen)
         spent.append(time.thread_time() - before)
-        assert found["steps"] == 100_000
+        assert answer["steps"] == 100_000
         if spent[-1] < 0.1:
             return
     pytest.fail(f"the fastest of twelve answers took {min(spent):.3f} s")
@@ -138,8 +142,8 @@ def request(site, method, path, body=None, **headers):
     connection = http.client.HTTPConnection("127.0.0.1", site.server_address[1], timeout=60)
     try:
         connection.request(method, path, body, {name.replace("_", "-"): value for name, value in headers.items()})
-        found = connection.getresponse()
-        return found.status, found.read(), dict(found.getheaders())
+        response = connection.getresponse()
+        return response.status, response.read(), dict(response.getheaders())
     finally:
         connection.close()
 
@@ -162,22 +166,38 @@ def test_the_server_answers_this_machine_and_nothing_else(site):
     assert (status, "I3 must be" in json.loads(body)["error"]) == (400, True)
 
 
+def test_a_browser_that_leaves_during_a_run_leaves_no_traceback(site, capfd):
+    body = json.dumps(fields(horizon=100.0, step_size=1e-4)).encode()
+    head = f"POST /run HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {len(body)}"
+    for sent in (body, body[:10]):  # in the middle of the run, and in the middle of the question
+        before, serving = set(threading.enumerate()), set()
+        with socket.create_connection(site.server_address) as browser:
+            browser.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # close with a reset
+            browser.sendall(f"{head}\r\n\r\n".encode() + sent)
+            while not serving:
+                serving = {thread for thread in threading.enumerate() if thread.is_alive()} - before
+        for thread in serving:
+            thread.join(60)
+    assert request(site, "GET", "/")[0] == 200
+    assert capfd.readouterr().err == ""
+
+
 def test_exports_over_http(site, tmp_path):
-    asked = fields(integrator="strang")
-    status, body, _ = request(site, "POST", "/netcdf", json.dumps(asked), **JSON)
+    chosen = fields(integrator="strang")
+    status, body, _ = request(site, "POST", "/netcdf", json.dumps(chosen), **JSON)
     assert status == 200
     (tmp_path / "run.nc").write_bytes(body)
-    assert datasets.read(tmp_path / "run.nc").equals(answers.dataset(answers.question(asked), str))
-    status, body, _ = request(site, "POST", "/script", json.dumps(asked), **JSON)
-    assert body.decode() == answers.script(answers.question(asked))
+    assert datasets.read(tmp_path / "run.nc").equals(answers.dataset(answers.setup(chosen), str))
+    status, body, _ = request(site, "POST", "/script", json.dumps(chosen), **JSON)
+    assert body.decode() == answers.script(answers.setup(chosen))
 
 
 def test_an_adaptive_run_that_takes_too_long_ends_and_says_so():
-    asked = answers.question(fields(integrator="rk45-compiled", tolerance=1e-12, horizon=1e5))
+    chosen = answers.setup(fields(integrator="rk45-compiled", tolerance=1e-12, horizon=1e5))
     began = time.monotonic()
-    assert "limit on the work" in answers.answer(asked)["message"]
+    assert "limit on the work" in answers.answer(chosen)["message"]
     assert time.monotonic() - began < 10.0
-    assert f"budget={asked.budget!r}" in answers.script(asked)
+    assert f"budget={chosen.budget!r}" in answers.script(chosen)
 
 
 def test_nothing_on_the_page_comes_from_elsewhere():

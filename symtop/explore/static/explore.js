@@ -1,4 +1,4 @@
-// Controls, questions to the server, and the clock of the animation.
+// Controls, requests to the server, and the animation.
 
 import { Sphere, plot } from "./draw.js";
 
@@ -9,7 +9,7 @@ const START = [
   ["theta", "theta", 0.01, 3.13, false], ["phi", "phi", -3.1416, 3.1416, false], ["psi", "psi", -3.1416, 3.1416, false],
   ["theta_dot", "theta'", -5, 5, false], ["phi_dot", "phi'", -15, 15, false], ["psi_dot", "psi'", -160, 160, false],
 ];
-const KNOBS = [["step_size", "step (s)", 1e-5, 1, true], ["tolerance", "tolerance", 1e-13, 1e-2, true], ["horizon", "time (s)", 0.5, 500, true]];
+const SETTINGS = [["step_size", "step (s)", 1e-5, 1, true], ["tolerance", "tolerance", 1e-13, 1e-2, true], ["horizon", "time (s)", 0.5, 500, true]];
 const PLOTS = ["axis_error", "energy", "p_phi", "p_psi"];
 
 const values = {};
@@ -17,7 +17,7 @@ const rows = {};
 const sphere = new Sphere($("sphere"));
 let catalogue, run = null, place = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, asking = false, stale = false, drawnAt = -1;
 
-function control([name, label, least, most, logarithmic], where) {
+function control([name, label, least, most, logarithmic], group) {
   const row = document.createElement("div");
   row.className = "slider";
   const [words, slider, number] = ["label", "input", "input"].map((tag) => document.createElement(tag));
@@ -32,7 +32,7 @@ function control([name, label, least, most, logarithmic], where) {
   const back = (v) => (logarithmic ? 10 ** v : v);
   Object.assign(slider, { min: forth(least), max: forth(most), step: "any" });
   row.append(words, slider, number);
-  $(where).append(row);
+  $(group).append(row);
   const show = (value) => { number.value = +value.toPrecision(6); slider.value = forth(value); };
   slider.addEventListener("input", () => { values[name] = +back(+slider.value).toPrecision(6); number.value = values[name]; ask(); });
   number.addEventListener("change", () => { values[name] = number.value === "" ? null : +number.value; slider.value = forth(values[name]); ask(); });
@@ -44,7 +44,7 @@ function chosen() {
 }
 
 function chooseScene(name) {
-  const entry = catalogue.scenes.find((known) => known.name === name);
+  const entry = catalogue.scenes.find((scene) => scene.name === name);
   $("purpose").textContent = entry.purpose;
   for (const [key] of [...TOP, ...START]) rows[key].set(entry[key]);
   rows.horizon.set(entry.horizon);
@@ -67,19 +67,19 @@ async function post(path) {
   return fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(values) });
 }
 
-// One question at a time; while it is answered only the newest wish is kept.
+// One request at a time; changes made meanwhile lead to one more, with the newest values.
 async function ask() {
   if (asking) { stale = true; return; }
   asking = true;
   const began = performance.now();
   const patience = setTimeout(() => {
-    $("status").textContent = `${values.integrator}: computing; the first run of a method compiles it`;
+    $("status").textContent = `${values.integrator}: computing; the first run of a method takes longer, because it is compiled`;
   }, 400);
   try {
     const response = await post("run");
-    const found = await response.json();
+    const answer = await response.json();
     clearTimeout(patience);
-    if (found.error) refuse(found.error); else show(found, began);
+    if (answer.error) refuse(answer.error); else show(answer, began);
   } catch {
     clearTimeout(patience);
     refuse("the explorer's server does not answer; is symtop explore still running?");
@@ -101,12 +101,12 @@ function refuse(sentence) {
   document.body.dataset.answer = "refused";
 }
 
-function show(found, began) {
+function show(answer, began) {
   const before = run && run.time.length > 1 ? place / (run.time.length - 1) : 0;
-  run = Object.fromEntries(Object.entries(found.arrays).map(([name, text]) => [name, unpack(text)]));
+  run = Object.fromEntries(Object.entries(answer.arrays).map(([name, text]) => [name, unpack(text)]));
   run.color = chosen().color;
   const last = run.time.length - 1;
-  run.trail = found.period ? Math.ceil((8 * found.period * last) / run.time[last]) : last;
+  run.trail = answer.period ? Math.ceil((8 * answer.period * last) / run.time[last]) : last;
   run.trueTheta = Array.from({ length: last + 1 }, (_, k) => {
     const [w, x, y, z] = run.truth.subarray(4 * k, 4 * k + 4);
     return (2 * Math.atan2(Math.hypot(x, y), Math.hypot(w, z)) * 180) / Math.PI;
@@ -114,13 +114,13 @@ function show(found, began) {
   run.degrees = run.theta.map((value) => (value * 180) / Math.PI);
   place = before * last;
   for (const name of PLOTS) {
-    const largest = found.largest[name];
+    const largest = answer.largest[name];
     $(`largest-${name}`).textContent = largest === null ? "" : largest === 0 ? "always zero" : `largest ${largest.toExponential(1)}`;
   }
-  const a = found.period && found.steps ? `, ${Math.round((found.steps * found.period) / run.time[last])} a nutation` : "";
-  $("status").textContent = `${values.integrator}: ${found.message}; ${found.steps} steps${a}, ${found.force_evaluations} force evaluations, ${found.run_ms.toFixed(0)} ms`;
-  $("status").className = found.outcome === "ok" ? "" : "failed";
-  $("warnings").replaceChildren(...found.warnings.map((sentence) => {
+  const a = answer.period && answer.steps ? `, ${Math.round((answer.steps * answer.period) / run.time[last])} a nutation` : "";
+  $("status").textContent = `${values.integrator}: ${answer.message}; ${answer.steps} steps${a}, ${answer.force_evaluations} force evaluations, ${answer.run_ms.toFixed(0)} ms`;
+  $("status").className = answer.outcome === "ok" ? "" : "failed";
+  $("warnings").replaceChildren(...answer.warnings.map((sentence) => {
     const item = document.createElement("li");
     item.textContent = sentence;
     return item;
@@ -128,8 +128,8 @@ function show(found, began) {
   $("netcdf").disabled = $("script").disabled = false;
   drawPlots();
   Object.assign(document.body.dataset, {
-    answer: found.outcome, answers: +(document.body.dataset.answers || 0) + 1, steps: found.steps,
-    server: found.all_ms.toFixed(1), elapsed: (performance.now() - began).toFixed(1),
+    answer: answer.outcome, answers: +(document.body.dataset.answers || 0) + 1, steps: answer.steps,
+    server: answer.all_ms.toFixed(1), elapsed: (performance.now() - began).toFixed(1),
   });
 }
 
@@ -172,7 +172,7 @@ async function begin() {
   catalogue = await (await fetch("catalogue")).json();
   for (const entry of TOP) control(entry, "top");
   for (const entry of START) control(entry, "start");
-  for (const entry of KNOBS) control(entry, "knobs");
+  for (const entry of SETTINGS) control(entry, "settings");
   for (const { name } of catalogue.scenes) $("scene").append(new Option(name, name));
   for (const family of new Set(catalogue.integrators.map((entry) => entry.family))) {
     const group = document.createElement("optgroup");

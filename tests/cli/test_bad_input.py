@@ -237,6 +237,8 @@ def commands(draw):
             ["report", "--results", draw(st.sampled_from(["/no-such", "/dev/null", "/proc"]))],
             ["scenes", f"--plugin={plugin}"],
             ["integrators", f"--plugin={plugin}"],
+            ["scenes", name],
+            ["integrators", name],
             ["doctor", f"--{name or 'x'}"],
             [name or "x"],
         ])

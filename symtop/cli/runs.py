@@ -1,0 +1,182 @@
+"""``symtop run``, ``long`` and ``claims``: one integrator on one scene, compared with the truth."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from symtop.base.validate import SymtopError
+from symtop.cli.common import completing, json_option, load_plugins, plugin_option, warn
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
+
+    from symtop.measure.verdicts import Judgement
+
+
+@click.command(short_help="Run one integrator on one scene; show its errors.")
+@click.argument("scene", shell_complete=completing("scenes"))
+@click.argument("integrator", shell_complete=completing("integrators"))
+@click.option("--step-size", type=float, help="Step of a fixed-step method.")
+@click.option("--tolerance", type=float, help="Tolerance of an adaptive method.")
+@click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
+@click.option("--samples", type=int, default=501, show_default=True, help="Number of samples in the output.")
+@click.option("--observe", help="nutation, axis or attitude; what the scene names by default.")
+@click.option("--budget", type=float, help="Most steps, or force evaluations of an adaptive method.")
+@click.option("--guard/--no-guard", default=True, help="Warn before the run if a large error is expected.")
+@click.option("--output", type=click.Path(), help="Write the run to this netCDF file.")
+@click.option("--figure", type=click.Path(), help="Draw the run and its errors into this PNG file.")
+@plugin_option
+@json_option
+def run(
+    scene: str, integrator: str, step_size: float | None, tolerance: float | None, horizon: float | None, samples: int,
+    observe: str | None, budget: float | None, guard: bool, output: str | None, figure: str | None,
+    plugin_files: tuple[str, ...], as_json: bool,
+) -> None:  # fmt: skip
+    """Run one INTEGRATOR on one SCENE and compare it with the exact motion.
+
+    \b
+    symtop run spheroid midpoint --step-size 0.01
+    symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
+    """
+    from symtop.base import datasets
+    from symtop.measure.errors import QUANTITIES, errors_against
+    from symtop.measure.verdicts import judgement
+    from symtop.model import scenes
+    from symtop.run.reference import reference
+    from symtop.run.simulation import simulate
+
+    load_plugins(plugin_files)
+    if figure is not None and Path(figure).suffix != ".png":
+        raise SymtopError(f"figure must be a file that ends in .png, not {figure!r}")
+    data = simulate(
+        scene, integrator, step_size=step_size, tolerance=tolerance, horizon=horizon, samples=samples, observe=observe,
+        guard=warn if guard else False, budget=budget,
+    )  # fmt: skip
+    if output is not None:
+        datasets.write(data, output)
+    chosen = scenes.scene(scene)
+    truth = reference(chosen, data["time"].values, precision="closed-form")
+    error = errors_against(chosen, data, truth)
+    verdict = judgement(chosen, data, error["axis"].values)
+    if figure is not None:
+        from symtop.report import single
+
+        single.draw(chosen, data, truth, error, figure)
+    series = {name: error[name].dropna("time").values for name in QUANTITIES if name in error}
+    series = {name: values for name, values in series.items() if values.size}
+    click.echo(_run_json(data, verdict, series) if as_json else _run_text(data, verdict, series))
+    for file in () if as_json else (output, figure):
+        if file is not None:
+            click.echo(f"written to {file}")
+    if data.attrs["outcome"] != "ok":
+        sys.exit(3)
+
+
+def _run_json(data: "xr.Dataset", verdict: "Judgement", series: "dict[str, np.ndarray]") -> str:
+    names = ("outcome", "outcome_message", "reached_time", "steps", "force_evaluations")
+    largest = {name: {"largest": float(values.max()), "last": float(values[-1])} for name, values in series.items()}
+    run = {name: data.attrs[name] for name in names}
+    return json.dumps({**run, "judgement": verdict._asdict(), "errors": largest}, indent=1)
+
+
+def _run_text(data: "xr.Dataset", verdict: "Judgement", series: "dict[str, np.ndarray]") -> str:
+    from symtop.measure.errors import QUANTITIES
+
+    lines = [
+        f"{data.attrs['title']}: {data.attrs['outcome_message']}",
+        f"{data.attrs['steps']} steps, {data.attrs['force_evaluations']} force evaluations",
+    ]
+    if data.attrs["outcome"] == "ok":
+        lines.append(f"judged against the truth: {verdict.verdict}, {verdict.sentence}")
+    for name, values in series.items():
+        lines.append(f"  {QUANTITIES[name]:<30} largest {float(values.max()):.3e}   last {float(values[-1]):.3e}")
+    return "\n".join(lines)
+
+
+@click.command(short_help="Run up to billions of steps in little memory.")
+@click.argument("scene", shell_complete=completing("scenes"))
+@click.argument("integrator", shell_complete=completing("integrators"))
+@click.option("--steps", type=float, default=1e9, show_default=True, help="Number of steps.")
+@click.option("--step-size", type=float, help="Step; a thousandth of a nutation period by default.")
+@click.option(
+    "--checkpoint", type=click.Path(dir_okay=False), help="File to resume from; in symtop's cache by default."
+)
+@click.option("--output", type=click.Path(), help="Write the windows to this netCDF file.")
+@plugin_option
+def long(
+    scene: str, integrator: str, steps: float, step_size: float | None, checkpoint: str | None, output: str | None,
+    plugin_files: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Run one INTEGRATOR on one SCENE for very many steps, in little memory.
+
+    The run is cut into windows, and the output holds the least, largest and mean change of the energy and the momenta
+    in each. A checkpoint is written as it goes: the same command resumes a run that was interrupted.
+
+    \b
+    symtop long spheroid stormer-verlet --steps 1e9 --output long.nc
+    """
+    from symtop.base import datasets
+    from symtop.base.validate import whole
+    from symtop.model import scenes
+    from symtop.run.long_run import PER_NUTATION, long_run
+
+    load_plugins(plugin_files)
+    h = scenes.scene(scene).nutation_period / PER_NUTATION if step_size is None else step_size
+    count = whole("steps", steps, 1)
+    try:
+        data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True)
+    except KeyboardInterrupt:
+        warn("interrupted; the steps that were run are kept, and the same command resumes after them")
+        sys.exit(130)
+    click.echo(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
+    if data.sizes["window"]:
+        for name in ("energy", "modified_energy", "p_phi", "p_psi"):
+            low, high = float(data[f"{name}_least"].min()), float(data[f"{name}_largest"].max())
+            end = float(data[f"{name}_mean"][-1])
+            click.echo(f"  {name:<16} change from {low:+.3e} to {high:+.3e}   mean of the last window {end:+.3e}")
+    if output is not None:
+        datasets.write(data, output)
+        click.echo(f"written to {output}")
+    if data.attrs["outcome"] != "ok":
+        sys.exit(3)
+
+
+@click.command(short_help="Measure what integrators claim about themselves.")
+@click.argument("names", nargs=-1, metavar="[INTEGRATOR]...", shell_complete=completing("integrators"))
+@click.option("--scene", default="spheroid", show_default=True, help="The scene to judge on.")
+@click.option("--quick", is_flag=True, help="Shorter runs, one chart.")
+@plugin_option
+@json_option
+def claims(names: tuple[str, ...], scene: str, quick: bool, plugin_files: tuple[str, ...], as_json: bool) -> None:
+    """Measure every claim of each INTEGRATOR: order, symplecticity, symmetry, conserved quantities, cost.
+
+    The exit code is 1 if a claim is refuted. Without a name: the integrators of the plug-in, or all.
+
+    \b
+    symtop claims midpoint rk4
+    symtop claims --plugin my_methods.py
+    """
+    from symtop.judge.claims import judge
+    from symtop.methods import registry
+    from symtop.model import scenes
+
+    before = set(registry.integrators())
+    load_plugins(plugin_files)
+    added = [name for name in registry.integrators() if name not in before]
+    chosen = scenes.scene(scene)
+    refuted, entries = False, []
+    for name in names or added or registry.integrators():
+        ledger = judge(registry.integrator(name), chosen, quick=quick)
+        refuted |= any(finding.verdict == "refuted" for finding in ledger.findings)
+        if as_json:
+            entries += [{"integrator": name, "scene": chosen.name, **finding.plain()} for finding in ledger.findings]
+        else:
+            click.echo("\n".join(ledger.sentences()))
+    if as_json:
+        click.echo(json.dumps(entries, indent=1))
+    if refuted:
+        sys.exit(1)

@@ -1,0 +1,92 @@
+"""``symtop recommend``, ``doctor`` and ``explore``."""
+
+import json
+import sys
+from pathlib import Path
+
+import click
+
+from symtop.cli.common import completing, json_option, load_plugins, plugin_option, results_option
+
+
+@click.command(short_help="Find the cheapest integrator for an accuracy.")
+@click.argument("scene", shell_complete=completing("scenes"))
+@click.option("--accuracy", type=float, required=True, help="The largest error you accept, for example 1e-6.")
+@click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
+@click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
+@click.option(
+    "--results",
+    type=click.Path(file_okay=False),
+    help="Folder with a stored work-precision study; results, if it holds one, by default.",
+)
+@plugin_option
+@json_option
+def recommend(
+    scene: str, accuracy: float, quantity: str, horizon: float | None, results: str | None,
+    plugin_files: tuple[str, ...], as_json: bool,
+) -> None:  # fmt: skip
+    """Find the cheapest integrator and step that meet an accuracy on a SCENE.
+
+    The exit code is 1 if none does.
+
+    \b
+    symtop recommend spheroid --accuracy 1e-6
+    symtop recommend goldstein --accuracy 1e-3 --quantity attitude --horizon 1e4
+    symtop recommend mine --plugin my_scene.py --accuracy 1e-9
+    """
+    import dataclasses
+
+    from symtop import advise
+
+    load_plugins(plugin_files)
+    if results is None and (Path("results") / advise.STORED_STUDY).is_file():
+        results = "results"
+    advice = advise.recommend(scene, accuracy=accuracy, quantity=quantity, horizon=horizon, results=results)
+    click.echo(json.dumps(dataclasses.asdict(advice), indent=1) if as_json else str(advice))
+    if advice.integrator is None:
+        sys.exit(1)
+
+
+@click.command(short_help="Check the installation; say what to do about faults.")
+@results_option
+@json_option
+def doctor(results: str, as_json: bool) -> None:
+    """Check packages, caches, folders and a few computed numbers, and say what to do about each fault.
+
+    The exit code is 1 if there is a fault. It takes some seconds.
+    """
+    from symtop.cli import doctor as checks
+
+    findings = checks.examine(Path(results))
+    if as_json:
+        click.echo(json.dumps([finding._asdict() for finding in findings], indent=1))
+    else:
+        click.echo(checks.page(findings))
+    if not all(finding.healthy for finding in findings):
+        sys.exit(1)
+
+
+@click.command(short_help="Open the explorer: one run in a browser, with sliders.")
+@click.option("--port", type=int, default=0, help="Port to listen on; a free one by default.")
+@click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
+@plugin_option
+def explore(port: int, no_browser: bool, plugin_files: tuple[str, ...]) -> None:
+    """Show one run beside the exact motion in a browser, with sliders for the top, the start and the step."""
+    import signal
+    import webbrowser
+
+    from symtop.explore.server import address, serve
+
+    def end(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, end)
+    load_plugins(plugin_files)
+    with serve(port) as server:
+        click.echo(f"symtop explore: {address(server)} (Ctrl-C ends it)")
+        if not no_browser:
+            webbrowser.open(address(server))
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            click.echo("")

@@ -1,0 +1,88 @@
+"""``symtop integrators`` and ``symtop scenes``: lists that fit the terminal, and one entry in full."""
+
+import json
+import math
+
+import pytest
+from click.testing import CliRunner
+
+import symtop
+from symtop.cli.common import table
+from symtop.cli.main import main
+
+
+def printed(*words, columns=80):
+    done = CliRunner().invoke(main, list(words), env={"COLUMNS": str(columns)})
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.mark.parametrize(("command", "entries"), [("integrators", symtop.integrators), ("scenes", symtop.scenes)])
+def test_a_list_fits_the_terminal_and_names_every_entry(command, entries):
+    for columns in (80, 120):
+        lines = printed(command, columns=columns).splitlines()
+        assert max(map(len, lines)) <= columns
+        assert {line.split(" ")[0] for line in lines} >= set(entries())
+    assert max(map(len, printed(command, "--wide").splitlines())) > 80
+
+
+def test_a_list_breaks_its_last_column_and_loses_no_word():
+    words = " ".join(printed("integrators").split())
+    assert "discrete Lagrangian, trapezoidal rule" in words
+    assert table(["a", "b"], [["1", "one two three four five six"]], 24).splitlines() == [
+        "a  b",
+        "-  ---------------------",
+        "1  one two three four",
+        "   five six",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "order", "flags"),
+    [("midpoint", "2", "ist"), ("strang", "2", "est"), ("rk4", "4", "e--"), ("taylor", "?", "e--")],
+)
+def test_the_flags_are_the_claims(name, order, flags):
+    (line,) = [line for line in printed("integrators").splitlines() if line.startswith(f"{name} ")]
+    assert line.split()[1:3] == [order, flags]
+
+
+def test_one_integrator_is_shown_in_full():
+    page = printed("integrators", "midpoint")
+    assert page.startswith("midpoint: discrete Lagrangian, midpoint rule\n")
+    assert "conserves   p_phi, p_psi\n" in page
+    assert "charts      angles\n" in page
+    assert "source      marsden-west-2001\n" in page
+    assert "@article{marsden-west-2001," in page
+    (record,) = json.loads(printed("integrators", "rk45", "--json"))
+    assert float(record["least tolerance"]) > 1e-15
+    assert record["source"] == symtop.integrator("rk45").reference
+
+
+def test_one_scene_is_shown_in_full():
+    page = printed("scenes", "spheroid")
+    spheroid = symtop.scene("spheroid")
+    assert page.startswith(f"spheroid: {spheroid.purpose}\n")
+    assert "I1=2, I3=1, mgl=26.86579145" in page
+    assert "theta_dot=0.1" in page
+    (record,) = json.loads(printed("scenes", "spheroid", "--json"))
+    assert record["top"]["mgl"] == spheroid.top.mgl
+    assert math.degrees(record["theta"][1]) == pytest.approx(99.44, abs=0.01)
+
+
+@pytest.mark.parametrize("name", list(symtop.scenes()))
+def test_every_scene_can_be_shown(name):
+    assert max(map(len, printed("scenes", name).splitlines())) <= 80
+
+
+def test_an_unknown_name_is_refused_with_the_nearest():
+    for words in (["integrators", "midpont"], ["scenes", "sferoid"]):
+        done = CliRunner().invoke(main, words)
+        assert done.exit_code == 2
+        assert "did you mean" in done.output
+
+
+def test_the_help_describes_every_command_in_one_whole_line():
+    done = CliRunner().invoke(main, ["--help"], env={"COLUMNS": "80"})
+    lines = done.output.partition("Commands:\n")[2].splitlines()
+    assert [line.split()[0] for line in lines] == sorted(main.commands)
+    assert all(line.endswith(".") and not line.endswith("..") for line in lines)

@@ -1,0 +1,293 @@
+"""The rooms of the package: which may import which, read from every import statement and from every string.
+
+`ORDER` is the rule. A module imports modules of its own row's room and of the rows below; two rooms in one row do not
+import each other. Statements inside functions count as well as those at the top, and so do those under TYPE_CHECKING,
+except in circles: what only a type checker reads cannot go round in one. ``from symtop import __version__`` is allowed
+everywhere. Strings count because an arrow may hide in one: see `strings`.
+"""
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+ORDER = (  # from the ground up
+    ("base",),
+    ("model",),
+    ("methods",),
+    ("run",),
+    ("measure",),
+    ("judge", "runner"),
+    ("report",),
+    ("advise",),  # a module in the root, as it is part of the public face
+    ("explore",),
+    ("cli",),
+    ("face",),  # symtop/__init__.py: imports every public name, and no other file imports it
+    ("studies",),
+)
+FLOOR = {room: floor for floor, row in enumerate(ORDER) for room in row}
+LONGEST = 350  # lines of a file
+STRANGERS = {"methods": {"xarray", "matplotlib"}}  # packages that a room does not import
+NAMED = {  # strings that name a module above on purpose
+    "symtop": "the lazy table of the public names",
+    "symtop.runner.scripts": "loads studies by the name of their package",
+}
+
+
+class Arrow(NamedTuple):
+    """One imported module."""
+
+    target: str
+    names: tuple[str, ...]
+    line: int
+    kind: str  # top, lazy (inside a function) or type (under TYPE_CHECKING)
+
+
+@dataclass(frozen=True)
+class Module:
+    """One file: its dotted name, its room, its tree and what it imports."""
+
+    name: str
+    path: Path
+    tree: ast.Module
+    arrows: tuple[Arrow, ...]
+
+    @property
+    def room(self) -> str:
+        package, *rest = self.name.split(".")
+        return "studies" if package == "symtop_studies" else rest[0] if rest else "face"
+
+
+def read(root: Path) -> dict[str, Module]:
+    """Every module below `root`/symtop and `root`/studies, by its dotted name."""
+    files: dict[str, Path] = {}
+    for folder, package in (("symtop", "symtop"), ("studies", "symtop_studies")):
+        for path in sorted((root / folder).rglob("*.py")):
+            parts = path.relative_to(root / folder).with_suffix("").parts
+            files[".".join([package, *(parts[:-1] if parts[-1] == "__init__" else parts)])] = path
+    modules = {}
+    for name, path in files.items():
+        tree = ast.parse(path.read_bytes())
+        package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+        modules[name] = Module(name, path, tree, tuple(_arrows(tree, package, "top", set(files))))
+    return modules
+
+
+def _arrows(node: ast.AST, package: str, kind: str, known: set[str]) -> Iterator[Arrow]:
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Import):
+            yield from (Arrow(alias.name, (), child.lineno, kind) for alias in child.names)
+        elif isinstance(child, ast.ImportFrom):
+            above = package.split(".")[: package.count(".") + 2 - child.level] if child.level else []
+            source = ".".join([*above, *([child.module] if child.module else [])])
+            for alias in child.names:
+                inner = f"{source}.{alias.name}"
+                yield Arrow(inner if inner in known else source, (alias.name,), child.lineno, kind)
+        elif isinstance(child, ast.If) and ast.unparse(child.test).rpartition(".")[2] == "TYPE_CHECKING":
+            for part in child.body:
+                yield from _arrows(ast.Module([part], []), package, "type", known)
+            for part in child.orelse:
+                yield from _arrows(ast.Module([part], []), package, kind, known)
+        else:
+            inside = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) and kind == "top"
+            yield from _arrows(child, package, "lazy" if inside else kind, known)
+
+
+def upward(modules: dict[str, Module]) -> list[str]:
+    """Imports of a room that is not the importer's own and not below it."""
+    complaints = []
+    for module in modules.values():
+        if module.room not in FLOOR:
+            complaints.append(f"{module.name} lies in no room of ORDER")
+            continue
+        for arrow in module.arrows:
+            target = modules.get(arrow.target)
+            if target is None or target.room == module.room or arrow.names == ("__version__",):
+                continue
+            if FLOOR.get(target.room, len(ORDER)) >= FLOOR[module.room]:
+                complaints.append(f"{module.name}:{arrow.line} imports {target.name} ({arrow.kind})")
+    return sorted(set(complaints))
+
+
+def circles(modules: dict[str, Module]) -> list[str]:
+    """Sets of files that import each other, directly or through others; TYPE_CHECKING imports aside."""
+    graph = {
+        name: {arrow.target for arrow in module.arrows if arrow.kind != "type" and arrow.names != ("__version__",)}
+        & modules.keys() - {name}
+        for name, module in modules.items()
+    }
+    reached: dict[str, set[str]] = {}
+    for name, targets in graph.items():
+        ahead, seen = set(targets), set[str]()
+        while ahead:
+            seen |= ahead
+            ahead = set().union(*(graph[step] for step in ahead)) - seen
+        reached[name] = seen
+    groups = {
+        tuple(sorted(other for other in reached[name] if name in reached[other]))
+        for name in graph
+        if name in reached[name]
+    }
+    return [" <-> ".join(group) for group in sorted(groups)]
+
+
+def strangers(modules: dict[str, Module]) -> list[str]:
+    """Imports of packages that a room does without."""
+    return [
+        f"{module.name}:{arrow.line} imports {arrow.target}"
+        for module in modules.values()
+        for arrow in module.arrows
+        if arrow.target.split(".")[0] in STRANGERS.get(module.room, ())
+    ]
+
+
+def strings(modules: dict[str, Module]) -> list[str]:
+    """Strings of the package, docstrings aside, that hide an arrow.
+
+    Those are the dotted name of a module above (with or without ``symtop.``), the bare name of a room above that is
+    compared, joined to a path or collected, and a path to a file or folder of another room.
+    """
+    complaints = []
+    for module in modules.values():
+        if module.room == "studies" or module.name in NAMED or module.room not in FLOOR:
+            continue
+        above = {name for name, other in modules.items() if FLOOR.get(other.room, 99) > FLOOR[module.room]} - {"symtop"}
+        above |= {name.removeprefix("symtop.") for name in above if name.count(".") > 1}
+        paths = {
+            "/".join(other.name.split(".")[1:]) + ending
+            for other in modules.values()
+            if other.room not in (module.room, "face") and other.name.count(".") > 1
+            for ending in ("", ".py")
+        }
+        for text, line in _literals(module.tree):
+            plain = text.strip("/.").removeprefix("symtop/")
+            if text.strip(".") in above or plain in paths:
+                complaints.append(f"{module.name}:{line} names {text!r}")
+        rooms = {room for room, floor in FLOOR.items() if floor > FLOOR[module.room]}
+        complaints += [f"{module.name}:{line} names the room {text!r}" for text, line in _places(module.tree, rooms)]
+    return sorted(set(complaints))
+
+
+def _literals(tree: ast.Module) -> Iterator[tuple[str, int]]:
+    """Strings and their lines, without docstrings."""
+    prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
+            yield node.value, node.lineno
+
+
+def _places(tree: ast.Module, rooms: set[str]) -> Iterator[tuple[str, int]]:
+    """Names of rooms used as folders: joined with ``/``, compared with a part of a path, or listed with others."""
+    every = set(FLOOR)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Tuple | ast.List | ast.Set) and len(node.elts) > 1:
+            texts = [part.value for part in node.elts if isinstance(part, ast.Constant)]
+            if every.issuperset(texts) and rooms.intersection(texts) and len(texts) == len(node.elts):
+                yield ", ".join(map(str, texts)), node.lineno
+        joined = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div)
+        text = ast.unparse(node) if isinstance(node, ast.Compare) else ""
+        if joined or ".name" in text or ".parts" in text or ".parent" in text:
+            for part in ast.walk(node):
+                if isinstance(part, ast.Constant) and part.value in rooms:
+                    yield str(part.value), part.lineno
+
+
+def too_long(modules: dict[str, Module]) -> list[str]:
+    """Files above the longest length, with their lines."""
+    counts = {name: len(module.path.read_text(encoding="utf-8").splitlines()) for name, module in modules.items()}
+    return [f"{name} has {count} lines" for name, count in counts.items() if count > LONGEST]
+
+
+def in_the_root(modules: dict[str, Module]) -> list[str]:
+    """Modules that lie in the root of symtop and not in a room."""
+    files = [module.path for name, module in modules.items() if name.split(".")[0] == "symtop"]
+    top = min(files, key=lambda path: len(path.parts)).parent
+    return [path.stem for path in sorted(files) if path.parent == top]
+
+
+HOUSE = read(ROOT)
+
+
+@pytest.mark.parametrize("rule", [upward, circles, strangers, strings, too_long])
+def test_the_package_holds_the_rule(rule):
+    assert rule(HOUSE) == []
+
+
+def test_two_modules_lie_in_the_root():
+    assert in_the_root(HOUSE) == ["__init__", "advise"]
+
+
+def test_every_file_is_read():
+    assert HOUSE.keys() >= {"symtop", "symtop.advise", "symtop.model.top", "symtop_studies.convergence.study"}
+    assert {module.room for module in HOUSE.values()} == set(FLOOR)
+    kinds = {(arrow.kind, arrow.target) for arrow in HOUSE["symtop"].arrows}
+    assert ("type", "symtop.run.simulation") in kinds
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A made-up package with one fault against each rule, and statements that are allowed beside them."""
+    files = {
+        "symtop/__init__.py": '"""symtop.report.page"""\nimport typing\nif typing.TYPE_CHECKING:\n'
+        "    from symtop.model.good import value\n",
+        "symtop/extra.py": "",
+        "symtop/base/__init__.py": "",
+        "symtop/base/plain.py": "from symtop import __version__\n",
+        "symtop/base/up.py": "from symtop.model import good\n",
+        "symtop/base/lazy.py": "def look():\n    import symtop.model.good\n",
+        "symtop/base/typed.py": "from typing import TYPE_CHECKING\n"
+        "if TYPE_CHECKING:\n    from ..model.good import value\n",
+        "symtop/model/__init__.py": "",
+        "symtop/model/good.py": "from symtop.base.plain import __version__\nvalue = 1\n",
+        "symtop/model/left.py": "from symtop.model import right\n",
+        "symtop/model/right.py": "def turn():\n    from . import left\n",
+        "symtop/model/hint.py": "import typing\nif typing.TYPE_CHECKING:\n    from symtop.model.hinted import x\n",
+        "symtop/model/hinted.py": "import symtop.model.hint\n",
+        "symtop/methods/kernel.py": "def show():\n    import matplotlib.pyplot\n",
+        "symtop/run/hidden.py": '"""report.page"""\nHOME = "report.page"\nFILE = "report/page.py"\n',
+        "symtop/run/folder.py": "def old(path):\n    return path.parent.name == 'measure'\n",
+        "symtop/run/listed.py": "UPPER = ('runner', 'report')\n",
+        "symtop/run/word.py": "TEXT = 'measure'\nWORDS = ('run', 'measure', 'energy')\n",
+        "symtop/judge/__init__.py": "",
+        "symtop/runner/beside.py": "import symtop.judge\n",
+        "symtop/report/page.py": "from symtop_studies.drift import study\n" + "#\n" * 350,
+        "studies/drift/study.py": "import symtop\nfrom symtop.report import page\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return read(tmp_path)
+
+
+def test_imports_that_run_upward_are_reported(small):
+    assert upward(small) == [
+        "symtop.base.lazy:2 imports symtop.model.good (lazy)",
+        "symtop.base.typed:3 imports symtop.model.good (type)",
+        "symtop.base.up:1 imports symtop.model.good (top)",
+        "symtop.extra lies in no room of ORDER",
+        "symtop.report.page:1 imports symtop_studies.drift.study (top)",
+        "symtop.runner.beside:1 imports symtop.judge (top)",
+    ]
+
+
+def test_a_circle_of_files_is_reported(small):
+    assert circles(small) == [
+        "symtop.model.left <-> symtop.model.right",
+        "symtop.report.page <-> symtop_studies.drift.study",
+    ]
+
+
+def test_other_faults_are_reported(small):
+    assert strangers(small) == ["symtop.methods.kernel:2 imports matplotlib.pyplot"]
+    assert strings(small) == [
+        "symtop.run.folder:2 names the room 'measure'",
+        "symtop.run.hidden:2 names 'report.page'",
+        "symtop.run.hidden:3 names 'report/page.py'",
+        "symtop.run.listed:1 names the room 'runner, report'",
+    ]
+    assert too_long(small) == ["symtop.report.page has 351 lines"]
+    assert in_the_root(small) == ["__init__", "extra"]
