@@ -22,10 +22,10 @@ import xarray as xr
 
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import energy_scale
-from symtop.measure.modified_energy import modified_energy
 from symtop.methods.registry import integrators
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
+from symtop.run.modified_energy import modified_energy
 from symtop.run.simulation import simulate
 
 from .derivations import easy_way, energies, hard_way, nutation_cubic, rate_of_alpha, six_variables, with_alpha

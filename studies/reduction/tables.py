@@ -8,7 +8,6 @@ what reducing saves. And reducing before discretising against discretising befor
 Times are of the bare solver, from start to horizon with two samples, and interleaved (see `symtop.measure.timing`).
 """
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -25,7 +24,7 @@ from symtop.measure.timing import bare_run, timings
 from symtop.methods import unreduced
 from symtop.methods.discrete_lagrangian import is_midpoint, rule_of
 from symtop.methods.fixed_step import inside
-from symtop.methods.registry import Integrator, integrator, integrators
+from symtop.methods.registry import SMALLEST_FIRST, Integrator, integrator, integrators
 from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate
@@ -34,7 +33,6 @@ from .commutation import commutation_gap, hamiltonian_gap
 
 TIMED_STEPS = 20_000  # of a timed run: a call costs as much as a hundred of them
 COMPARED_STEPS = 10_000  # of a reduced kernel and its unreduced form
-SMALLEST_FIRST = ("axis", "angles", "attitude")
 SHARED = ("axis", "theta", "energy")  # quantities that every chart shows
 COMMUTES = 1e-13  # rad: two paths of a few thousand steps with compensated sums are that close if they are one method
 # rad, over 10 000 steps without compensation: n^1.5 ulp of theta' h, and phi' is steep near a pole
@@ -67,11 +65,6 @@ def several_charts() -> list[Integrator]:
     return [method for method in integrators().values() if len(method.solvers) > 1]
 
 
-def in_chart(method: Integrator, chart: str) -> Integrator:
-    """The same integrator with one chart only."""
-    return dataclasses.replace(method, solvers={chart: method.solvers[chart]})
-
-
 def chart_table(
     scene: Scene, method: Integrator, settings: Sequence[float], horizon: float, batches: int = 5
 ) -> xr.Dataset:
@@ -92,7 +85,7 @@ def chart_table(
     for (row, column, _), timing in zip(runs, timings([run for *_, run in runs], batches), strict=True):
         columns[Column.SECONDS][row, column], columns[Column.SPREAD][row, column] = timing.best, timing.spread
     for chart in method.solvers:
-        table = error_table(scene, in_chart(method, chart), settings, horizon, observe="axis")
+        table = error_table(scene, method.only(chart), settings, horizon, observe="axis")
         for name in judged:
             columns[name][CHARTS.index(chart)] = table[name].values
     variables = {name: (("chart", "setting"), values) for name, values in columns.items()}
@@ -116,7 +109,7 @@ def _judged(table: xr.Dataset) -> NDArray[np.bool_]:
 
 def charts_by_size(cell: xr.Dataset) -> list[str]:
     """The charts that one integrator was timed in, the smallest first."""
-    return [chart for chart in SMALLEST_FIRST if np.isfinite(cell[Column.SECONDS].sel(chart=chart)).any()]
+    return [chart for chart in SMALLEST_FIRST["axis"] if np.isfinite(cell[Column.SECONDS].sel(chart=chart)).any()]
 
 
 def chart_ratios(cell: xr.Dataset) -> list[Ratio]:

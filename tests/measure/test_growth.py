@@ -93,7 +93,7 @@ def test_a_horizon_is_foretold_from_a_tenth_of_it(bend):
     assert horizon(t[short], -error[short], tolerance).time == pytest.approx(true, rel=0.02)
 
 
-def test_what_is_not_lost_has_no_horizon():
+def test_a_phase_that_is_not_lost_has_no_horizon():
     error = 1e-6 * np.sin(5.3 * TIME)
     assert np.isnan(lost_at(TIME, error, 1e-2))
     assert horizon(TIME, error, 1e-2).time > 1e3 * TIME[-1]

@@ -75,7 +75,7 @@ def points():
     return np.column_stack([draw.uniform(0.3, 2.8, 200), draw.uniform(-3, 3, (200, 5))])
 
 
-def test_the_lagrangian_three_ways(symbols, points):
+def test_the_lagrangian_is_the_same_in_three_forms(symbols, points):
     lagrangians = symbols.values(symbols.ways, points)
     assert np.ptp(lagrangians, axis=0).max() < 1e-13
     assert np.std(lagrangians[0]) > 1.0
@@ -84,7 +84,7 @@ def test_the_lagrangian_three_ways(symbols, points):
             assert np.abs(symbols.values([symbols.hy.diff(way, coordinate)], points)).max() < 1e-13
 
 
-def test_the_euler_lagrange_equations_of_the_kernels(symbols, points):
+def test_the_kernels_accelerations_solve_the_symbolic_euler_lagrange_equations(symbols, points):
     """d/dt dL/dv - dL/dq = 0 by differentiation, solved for the accelerations, against the kernels' formula."""
     hy, L = symbols.hy, symbols.ways[1]
     mass = [[hy.diff(hy.diff(L, a), b) for b in symbols.v] for a in symbols.v]
@@ -99,7 +99,7 @@ def test_the_euler_lagrange_equations_of_the_kernels(symbols, points):
         assert accelerations(*NUMBERS, point[0], *point[3:]) == pytest.approx(expected, rel=1e-11, abs=1e-11)
 
 
-def test_both_conjugate_momenta_of_the_kernels(symbols, points):
+def test_the_kernels_momenta_are_the_derivatives_of_the_symbolic_lagrangian(symbols, points):
     top = symtop.SymmetricTop(*NUMBERS)
     slopes = symbols.values([symbols.hy.diff(symbols.ways[0], v) for v in symbols.v[1:]], points)
     for k, point in enumerate(points):
@@ -130,7 +130,7 @@ def test_a_step_of_the_kernels_is_the_discrete_legendre_transform(symbols, metho
     assert -ends[1:3] == pytest.approx(ends[4:], abs=1e-11)  # Noether, one step
 
 
-def test_the_spheroid_and_back():
+def test_the_spheroids_radii_give_its_inertia_and_the_inertia_its_radii():
     top, radii = notebook_top()
     assert radii == pytest.approx((2.73861, 1.58114), abs=5e-6)
     assert pytest.approx((2.0, 1.0), rel=1e-15) == (top.I1, top.I3)
@@ -207,7 +207,7 @@ def test_the_modified_energy_is_kept_to_fourth_order(method):
     assert power_law(table[Column.MODIFIED_STEP], table[Column.MODIFIED_CHANGE]).slope == pytest.approx(4.0, abs=0.06)
 
 
-def test_the_modified_energy_of_another_method_does_not_serve():
+def test_the_modified_energy_of_another_method_is_not_conserved():
     scene = symtop.scene("spheroid")
     run = symtop.simulate(scene, "midpoint", step_size=0.01, guard=False)
     states, h = np.stack([run["theta"].values, run["p_theta"].values], axis=1), run.attrs["step_size"]
@@ -217,7 +217,7 @@ def test_the_modified_energy_of_another_method_does_not_serve():
     assert its_own < 0.02 * np.ptp(run["energy"].values) < other
 
 
-def test_every_discrete_method_keeps_the_momenta_and_is_shown():
+def test_discrete_methods_keep_the_momenta_and_27_or_more_are_in_the_study():
     assert len(discrete_methods()) >= 27
     for name, method in itertools.product(("spheroid", "goldstein"), ("trapezoidal", "cayley", "galerkin-simpson")):
         run = residual_history(symtop.scene(name), method, 0.02, samples=101)

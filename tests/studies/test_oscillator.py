@@ -56,7 +56,7 @@ def test_the_exact_motion_is_the_matrix_exponential(damping):
 
 @pytest.mark.parametrize("method", ["midpoint", "trapezoidal"])
 @pytest.mark.parametrize("damping", DAMPINGS)
-def test_order_two_in_every_regime(damping, method):
+def test_both_rules_have_order_two_in_every_regime(damping, method):
     table = convergence(damping, method, STEPS, 25.0)
     assert power_law(table[Column.STEP], table[Column.POSITION_ERROR]).slope == pytest.approx(2.0, abs=0.02)
 
@@ -121,7 +121,7 @@ def test_one_wrong_coefficient_of_the_update_would_be_seen():
     assert np.max(np.abs(bad - path.position)) > 1e-8
 
 
-def test_energy_without_and_with_damping():
+def test_the_midpoint_rule_conserves_the_undamped_energy_the_trapezoidal_bounds_it_and_rk45_drifts():
     free = Oscillator()
     path = discrete_path(free, "midpoint", 1.0, 0.0, 1e4, 100_000)
     assert np.max(np.abs(relative_energy_error(free, path, 1.0, 0.0))) < 1e-11  # a quadratic invariant is kept
@@ -177,7 +177,7 @@ def test_without_friction_it_is_the_unreduced_kernel():
 
 
 @pytest.mark.parametrize("method", ["midpoint", "trapezoidal"])
-def test_the_damped_top_has_order_two_and_its_truth_a_second_witness(method):
+def test_the_damped_top_has_order_two_and_both_integrations_of_its_truth_agree(method):
     table = damped_top_table(symtop.scene("goldstein"), FRICTION, method, [500, 1000, 2000, 4000], 20.0)
     assert power_law(table[Column.TOP_STEP], table[Column.THETA_ERROR]).slope == pytest.approx(2.0, abs=0.02)
     assert float(table[Column.TOP_BOUND]) < 1e-10
