@@ -2,7 +2,8 @@
 
     symtop study convergence --plugin studies/examples/my_methods.py
 
-The first four are tables of numbers. The last is a kernel of its own: symplectic Euler on the reduced top, order 1.
+Three integrators are tables of numbers: a quadrature rule, the coefficients of a splitting, a Butcher tableau. The last
+one is a kernel of its own: symplectic Euler on the reduced top, order 1.
 """
 
 import numpy as np

@@ -68,7 +68,7 @@ def test_the_brackets_of_every_chart_are_those_of_its_variables(chart, where):
 
 
 @pytest.mark.parametrize("chart", CHARTS)
-def test_a_millionth_part_of_a_momentum_is_seen(chart):
+def test_a_momentum_that_grows_by_a_millionth_a_step_is_seen_as_not_symplectic(chart):
     def swell(state):
         state[-3 if chart != "angles" else 1] *= 1.0 + 1e-6
         return state
@@ -112,7 +112,7 @@ WAVE = 1e-5 * np.sin(37.1 * TIME)  # not commensurate with the samples
         (np.where(TIME > 4.0, 1e-15 * 500.0 * TIME, 0.0), "drift"),  # 1e-15 a step, 2 ms each
     ],
 )
-def test_kinds_of_growth(residual, kind):
+def test_residuals_are_classified_by_how_they_grow(residual, kind):
     assert long._judged(TIME, residual, residual[:100], 1_000_000).kind == kind
 
 
@@ -136,20 +136,20 @@ def test_a_law_is_named_only_if_the_interval_excludes_its_neighbours(size, slope
     assert behaviour(size, slope, interval, rounding=1e-11) == kind
 
 
-def test_no_exponent_is_no_evidence_that_a_constant_is_bounded():
+def test_a_run_too_short_for_an_exponent_is_not_called_bounded():
     short = np.where(TIME < 4.0, WAVE + 1e-6, np.nan)  # ends before the last two decades begin
     found = long._judged(TIME, short, short[:2], 2000)
     assert math.isnan(found.exponent)
     assert (found.kind, found.grows) == ("unknown", None)
 
 
-def test_a_wave_with_noise_is_never_a_drift():
+def test_an_oscillation_with_noise_is_never_called_a_drift():
     draw = np.random.default_rng(5)
     kinds = [long._judged(TIME, WAVE + 1e-6 * draw.standard_normal(TIME.size), WAVE, 1).kind for _ in range(200)]
     assert set(kinds) == {"bounded"}
 
 
-def test_the_worst_chart_decides():
+def test_a_claim_about_several_charts_is_judged_in_the_worst_of_them():
     """rk4 keeps p_phi on the axis, where it is linear in the state, and loses it to truncation in the angles."""
     rk4 = symtop.integrator("rk4")
     runs = {chart: long.long_run(rk4, SPHEROID, chart, quick=True) for chart in rk4.charts()}
@@ -169,14 +169,14 @@ def test_the_cayley_energy_is_kept_by_nobody_else():
 
 
 @pytest.mark.parametrize("name", ["midpoint", "strang", "gauss-4", "rk4"])
-def test_honest_methods_go_to_the_true_motion(name):
+def test_honest_methods_converge_to_the_true_motion(name):
     method = symtop.integrator(name)
     found = limit(method, SPHEROID, method.order)
     assert found.miss < 1e-12
     assert found.doubt < 1e-12
 
 
-def test_a_clock_that_is_wrong_by_a_billionth_does_not():
+def test_a_method_whose_step_is_wrong_by_a_billionth_does_not_converge_to_the_true_motion():
     good = symtop.integrator("strang")
 
     def slow(top, start, plan):
@@ -237,7 +237,7 @@ def test_what_nobody_claimed_is_measured():
     assert abs(ledger["order"].value - 2.0) < 0.05
 
 
-def test_modesty_is_refuted_too():
+def test_a_claim_that_denies_a_property_the_method_has_is_refuted():
     modest = dataclasses.replace(symtop.integrator("stormer-verlet"), symmetric=False, symplectic=False)
     ledger = judge(modest, SPHEROID, quick=True)
     assert (ledger["symmetric"].verdict, ledger["symplectic"].verdict) == ("refuted", "refuted")
@@ -292,7 +292,7 @@ FOLLOWS = {
 OWN_KERNEL = {"one_newton", "coefficient_off", "verlet_swapped", "leaking_momentum"}  # seconds to compile
 
 
-def test_every_liar_is_here():
+def test_every_file_of_false_claims_is_tested():
     assert {path.stem for path in LIARS.glob("*.py")} == set(CAUGHT)
 
 
@@ -355,7 +355,7 @@ def test_no_registered_integrator_is_refuted_and_few_claims_stay_open():
 # ---- command and study -----------------------------------------------------------------------------------------------
 
 
-def test_the_command_says_a_sentence_a_claim():
+def test_the_command_prints_one_sentence_for_each_claim():
     code, output = run_claims("stormer-verlet", "--quick")
     assert code == 0
     lines = output.strip().splitlines()

@@ -42,7 +42,7 @@ def test_energy_error_is_bounded_without_a_trend(million, name):
     assert 1e-6 < np.max(np.abs(change)) < 1e-3  # of second order in the step: bounded, not small
 
 
-def test_rk45_loses_energy_linearly_and_lets_its_momenta_drift():
+def test_the_energy_of_rk45_falls_linearly_and_its_momenta_drift():
     where = symtop.scene("spheroid")
     run = symtop.simulate(where, "rk45", tolerance=1e-6, horizon=200.0, samples=1001, guard=False)
     lost = float(run["energy"][0] - run["energy"][-1])

@@ -33,7 +33,7 @@ def test_a_law_is_not_named_where_the_interval_holds_two():
     assert law(fit._replace(slope=0.8, interval=0.4)) == "undecided"
 
 
-def test_a_loss_that_heals_counts_from_its_first_crossing():
+def test_the_horizon_of_a_phase_is_its_first_crossing_even_if_the_error_falls_again():
     t = np.linspace(0.0, 100.0, 5001)
     bump = 1e-3 * t + np.exp(-(((t - 30.0) / 3.0) ** 2))
     assert 25.0 < lost_at(t, bump, 0.5) < 30.0
@@ -48,7 +48,7 @@ def test_an_ensemble_tells_a_walk_from_a_drift():
     assert drift.fit.slope - drift.fit.interval > 0.65
 
 
-def test_steps_between_means_make_a_walk_a_walk_from_the_first_window_on():
+def test_the_variance_of_means_of_a_random_walk_grows_with_the_steps_between_them():
     ends = np.array([100, 130, 200, 400, 1000])
     walks = np.cumsum(np.random.default_rng(4).standard_normal((20_000, 1000)), axis=1)
     means = np.stack([part.mean(axis=1) for part in np.split(walks, ends[:-1], axis=1)])
@@ -83,7 +83,7 @@ def test_a_change_of_law_is_found_where_it_is_and_not_where_it_is_not():
 
 
 @pytest.mark.parametrize("bend", [0.0, 3e-9])
-def test_a_horizon_is_foretold_from_a_tenth_of_it(bend):
+def test_a_horizon_is_predicted_from_a_tenth_of_it(bend):
     t = np.linspace(0.0, 10_000.0, 20_001)
     error = 2e-6 + 1e-6 * t + bend * t * t + 1e-6 * np.sin(5.3 * t)
     short = t < 1000.0

@@ -83,7 +83,7 @@ def test_false_alarms_of_the_trend_are_as_rare_as_it_says():
     assert trend(t, rng.normal(size=t.size) + 0.005 * t).significant
 
 
-def test_errors_are_scaled_by_what_they_say():
+def test_errors_of_momenta_and_energy_are_relative_to_their_documented_scales():
     where = symtop.scene("goldstein")
     run = symtop.simulate(where, "exact", samples=5)
     truth = reference(where, run["time"].values, "closed-form")
@@ -114,7 +114,7 @@ def test_samples_at_fractions_of_a_period_are_dithered(fraction):
     assert times[-1] == 100.0 * fraction
 
 
-def test_verdicts_tell_the_fates_apart():
+def test_each_kind_of_run_gets_its_own_verdict():
     where = symtop.scene("spheroid")
     good = symtop.simulate(where, "exact", samples=101)
     nothing = np.zeros(101)
@@ -127,7 +127,7 @@ def test_verdicts_tell_the_fates_apart():
     assert verdicts.verdict(where, good.assign_attrs(outcome="left_chart"), nothing) == "left_chart"
 
 
-def test_accurate_means_something_on_a_top_that_nutates_by_a_hair():
+def test_accurate_is_measured_against_the_width_of_the_nutation():
     """`fast` nutates over 4e-4 rad: half a thousandth of a radian is not accurate there."""
     where = symtop.scene("fast")
     run = symtop.simulate(where, "exact", samples=101)
@@ -142,7 +142,7 @@ def test_a_table_stops_for_good_once_a_run_took_too_much_work():
     assert list(table["outcome"].values) == ["ok", "ok", "not_run", "not_run"]
 
 
-def test_ladders_end_where_they_are_told():
+def test_ladders_end_at_the_largest_number_of_steps_and_the_least_tolerance():
     where = symtop.scene("spheroid")
     for name in ("midpoint", "kahan-li-8", "gauss-12"):
         steps = ladder(symtop.integrator(name), where, 8.0, 6, most=1e4)

@@ -36,13 +36,13 @@ CLAIMS = {"two-point": 2, "mclachlan-2": 2, "ralston-3": 3, "symplectic-euler": 
 
 
 def test_its_methods_have_the_orders_they_claim(example):
-    where = symtop.scene("goldstein")
+    scene = symtop.scene("goldstein")
     for name, claim in CLAIMS.items():
         method = symtop.integrator(name)
         assert method.order == claim
-        steps = [where.nutation_period / (80.37 * 1.7**k) * (0.05 if claim == 1 else 1.0) for k in range(9)]
-        table = error_table(where, method, steps, 8.0, observe="axis")
-        fit = order(table["step_size"], table["axis"], table["axis_bound"], 2 * math.pi / where.nutation_period)
+        steps = [scene.nutation_period / (80.37 * 1.7**k) * (0.05 if claim == 1 else 1.0) for k in range(9)]
+        table = error_table(scene, method, steps, 8.0, observe="axis")
+        fit = order(table["step_size"], table["axis"], table["axis_bound"], 2 * math.pi / scene.nutation_period)
         assert fit.slope == pytest.approx(claim, abs=0.05), name
 
 
@@ -63,11 +63,11 @@ class Point:
 
     value = "stranger:methods"
 
-    def __init__(self, found):
-        self.found = found
+    def __init__(self, announced):
+        self.announced = announced
 
     def load(self):
-        return self.found
+        return self.announced
 
 
 def test_an_installed_package_announces_its_methods(clean_registry, monkeypatch):

@@ -26,7 +26,7 @@ from symtop.measure import conservation, published
         ((1e-12, 1e-13), (0.5, 0.5), 0.1, "random walk"),
     ],
 )
-def test_a_quantity_is_what_it_is_on_its_worst_scene(sizes, exponents, interval, word):
+def test_the_behaviour_of_a_quantity_is_that_on_its_worst_scene(sizes, exponents, interval, word):
     cell = xr.Dataset({
         "outcome": ("scene", ["ok", "ok"]),
         "energy_largest": ("scene", list(sizes)),
@@ -65,7 +65,7 @@ def test_a_walk_of_rounding_is_held_against_one_half(power, says):
     assert "100 times less" in sentence
 
 
-def test_a_mean_energy_that_moves_is_said_to():
+def test_the_shift_of_the_mean_energy_is_relative_to_its_band():
     means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("integrator", "window"))
     cells = xr.Dataset({"energy_mean": means, "modified_energy_mean": means * 1e-10,
                         "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
