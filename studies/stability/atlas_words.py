@@ -93,9 +93,9 @@ def _fails(data: xr.Dataset, one: OutcomeMap, name: str) -> str:
     fixed = one.control == "step_size"
     parts = []
     for k, (setting, outcome) in enumerate(first_failures(one)[:2]):
-        where = f"h = {setting:.2g}" if fixed else f"a tolerance of {setting:.2g}"
+        place = f"h = {setting:.2g}" if fixed else f"a tolerance of {setting:.2g}"
         unit = " nutation periods" if fixed and k == 0 else ""
-        parts.append(f"first {FAILURES[outcome]} at {where}{unit}")
+        parts.append(f"first {FAILURES[outcome]} at {place}{unit}")
     share = float(np.mean(one.outcome == BOUNDED_BUT_WRONG))
     if share > 0.05:
         parts.append(f"is wrong with bounded energy in {share:.0%} of its map")

@@ -181,7 +181,7 @@ def solver(data: xr.Dataset) -> list[str]:
 
 def mechanism_sentences(data: xr.Dataset) -> list[str]:
     """The sentences of all mechanisms."""
-    return [said for part in (poles, resonances, sleepers, horizons, sampling, solver) for said in part(data)]
+    return [sentence for part in (poles, resonances, sleepers, horizons, sampling, solver) for sentence in part(data)]
 
 
 LIMITS = (  # scene, variable, header, format

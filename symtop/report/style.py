@@ -115,8 +115,8 @@ def look(name: str) -> Look:
         return _LOOKS[name]
     from symtop.methods.registry import integrators
 
-    known = integrators()
-    shades = _SHADES[known[name].family if name in known else "other"]
+    registered = integrators()
+    shades = _SHADES[registered[name].family if name in registered else "other"]
     free = [Look(shade, marker) for marker in _MARKERS for shade in shades]
     free = [one for one in free if all((one.color, one.marker) != shipped[:2] for shipped in _LOOKS.values())]
     return free[zlib.crc32(name.encode()) % len(free)]

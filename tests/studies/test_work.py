@@ -50,14 +50,14 @@ def moved(name, periods=20.0, early=0.0, faster=0.0, turned=0.0, turning=0.0, li
 @pytest.mark.parametrize("name", ["spheroid", "cusp", "hairer-lubich-wanner", "bruls-cardona-arnold"])
 def test_a_motion_that_is_early_and_turned_has_the_right_shape(name):
     scene, run, truth = moved(name, early=0.013, turned=-0.2)
-    found = phase(scene, run, truth)
+    parts = phase(scene, run, truth)
     omega = 2.0 * math.pi / scene.nutation_period
     sine = np.sin(run["theta"].values)
-    assert found.shape < 1e-13
-    assert found.nutation_lag == pytest.approx(0.013 * omega, rel=1e-9)
-    assert found.precession_lag == pytest.approx(0.2 * sine.max(), rel=1e-9)
-    assert found.nutation_period < 1e-12
-    assert found.precession_rate < 1e-10
+    assert parts.shape < 1e-13
+    assert parts.nutation_lag == pytest.approx(0.013 * omega, rel=1e-9)
+    assert parts.precession_lag == pytest.approx(0.2 * sine.max(), rel=1e-9)
+    assert parts.nutation_period < 1e-12
+    assert parts.precession_rate < 1e-10
 
 
 def test_lags_may_be_longer_than_a_nutation_and_a_turn():
@@ -70,22 +70,22 @@ def test_lags_may_be_longer_than_a_nutation_and_a_turn():
 
 def test_wrong_frequencies_are_found_one_by_one():
     scene, run, truth = moved("spheroid", faster=1e-5)
-    found = phase(scene, run, truth)
-    assert found.nutation_period == pytest.approx(1e-5, rel=1e-4)
-    assert found.precession_rate == pytest.approx(1e-5, rel=1e-4)  # it turns faster by as much
+    parts = phase(scene, run, truth)
+    assert parts.nutation_period == pytest.approx(1e-5, rel=1e-4)
+    assert parts.precession_rate == pytest.approx(1e-5, rel=1e-4)  # it turns faster by as much
     scene, run, truth = moved("spheroid", turning=1e-5)
-    found, form = phase(scene, run, truth), closed_form(scene)
-    assert found.nutation_period < 1e-14
-    assert found.precession_rate == pytest.approx(1e-5 * form.nutation_period / form.phi_per_period, rel=1e-9)
+    parts, form = phase(scene, run, truth), closed_form(scene)
+    assert parts.nutation_period < 1e-14
+    assert parts.precession_rate == pytest.approx(1e-5 * form.nutation_period / form.phi_per_period, rel=1e-9)
 
 
 def test_a_motion_of_another_shape_is_not_called_late():
     scene, run, truth = moved("spheroid", lifted=1e-4)
-    found = phase(scene, run, truth)
-    assert 3e-5 < found.shape < 2e-4
+    parts = phase(scene, run, truth)
+    assert 3e-5 < parts.shape < 2e-4
     omega = 2.0 * math.pi / scene.nutation_period
-    assert found.nutation_lag < 1e-3
-    assert found.nutation_period < 3.0 * found.nutation_lag / (omega * float(run["time"][-1]))  # a bounded lag
+    assert parts.nutation_lag < 1e-3
+    assert parts.nutation_period < 3.0 * parts.nutation_lag / (omega * float(run["time"][-1]))  # a bounded lag
 
 
 def test_a_pole_that_is_passed_on_the_other_side_is_not_a_turn():
@@ -101,20 +101,20 @@ def test_a_pole_that_is_passed_on_the_other_side_is_not_a_turn():
 
 def test_a_steady_precession_has_no_nutation_to_be_late():
     scene, run, truth = moved("steady", turned=1e-6)
-    found = phase(scene, run, truth)
-    assert math.isnan(found.nutation_lag)
-    assert math.isnan(found.nutation_period)
-    assert found.shape < 1e-14
-    assert found.precession_lag == pytest.approx(1e-6 * math.sin(scene.start.theta), rel=1e-8)
+    parts = phase(scene, run, truth)
+    assert math.isnan(parts.nutation_lag)
+    assert math.isnan(parts.nutation_period)
+    assert parts.shape < 1e-14
+    assert parts.precession_lag == pytest.approx(1e-6 * math.sin(scene.start.theta), rel=1e-8)
 
 
 @pytest.mark.parametrize("name", ["spheroid", "fast"])
 def test_frequencies_of_the_exact_motion_are_wrong_by_no_more_than_their_bounds(name):
     scene = symtop.scene(name)
     run = symtop.simulate(scene, "exact", horizon=10.0 * scene.nutation_period, samples=331, observe="axis")
-    found = phase(scene, run, reference(scene, run["time"], precision="closed-form"))
-    assert found.nutation_period <= found.nutation_period_bound
-    assert found.precession_rate <= found.precession_rate_bound
+    parts = phase(scene, run, reference(scene, run["time"], precision="closed-form"))
+    assert parts.nutation_period <= parts.nutation_period_bound
+    assert parts.precession_rate <= parts.precession_rate_bound
     failed = phase(
         scene, run.assign_attrs(outcome="left_chart"), reference(scene, run["time"], precision="closed-form")
     )
@@ -238,9 +238,9 @@ def test_a_machine_that_turns_slow_before_the_rounds_slows_the_predictions_too(m
 
 
 def test_batches_of_a_round_are_neighbours_in_time():
-    said = []
-    timings([lambda name=name: said.append(name) for name in "abc"], batches=4, batch=0.0)
-    rounds = ["".join(sorted(said[-12 + 3 * k : -9 + 3 * k or None])) for k in range(4)]
+    called = []
+    timings([lambda name=name: called.append(name) for name in "abc"], batches=4, batch=0.0)
+    rounds = ["".join(sorted(called[-12 + 3 * k : -9 + 3 * k or None])) for k in range(4)]
     assert rounds == ["abc"] * 4
 
 
@@ -392,11 +392,11 @@ def test_a_crossing_of_two_power_laws_is_found_where_it_is():
         },
         coords={"integrator": ["a", "b"], "scene": "x"},
     )
-    found = ranking.crossing(data, "a", "b")
-    assert found.dearest_won == pytest.approx(100.0, rel=0.06)
-    assert (found.at_least, found.at_most) == (True, False)
-    assert found.share == pytest.approx(0.5, abs=0.01)
-    assert found.gain == pytest.approx(100.0)
+    crossing = ranking.crossing(data, "a", "b")
+    assert crossing.dearest_won == pytest.approx(100.0, rel=0.06)
+    assert (crossing.at_least, crossing.at_most) == (True, False)
+    assert crossing.share == pytest.approx(0.5, abs=0.01)
+    assert crossing.gain == pytest.approx(100.0)
     turned = ranking.crossing(data, "b", "a")
     assert (turned.at_least, turned.at_most) == (False, True)
     assert turned.dearest_won == pytest.approx(1e4)
@@ -423,10 +423,10 @@ def _both(case):
 
 
 def test_a_study_may_have_a_second_round_made_from_the_first(tmp_path, monkeypatch):
-    asked = []
+    sizes = []
 
     def again(data):
-        asked.append(dict(data.sizes))
+        sizes.append(dict(data.sizes))
         names = [str(name) for name in data["integrator"].values]
         return [Case("spheroid", "together", {"integrators": names}, timed=True)]
 
@@ -438,7 +438,7 @@ def test_a_study_may_have_a_second_round_made_from_the_first(tmp_path, monkeypat
     monkeypatch.setattr(runner, "load", lambda _: study)
     first = runner.run(study, tmp_path, quiet=True)
     assert first["computed"] == 3
-    assert asked == [{"scene": 1, "integrator": 2, "setting": 2}]
+    assert sizes == [{"scene": 1, "integrator": 2, "setting": 2}]
     data = xr.open_dataset(tmp_path / "stability.nc").load()
     assert data["later"].values.tolist() == [[0.0, 1.0]]
     assert data["found"].sel(integrator="strang").values.tolist() == [[6.0, 1.0]]
