@@ -1,1 +1,3 @@
 """The studies that ship with symtop: one folder a question."""
+
+ORDER = ("truth", "convergence", "work_precision", "drift", "stability", "reduction")  # of the report; others follow

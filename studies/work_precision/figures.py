@@ -1,223 +1,113 @@
-"""The drawings of the work-precision study: fronts, winners, profiles, and a few methods against cost."""
+"""The figures of the work-precision study with their captions."""
 
-import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections import Counter
 
-import numpy as np
 import xarray as xr
 
-from symtop.report.figures import pareto
-from symtop.report.style import BLACK, GREY, legend_below, look, panels, slope_guide
+from symtop.measure import ranking
+from symtop.measure.errors import QUANTITIES
+from symtop.measure.phase import PARTS
+from symtop.measure.work import TARGETS
+from symtop.runner.study import Picture
 
-SHORT = {
-    "stormer-verlet": "verlet", "takahashi-imada": "takahashi", "suzuki-umeno-8": "umeno-8",
-    "sofroniou-spaletta-10": "sofroniou-10", "taylor-longdouble": "taylor-long", "rk45-compiled": "rk45-comp",
-    "stormer-verlet-yoshida-4": "verlet-y4", "stormer-verlet-suzuki-4": "verlet-s4", "galerkin-simpson": "galerkin",
-    "midpoint-unreduced": "midpoint-u", "trapezoidal-unreduced": "trapezoidal-u",
-    "stormer-verlet-blanes-moan-6": "verlet-bm6",
-}  # fmt: skip
+from . import drawings, words
+from .tables import Column
 
-
-def fronts(
-    data: xr.Dataset, quantity: str, cost: str, labels: tuple[str, str], least: float = 1e-15
-) -> tuple[Any, list[str]]:
-    """Every run of every method, one panel a scene; the front of the compiled methods in bold, marked by who is on it.
-
-    `data` is one horizon. Dashed: the front of the methods whose inner loop is plain Python. Returns the figure and the
-    names on the compiled front.
-    """
-    scenes = [str(name) for name in data["scene"].values]
-    columns = min(3, len(scenes))
-    figure, axes = panels(-(-len(scenes) // columns), columns, width=11.5, height=3.2, sharex=True, sharey=True)
-    seen: dict[str, None] = {}
-    for axis, scene in zip(axes.flat, scenes, strict=False):
-        cell = data.sel(scene=scene)
-        bounds = cell[f"{quantity}_bound"].values
-        floor = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else least
-        axis.axhspan(least * 1e-3, floor, color="#BBBBBB", alpha=0.45, lw=0, label="the reference's own bound")
-        for name in cell["integrator"].values:
-            x, y = _curve(cell.sel(integrator=name), cost, quantity, 0.5 * floor)
-            python = "python" in cell["tier"].sel(integrator=name).values
-            axis.plot(x, y, color=look(str(name)).color, ls=(0, (3, 2)) if python else "-", lw=0.7, alpha=0.4, zorder=1)
-        for tier, line in (("compiled", "-"), ("python", (0, (4, 2)))):
-            names = _front(axis, cell, cost, quantity, tier, line, 0.5 * floor)
-            if tier == "compiled":
-                seen |= dict.fromkeys(names)
-        axis.set(xscale="log", yscale="log", title=scene)
-    for axis in axes.flat[len(scenes) :]:
-        axis.set_visible(False)
-    axes.flat[0].set_ylim(least, 3.0)
-    for axis in axes[-1]:
-        axis.set_xlabel(labels[0])
-    for axis in axes[:, 0]:
-        axis.set_ylabel(labels[1])
-    legend_below(figure, axes)
-    return figure, list(seen)
+DECADES = tuple(10.0**-k for k in range(2, 14))
+LEADERS = 9  # bold curves of the performance profiles
+ALWAYS_SHOWN = ("midpoint", "stormer-verlet", "rk4", "rk45-compiled", "rk45")
+PARTS_OF = ("midpoint", "stormer-verlet", "takahashi-imada", "rk4", "rk45-compiled", "gauss-8")
+WALL_TIME, EVALUATIONS = "wall time of one run (s)", "force evaluations of one run"
 
 
-def _curve(own: xr.Dataset, cost: str, quantity: str, floor: float) -> tuple[Any, Any]:
-    x, y = own[cost].values, own[quantity].values
-    good = np.isfinite(x) & np.isfinite(y)
-    order = np.argsort(x[good])
-    return x[good][order], np.maximum(y[good][order], floor)
+def pictures(data: xr.Dataset) -> list[Picture]:
+    """Fronts at both horizons, the fastest methods, profiles, energy at the long horizon, and parts of the error."""
+    return [
+        _front(data, "front-short", 0, Column.SECONDS, WALL_TIME),
+        _front(data, "front-long", -1, Column.SECONDS, WALL_TIME),
+        _front(data, "front-evaluations", 0, Column.EVALUATIONS, EVALUATIONS),
+        _winners(data),
+        _profiles(data),
+        _energy(data),
+        _parts(data),
+    ]
 
 
-def _front(axis: Any, cell: xr.Dataset, cost: str, quantity: str, tier: str, line: Any, floor: float) -> list[str]:
-    x, y = cell[cost].values, np.maximum(cell[quantity].values, floor)
-    x = np.where(cell["tier"].values == tier, x, np.nan)
-    on = pareto(x, y)
-    if not on.any():
-        return []
-    order = np.argsort(x[on])
-    steps = x[on][order], y[on][order]
-    label = f"front of the {tier} methods"
-    axis.step(*steps, where="post", color=BLACK, ls=line, lw=1.4, zorder=3, label=label)
-    owners = np.broadcast_to(cell["integrator"].values[:, None], x.shape)[on][order]
-    for name in dict.fromkeys(str(owner) for owner in owners):
-        pick = owners == name
-        style = look(name)
-        edge = {"mec": style.color, "mew": 1.6} if style.marker in "x+" else {"mec": "white", "mew": 0.4}
-        axis.plot(
-            steps[0][pick], steps[1][pick], style.marker, ls="none", color=style.color, ms=style.size + 2.0, zorder=4,
-            label=name, **edge,
-        )  # fmt: skip
-    return list(dict.fromkeys(str(owner) for owner in owners))
-
-
-def winner_strips(
-    wins: Mapping[tuple[str, int, float], Any], scenes: Sequence[str], horizons: Sequence[str], targets: Sequence[float]
-) -> Any:
-    """One row a scene, one column a decade of accuracy, one panel a horizon: the fastest method's colour and name.
-
-    `wins` maps (scene, index of the horizon, target) to a `ranking.Win` or None. Pale, with a tilde: level with others.
-    """
-    from matplotlib.colors import to_rgb
-
-    figure, axes = panels(len(horizons), 1, width=11.5, height=0.55 + 0.36 * len(scenes))
-    for far, (axis, horizon) in enumerate(zip(axes[:, 0], horizons, strict=True)):
-        for row, scene in enumerate(scenes):
-            for column, target in enumerate(targets):
-                won = wins[scene, far, target]
-                if won is None:
-                    axis.text(column, row, "nobody", ha="center", va="center", fontsize=7.5, color=GREY)
-                    continue
-                name = won.best.integrator
-                strength = 0.95 if won.reliable else 0.35
-                color = strength * np.array(to_rgb(look(name).color)) + (1.0 - strength)
-                axis.fill_between([column - 0.49, column + 0.49], row - 0.46, row + 0.46, color=color, lw=0)
-                dark = color @ np.array([0.3, 0.59, 0.11]) < 0.55
-                label = SHORT.get(name, name)
-                axis.text(
-                    column, row, label if won.reliable else f"~{label}", ha="center", va="center", fontsize=7.5,
-                    color="white" if dark else "black",
-                )  # fmt: skip
-        axis.set(
-            xlim=(-0.5, len(targets) - 0.5), ylim=(len(scenes) - 0.5, -0.5), yticks=range(len(scenes)),
-            yticklabels=scenes, xticks=range(len(targets)), title=horizon,
-            xticklabels=[f"$10^{{{np.log10(target):.0f}}}$" for target in targets],
-        )  # fmt: skip
-        axis.grid(visible=False)
-        axis.tick_params(length=0)
-    axes[-1, 0].set_xlabel("largest angle between the axes that is allowed (rad)")
-    return figure
-
-
-def profiles(ratios: xr.DataArray, shown: Sequence[str], titles: Sequence[str]) -> Any:
-    """Share of problems on which a method's cost is within a factor of the best, one panel a target.
-
-    `ratios` (target, integrator, problem) are costs over the best cost, infinite where the target was not met: a curve
-    that ends below one did not solve the rest. The methods in `shown` are bold.
-    """
-    columns = 2 if ratios.sizes["target"] > 1 else 1
-    figure, axes = panels(
-        -(-ratios.sizes["target"] // columns), columns, width=11.0, height=3.3, sharex=True, sharey=True
+def _front(data: xr.Dataset, name: str, far: int, cost: str, label: str) -> Picture:
+    labels = (label, f"largest {QUANTITIES['axis']}")
+    figure, names = drawings.fronts(data.isel(horizon=far), Column.AXIS, cost, labels)
+    times = " A time is measured where the run was a contender for the fastest, and predicted elsewhere."
+    return Picture(
+        name,
+        figure,
+        f"Largest axis error {words.spans(data)[far]} against {label}. Each thin line is a method. The black step line "
+        "is the front of the compiled methods: none of their runs is below or left of it. On it are "
+        f"{', '.join(names)}. Dashed: methods whose inner loop is plain Python, with a front of their own. Grey band: "
+        f"below the error bound of the reference.{times if cost == Column.SECONDS else ''}",
+        f"Log-log work-precision plots of the axis error against {label}, one panel a scene.",
     )
-    most = 1000.0
-    for axis, number, title in zip(axes.flat, range(ratios.sizes["target"]), titles, strict=False):
-        for name in ratios["integrator"].values:
-            values = np.sort(ratios.isel(target=number).sel(integrator=name).values)
-            share = np.arange(1, values.size + 1) / values.size
-            kept = values <= most
-            if not kept.any():
-                continue
-            x, y = np.append(values[kept], most), np.append(share[kept], share[kept][-1])
-            style, bold = look(str(name)), str(name) in shown
-            axis.step(
-                np.insert(x, 0, x[0]), np.insert(y, 0, 0.0), where="post", color=style.color, lw=1.5 if bold else 0.6,
-                alpha=1.0 if bold else 0.35, zorder=3 if bold else 1,
-            )  # fmt: skip
-            if bold:
-                size = style.size
-                axis.plot(x[:-1], y[:-1], style.marker, ls="none", color=style.color, ms=0.8 * size, zorder=4)
-                axis.plot([], [], style.marker + "-", color=style.color, ms=size, label=str(name))
-        axis.set(xscale="log", xlim=(0.9, most), ylim=(-0.02, 1.05), title=title)
-    for axis in axes.flat[ratios.sizes["target"] :]:
-        axis.set_visible(False)
-    for axis in axes[-1]:
-        axis.set_xlabel("seconds, in units of the fastest method's")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("share of scenes and horizons")
-    legend_below(figure, axes)
-    return figure
 
 
-def few_curves(
-    columns: Mapping[str, xr.Dataset], names: Sequence[str], rows: Mapping[str, str], cost: str, xlabel: str
-) -> Any:
-    """A few methods against cost: one row a quantity and its label, one column a dataset of one scene and horizon."""
-    figure, axes = panels(len(rows), len(columns), width=11.5, height=3.0, sharex=True, sharey="row")
-    for axis, title in zip(axes[0], columns, strict=True):
-        axis.set_title(title)
-    for line, (quantity, label) in zip(axes, rows.items(), strict=True):
-        for axis, cell in zip(line, columns.values(), strict=True):
-            draw_curves(axis, cell, names, quantity, cost)
-            axis.set(xscale="log", yscale="log")
-        line[0].set_ylabel(label)
-    for axis in axes[-1]:
-        axis.set_xlabel(xlabel)
-    legend_below(figure, axes)
-    return figure
-
-
-def draw_curves(
-    axis: Any, cell: xr.Dataset, names: Sequence[str], quantity: str, cost: str, bound: str | None = None
-) -> None:
-    """One panel: error of a quantity against cost for a few methods, over the reference's own bound."""
-    floor = 1e-16
-    if bound is not None and np.isfinite(cell[bound].values).any():
-        floor = float(np.nanmedian(cell[bound].values))
-        axis.axhspan(floor * 1e-3, floor, color="#BBBBBB", alpha=0.45, lw=0, label="the reference's own bound")
-    for name in names:
-        x, y = _curve(cell.sel(integrator=name), cost, quantity, 0.5 * floor)
-        style = look(name)
-        axis.plot(x, y, style.marker + "-", color=style.color, ms=style.size, lw=1.1, label=name)
-
-
-def small_multiples(
-    data: xr.Dataset,
-    names: Sequence[str],
-    quantity: str,
-    cost: str,
-    labels: tuple[str, str],
-    limits: tuple[float, float],
-) -> Any:
-    """A few methods on every scene of one horizon."""
+def _winners(data: xr.Dataset) -> Picture:
     scenes = [str(name) for name in data["scene"].values]
-    columns = min(3, len(scenes))
-    figure, axes = panels(-(-len(scenes) // columns), columns, width=11.5, height=3.0, sharex=True, sharey=True)
-    for axis, scene in zip(axes.flat, scenes, strict=False):
-        draw_curves(axis, data.sel(scene=scene), names, quantity, cost, f"{quantity}_bound")
-        axis.set(xscale="log", yscale="log", title=scene, ylim=limits)
-    for axis in axes.flat[len(scenes) :]:
-        axis.set_visible(False)
-    for power, level in ((-2.0, 1e-2), (-4.0, 1e-6)):
-        least, most = axes.flat[0].get_xlim()
-        middle = math.sqrt(least * most)
-        slope_guide(axes.flat[0], power, (0.1 * middle, 0.6 * middle), level * 1e-4, f"cost$^{{{power:g}}}$")
-    for axis in axes[-1]:
-        axis.set_xlabel(labels[0])
-    for axis in axes[:, 0]:
-        axis.set_ylabel(labels[1])
-    legend_below(figure, axes)
-    return figure
+    wins = ranking.winners(data, DECADES)
+    kept, uncounted = ranking.counted(data)
+    counting = [won for key, won in wins.items() if key[0] in kept["scene"].values]
+    count = Counter(won.best.integrator for won in counting if won)
+    most = ", ".join(f"{name} ({times})" for name, times in count.most_common(4))
+    return Picture(
+        "winners",
+        drawings.winner_strips(wins, scenes, words.spans(data), DECADES),
+        f"The fastest compiled method for each decade of axis error. Most often: {most}, of {len(counting)} cells."
+        f"{words.left_out(uncounted)} Pale and with a tilde: its lead over at least one other method is within the "
+        "noise. Methods were timed against each other at 1e-3, 1e-6, 1e-9 and 1e-12; in between some times are "
+        "predicted.",
+        "Coloured strips naming the fastest method, a row a scene, a column a decade of accuracy.",
+    )
+
+
+def _profiles(data: xr.Dataset) -> Picture:
+    kept = ranking.counted(data)[0]
+    tiers = {str(name): data[Column.IMPLEMENTATION].sel(integrator=name).values for name in data["integrator"].values}
+    names = [name for name, tier in tiers.items() if "compiled" in tier]
+    ratios = ranking.relative(ranking.costs(kept), names)
+    shown = ranking.leaders(ratios.sel(integrator=names), LEADERS)
+    shown += [name for name in ALWAYS_SHOWN if name not in shown]
+    return Picture(
+        "profiles",
+        drawings.profiles(ratios, shown, [f"axis error {target:.0e}" for target in TARGETS]),
+        f"Share of the {ratios.sizes['problem']} pairs of scene and horizon on which a method meets a target within a "
+        "factor (horizontal) of the fastest compiled method's time. A curve's left end is the share on which the "
+        "method is the fastest; its right end is the share on which it meets the target at all, within its budget of "
+        "force evaluations and a thousand times the fastest time. Closest to the fastest over all targets is "
+        f"{shown[0]}, then {', '.join(shown[1:4])}.",
+        "Performance profiles at four targets, one curve a method.",
+    )
+
+
+def _energy(data: xr.Dataset) -> Picture:
+    labels = (WALL_TIME, f"largest {QUANTITIES['energy']}")
+    methods = [*words.STRUCTURE, *words.CLASSIC]
+    return Picture(
+        "energy-long",
+        drawings.small_multiples(data.isel(horizon=-1), methods, Column.ENERGY, Column.SECONDS, labels, (1e-16, 30.0)),
+        f"Energy error {words.spans(data)[-1]} against {WALL_TIME}. {words.crossed(data)}",
+        "Log-log plots of energy error against time at the long horizon for six methods, one panel a scene.",
+    )
+
+
+def _parts(data: xr.Dataset) -> Picture:
+    name = str(data["scene"].values[0])
+    scene = data.sel(scene=name)
+    cells = {f"{name}, {words.spans(data)[far]}": scene.isel(horizon=far) for far in (0, -1)}
+    first, last = (f"{data['horizon'].values[far]:g}" for far in (0, -1))
+    return Picture(
+        "parts",
+        drawings.few_curves(cells, PARTS_OF, PARTS, Column.EVALUATIONS, EVALUATIONS),
+        f"Parts of the axis error on {name}: distance from the true path (shape), and how far the run is behind or "
+        f"ahead of the truth in its nutation and in its precession (lags). From {first} to {last} nutation periods, at "
+        "equal step or tolerance, the shape error grows by a factor of "
+        f"{words.growth(scene, PARTS_OF, Column.SHAPE)}; the nutation lag by a factor of "
+        f"{words.growth(scene, PARTS_OF, Column.NUTATION_LAG)}.",
+        "Shape error, nutation lag and precession lag against work at two horizons.",
+    )

@@ -1,4 +1,4 @@
-"""What the work-precision study says in words, all of it from the data."""
+"""What the work-precision study says in sentences and tables, all of it from its dataset."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -7,12 +7,24 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
-from symtop.measure.errors import QUANTITIES
 from symtop.measure.work import TARGETS
-from symtop.runner.study import Chart, Opening, Series, Table
+from symtop.runner.study import Table
+
+from .tables import Column
 
 STRUCTURE = ("midpoint", "trapezoidal", "stormer-verlet", "galerkin-simpson")
 CLASSIC = ("rk4", "rk45-compiled")
+MOST_NAMES = 3  # of a list of names; the others are counted
+
+HOW_TO_READ = (
+    "Choose the error that you accept on the vertical axis: the first curve to the right of it is the fastest method. "
+    "Seconds include the call of the compiled loop, about twenty microseconds, so that all curves bend where runs are "
+    "that short. A force evaluation is one evaluation of the equations of motion: a Newton iteration at one node, a "
+    "kick, a stage, or one derivative of a Taylor series, which costs more the higher it is. The settings of a method "
+    "were searched for, so that they just meet 1e-3, 1e-6, 1e-9 and 1e-12; no fixed step is longer than a quarter of a "
+    "nutation, and no run was longer than a million force evaluations (25 thousand in plain Python, 40 thousand in "
+    "quadruple precision). `exact` spends its time on constants in 40 digits, whatever the horizon."
+)
 
 
 def spans(data: xr.Dataset) -> list[str]:
@@ -25,9 +37,6 @@ def seconds(value: float) -> str:
     return f"{value * 1e6:.3g} us" if value < 1e-3 else f"{value * 1e3:.3g} ms" if value < 1.0 else f"{value:.3g} s"
 
 
-MOST_NAMES = 3
-
-
 def few(names: Sequence[str]) -> str:
     """The first names, and how many more there are."""
     more = len(names) - MOST_NAMES
@@ -35,9 +44,9 @@ def few(names: Sequence[str]) -> str:
 
 
 def winner(won: ranking.Win | None) -> str:
-    """Who won, in how long, and who is level."""
+    """The fastest method, its time, and which methods are level with it."""
     if won is None:
-        return "nobody"
+        return "none"
     level = f", level with {few(won.level)}" if won.level else ""
     return f"{won.best.integrator}, {seconds(won.best.cost)}{level}"
 
@@ -46,16 +55,16 @@ def lead(target: float, cell: xr.Dataset) -> str:
     """The fastest compiled method at a target and its lead; `cell` is one scene and one horizon."""
     won = ranking.win(cell, target)
     if won is None:
-        return f"{target:.0e} nobody"
-    said = f"{target:.0e} {won.best.integrator} in {seconds(won.best.cost)}"
+        return f"{target:.0e} no method"
+    text = f"{target:.0e} {won.best.integrator} in {seconds(won.best.cost)}"
     if won.level:
-        said += f" (inside the noise of {few(won.level)})"
+        text += f" (level with {few(won.level)})"
     elif won.behind and won.lead:
-        foreseen = "" if won.rival_timed else ", foreseen"
-        said += f" ({won.lead.ratio:.1f} times ahead of {won.behind.integrator}{foreseen})"
+        predicted = "" if won.rival_timed else ", by a predicted time"
+        text += f" ({won.lead.ratio:.1f} times faster than {won.behind.integrator}{predicted})"
     if won.best.integrator == "exact" and (other := ranking.win(cell, target, without=("exact",))):
-        said += f", the fastest that steps {other.best.integrator} in {seconds(other.best.cost)}"
-    return said
+        text += f", the fastest that steps {other.best.integrator} in {seconds(other.best.cost)}"
+    return text
 
 
 def left_out(names: Sequence[str]) -> str:
@@ -63,128 +72,130 @@ def left_out(names: Sequence[str]) -> str:
     if not names:
         return ""
     return (
-        f" Not counted: {', '.join(names)}, without a nutation; a start that is a fixed point of a map "
-        "gives it no error at any step."
+        f" Not counted: {', '.join(names)} (no nutation). Such a motion is a fixed point of some methods, which then "
+        "have no error at any step."
     )
 
 
-def growth(data: xr.Dataset, names: list[str], part: str) -> str:
+def growth(data: xr.Dataset, names: Sequence[str], part: str) -> str:
     """Median growth of a part of the error from the first to the last horizon."""
     grown = {name: ranking.growth_at_equal_settings(data.sel(integrator=name), part) for name in names}
-    said = [f"{value:.3g} times with {name}" for name, value in grown.items() if np.isfinite(value)]
+    listed = ", ".join(f"{value:.3g} with {name}" for name, value in grown.items() if np.isfinite(value))
     rest = [name for name, value in grown.items() if not np.isfinite(value)]
-    return ", ".join(said) + (f" (not judged: {', '.join(rest)}, at rounding or over budget)" if rest else "")
+    return listed + (f" (not judged: {', '.join(rest)}, at rounding or over budget)" if rest else "")
 
 
-def crossings(data: xr.Dataset) -> list[str]:
-    """For each classical method, who keeps energy better at equal cost, where, and up to what cost."""
-    cells = _long(data)
-    sentences = []
-    for classic in CLASSIC:
-        parts = []
-        for method in STRUCTURE:
-            found = [one for cell in cells if (one := ranking.crossing(cell, method, classic))]
-            won = [one for one in found if one.share > 0.0]
-            lost = [one.scene for one in found if one.share == 0.0]
-            if not found:
-                parts.append(f"{method} nowhere, as no costs are common")
-                continue
-            if not won:
-                parts.append(f"{method} on none of {len(found)} scenes")
-                continue
-            top = max(won, key=lambda one: one.gain)
-            reach = seconds(float(np.median([one.dearest_won for one in won])))
-            never = f", never on {', '.join(lost)}" if lost else ""
-            parts.append(
-                f"{method} on {len(won)} of {len(found)} scenes, there up to {reach} a run (median), at best "
-                f"{top.gain:.2g} times on {top.scene} (error {top.error:.1g}){never}"
-            )
-        sentences.append(f"At equal cost energy is kept better than by {classic}: by " + "; by ".join(parts) + ".")
-    return sentences
-
-
-def _long(data: xr.Dataset) -> list[xr.Dataset]:
+def _at_long_horizon(data: xr.Dataset) -> list[xr.Dataset]:
     """The scenes that count, over the long horizon."""
     kept = ranking.counted(data)[0]
     return [kept.sel(scene=name).isel(horizon=-1) for name in kept["scene"].values]
 
 
-def crossed(data: xr.Dataset) -> str:
-    """The same in one sentence."""
-    cells = _long(data)
-    known = [one for cell in cells for a in STRUCTURE for b in CLASSIC if (one := ranking.crossing(cell, a, b))]
-    coarse = sum(one.at_least and not one.at_most for one in known)
-    fine = sum(one.at_most and not one.at_least for one in known)
-    return (
-        f"Of {len(known)} comparisons of {', '.join(STRUCTURE)} with {' and '.join(CLASSIC)}, the structure-preserving "
-        f"method is better at every cost in {sum(one.share == 1.0 for one in known)}, with coarse steps only in "
-        f"{coarse}, with fine steps only in {fine}, and nowhere in {sum(one.share == 0.0 for one in known)}."
-    )
-
-
-def opening(data: xr.Dataset) -> Opening:
-    """Which method to begin with: for each horizon and target the one closest to the fastest over all scenes."""
-    rows, sentences = [], []
-    data, uncounted = ranking.counted(data)
-    names = [name for name in map(str, data["integrator"].values) if _steps(data.sel(integrator=name))]
-    ahead: Counter[str] = Counter()
-    for far, span in enumerate(spans(data)):
-        table = ranking.relative(ranking.costs(data.isel(horizon=[far])), names).sel(integrator=names)
-        for number, target in enumerate(TARGETS):
-            ratios = table.isel(target=[number])
-            order = ranking.leaders(ratios, 3)
-            if not order:
-                rows.append([span, f"{target:.0e}", "none", "", "", ""])
+def crossings(data: xr.Dataset) -> list[str]:
+    """For each classical method, which structure-preserving ones have less energy error at equal time, and where."""
+    cells = _at_long_horizon(data)
+    sentences = []
+    for classic in CLASSIC:
+        parts = []
+        for method in STRUCTURE:
+            compared = [one for cell in cells if (one := ranking.crossing(cell, method, classic))]
+            won = [one for one in compared if one.share > 0.0]
+            lost = [one.scene for one in compared if one.share == 0.0]
+            if not compared:
+                parts.append(f"{method} nowhere, because no run times are common")
                 continue
-            own = ratios.sel(integrator=order[0]).values.ravel()
-            solved = np.isfinite(own)
-            ahead[order[0]] += 1
-            usual, worst = float(np.median(own[solved])), float(own[solved].max())
-            share = f"{int(solved.sum())} of {own.size} scenes"
-            time = f"{usual:.2g} (worst {worst:.2g})"
-            rows.append([span, f"{target:.0e}", order[0], share, time, ", ".join(order[1:])])
-    if ahead:
-        best, times = ahead.most_common(1)[0]
-        others = ", ".join(f"{name} for {count}" for name, count in ahead.most_common()[1:])
+            if not won:
+                parts.append(f"{method} on none of {len(compared)} scenes")
+                continue
+            top = max(won, key=lambda one: one.gain)
+            longest = seconds(float(np.median([one.dearest_won for one in won])))
+            never = f", not on {', '.join(lost)}" if lost else ""
+            parts.append(
+                f"{method} on {len(won)} of {len(compared)} scenes{never} (for runs up to {longest} in the median; at "
+                f"best {top.gain:.2g} times smaller, on {top.scene}, where it is {top.error:.1g})"
+            )
         sentences.append(
-            f"For the direction of the axis, begin with {best}: over all scenes it is closest to the fastest method "
-            f"for {times} of {len(rows)} pairs of horizon and accuracy"
-            + (f"; {others}." if others else ".")
-            + left_out(uncounted)
+            f"At equal run time the energy error is smaller than that of {classic} with {'; '.join(parts)}."
         )
-    sentences.append(f"For energy {spans(data)[-1]}: {crossed(data)}")
-    sentences.append(
-        "For your own scene and accuracy: symtop recommend SCENE --accuracy 1e-6; it also tries out what it says."
+    return sentences
+
+
+def crossed(data: xr.Dataset) -> str:
+    """How often structure-preserving methods have less energy error at equal time, in one sentence."""
+    cells = _at_long_horizon(data)
+    compared = [one for cell in cells for a in STRUCTURE for b in CLASSIC if (one := ranking.crossing(cell, a, b))]
+    coarse = sum(one.at_least and not one.at_most for one in compared)
+    fine = sum(one.at_most and not one.at_least for one in compared)
+    return (
+        f"Of {len(compared)} comparisons at equal run time of a structure-preserving method ({', '.join(STRUCTURE)}) "
+        f"with a classical one ({', '.join(CLASSIC)}), the structure-preserving one has the smaller energy error at "
+        f"all run times in {sum(one.share == 1.0 for one in compared)}, at short ones only in {coarse}, at long ones "
+        f"only in {fine}, and at none in {sum(one.share == 0.0 for one in compared)}."
     )
-    header = ["horizon", "axis error", "begin with", "meets it on", "time over the fastest", "then"]
-    return Opening("Which integrator should I use?", sentences, Table("A method to begin with", header, rows))
 
 
-def _steps(cell: xr.Dataset) -> bool:
-    """Is it compiled, and does it step? The closed form does not."""
-    turned = np.isfinite(cell["step_size"].values) | np.isfinite(cell["tolerance"].values)
-    return bool(turned.any()) and "compiled" in cell["tier"].values
+def _worth_of_times(data: xr.Dataset, wins: Sequence[ranking.Win]) -> str:
+    """How many times were measured, and how far off the predicted ones may be."""
+    sure = [won for won in wins if won.reliable and won.lead]
+    timed, finite = data[Column.TIMED].values == 1.0, np.isfinite(data[Column.SECONDS].values)
+    miss = data[Column.PREDICTION_MISS].values
+    text = f"{int(timed.sum())} of {int(finite.sum())} run times were measured"
+    if not np.isfinite(miss).any():
+        return f"{text}."
+    return (
+        f"{text}; the others are predicted from two measured runs of the same method on the same scene. "
+        f"{sum(won.rival_timed for won in sure)} of {len(sure)} leads larger than the noise are over a method timed in "
+        "the same rounds, the others over a predicted time. Where a prediction was tested by a measurement it was off "
+        f"by {np.nanmedian(miss):.0%} (median) and by {np.nanmax(miss):.0%} at worst. "
+        f"{int(np.sum(data[Column.RELIABLE].values == 0.0))} of the measured times are too noisy to trust."
+    )
 
 
-def charts(data: xr.Dataset) -> list[Chart]:
-    """Axis error against seconds, every run of every method: one panel a scene and horizon."""
-    panels = {}
-    for scene in data["scene"].values:
-        for far, span in enumerate(spans(data)):
-            cell = data.sel(scene=scene).isel(horizon=far)
-            names = [str(name) for name in cell["integrator"].values]
-            panels[f"{scene}, {span}"] = [_series(cell.sel(integrator=name), name) for name in names]
-    return [Chart("axis", "Point at the runs", "wall time of one run (s)", f"largest {QUANTITIES['axis']}", panels)]
-
-
-def _series(cell: xr.Dataset, name: str) -> Series:
-    keep = np.isfinite(cell["seconds"].values) & np.isfinite(cell["axis"].values) & (cell["outcome"].values == "ok")
-    points = []
-    for k in sorted(np.flatnonzero(keep), key=lambda k: cell["seconds"].values[k]):
-        step, tolerance = float(cell["step_size"].values[k]), float(cell["tolerance"].values[k])
-        knob = (
-            f"step {step:.3g}, " if np.isfinite(step) else f"tolerance {tolerance:.1e}, " * bool(np.isfinite(tolerance))
+def sentences(data: xr.Dataset) -> list[str]:
+    """The fastest method for each scene, horizon and target, the crossover in energy, and what the times are worth."""
+    kept, uncounted = ranking.counted(data)
+    wins = [won for won in ranking.winners(kept).values() if won]
+    count = Counter(won.best.integrator for won in wins)
+    said = [
+        f"Of {len(wins)} combinations of scene, horizon and target that a compiled method met, the fastest is "
+        + ", ".join(f"{name} in {times}" for name, times in count.most_common())
+        + f"; in {sum(won.reliable for won in wins)} its lead is larger than the noise."
+        + left_out(uncounted),
+        f"Energy error {spans(data)[-1]}. " + " ".join(crossings(data)),
+    ]
+    tiers = {str(name): data[Column.IMPLEMENTATION].sel(integrator=name).values for name in data["integrator"].values}
+    python = [name for name, tier in tiers.items() if "python" in tier]
+    if python:
+        said.append(
+            f"Only compiled methods are ranked. Those in plain Python ({', '.join(python)}) are ranked "
+            "among themselves in the table; compare them with the rest by force evaluations."
         )
-        time, error = float(f"{cell['seconds'].values[k]:.3g}"), float(f"{cell['axis'].values[k]:.3g}")
-        points.append((time, error, f"{knob}{seconds(time)}, error {error:.1e}"))
-    return Series(name, points)
+    said.append(_worth_of_times(data, wins))
+    for name in data["scene"].values:
+        for far, span in enumerate(spans(data)):
+            cell = data.sel(scene=name).isel(horizon=far)
+            fastest = "; ".join(lead(target, cell) for target in TARGETS)
+            said.append(f"{name}, the fastest to an axis error {span}: {fastest}.")
+    return said
+
+
+def tables(data: xr.Dataset) -> list[Table]:
+    """The fastest methods, and every method's time."""
+    shown = []
+    header = [f"axis error {target:.0e}" for target in TARGETS]
+    for far, span in enumerate(spans(data)):
+        fastest, times = [], []
+        for name in data["scene"].values:
+            cell = data.sel(scene=name).isel(horizon=far)
+            for tier in ("compiled", "python"):
+                won = [ranking.win(cell, target, tier=tier) for target in TARGETS]
+                fastest.append([str(name), tier, *(winner(one) for one in won)])
+            met = [{place.integrator: place for place in ranking.cheapest(cell, target)} for target in TARGETS]
+            for method in map(str, cell["integrator"].values):
+                row = [seconds(places[method].cost) if method in places else "-" for places in met]
+                times.append([str(name), method, *row, str(cell[Column.STOPPED].sel(integrator=method).values)])
+        columns = ["scene", "implementation", *header]
+        shown.append(Table(f"Fastest method to an axis error {span}", columns, fastest))
+        columns = ["scene", "integrator", *header, "nothing finer because of"]
+        shown.append(Table(f"Time of every method to the same errors {span}", columns, times))
+    return shown

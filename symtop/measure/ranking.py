@@ -161,24 +161,6 @@ def counted(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
     return (data.sel(scene=kept), [name for name in nutating if name not in kept]) if kept else (data, [])
 
 
-def agreement(first: xr.Dataset, second: xr.Dataset) -> tuple[int, list[str]]:
-    """How many winners that both runs of a study call reliable there are, and the ones on which they contradict.
-
-    A winner that one run calls reliable contradicts the other run if that one has it neither first nor level.
-    """
-    ours, theirs = winners(first), winners(second)
-    sure, wrong = 0, []
-    for key, one in ours.items():
-        other = theirs.get(key)
-        if one is None or other is None:
-            continue
-        sure += one.reliable and other.reliable
-        for a, b in ((one, other), (other, one)):
-            if a.reliable and a.best.integrator not in (b.best.integrator, *b.level):
-                wrong.append(f"{key}: {a.best.integrator} against {b.best.integrator}")
-    return sure, wrong
-
-
 def costs(
     data: xr.Dataset, targets: tuple[float, ...] = TARGETS, quantity: str = "axis", cost: str = "seconds"
 ) -> xr.DataArray:

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.ticker import LogLocator
 
-from symtop.report.style import GREY, VERMILLION, YELLOW, Look, legend_below, look, panels, slope_guide
+from symtop.report.style import GREY, VERMILLION, YELLOW, Look, grid, legend_below, look, panels, slope_guide
 
 
 def error_curves(
@@ -25,9 +25,8 @@ def error_curves(
     band at the bottom. The integrators in `faint` are thin lines without markers, and not in the legend.
     """
     columns = 3 if len(scenes) == 3 else min(2, len(scenes))
-    rows = -(-len(scenes) // columns)
-    figure, axes = panels(rows, columns)
-    for axis, scene in zip(axes.flat, scenes, strict=False):
+    figure, axes = grid(len(scenes), columns, labels)
+    for axis, scene in zip(axes, scenes, strict=True):
         floor = _band(axis, data, scene, quantity)
         for name in data["integrator"].values:
             cell = data.sel(scene=scene, integrator=name)
@@ -42,12 +41,6 @@ def error_curves(
         axis.set(xscale="log", yscale="log", title=scene)
         axis.xaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))  # labels of all nine would collide
         axis.grid(visible=True, which="major")
-    for axis in axes.flat[len(scenes) :]:
-        axis.set_visible(False)
-    for axis in axes[-1]:
-        axis.set_xlabel(labels[0])
-    for axis in axes[:, 0]:
-        axis.set_ylabel(labels[1])
     legend_below(figure, axes)
     return figure, axes
 

@@ -34,12 +34,12 @@ def section(study: Mapping[str, Any]) -> str:
 
 
 def opening(study: Mapping[str, Any]) -> str:
-    """What a study has to say on the first screen; empty if nothing."""
+    """A study's answer on the first screen; empty if it has none."""
     first = study["opening"]
     if not first:
         return ""
-    said = "\n".join(f"- {sentence}" for sentence in first["sentences"])
-    return f"## {first['question']}\n\n{said}\n\n{table(first['table']['header'], first['table']['rows'])}"
+    answer = "\n".join(f"- {sentence}" for sentence in first["sentences"])
+    return f"## {first['question']}\n\n{answer}\n\n{table(first['table']['header'], first['table']['rows'])}"
 
 
 def page(studies: Sequence[Mapping[str, Any]], opening: Sequence[str], provenance: Mapping[str, str]) -> str:

@@ -9,8 +9,7 @@ from typing import Any
 from symtop.base.validate import SymtopError
 from symtop.methods.registry import integrators
 from symtop.model.scenes import scenes
-from symtop.report import interactive as charts
-from symtop.report import markdown
+from symtop.report import interactive, markdown
 from symtop.runner import run as runner
 from symtop.runner import store
 
@@ -37,7 +36,7 @@ def _embedded(path: Path) -> str:
     return f"data:image/{path.suffix[1:]};base64," + base64.b64encode(path.read_bytes()).decode()
 
 
-BENCHMARKS = ("peers",)  # findings in the form of a study's that another program leaves
+BENCHMARKS = ("peers",)  # programs of `benchmarks` that leave findings in the form of a study's
 
 
 def _command(name: str) -> str:
@@ -46,7 +45,7 @@ def _command(name: str) -> str:
 
 def gather(results: Path) -> list[dict[str, Any]]:
     """The findings of all studies that were run, in the order of the report, with their pictures."""
-    found = []
+    gathered = []
     for name in [*runner.names(), *BENCHMARKS]:
         findings = store.read_json(results / f"{name}.json")
         if findings is None:
@@ -59,16 +58,18 @@ def gather(results: Path) -> list[dict[str, Any]]:
                 f"the findings of {name} in {results} are incomplete ({error}); run it again: {_command(name)}"
             ) from error
         findings.setdefault("opening", None)
-        findings["charts"] = [{**chart, "prepared": charts.prepared(chart)} for chart in findings.get("charts", [])]
+        findings["charts"] = [
+            {**chart, "prepared": interactive.prepared(chart)} for chart in findings.get("charts", [])
+        ]
         findings["dataset"] = f"{name}.nc" if (results / f"{name}.nc").is_file() else ""
-        found.append(findings)
-    if not found:
+        gathered.append(findings)
+    if not gathered:
         raise SymtopError(f"no study has left findings in {results}; run one first, for example: symtop study --all")
-    return found
+    return gathered
 
 
 def write(results: Path) -> Path:
-    """Write ``report.html`` and its twin ``report.md`` into the results folder; returns the path of the page."""
+    """Write ``report.html``, and ``report.md`` with the same words, into the results folder; returns the page."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -97,7 +98,7 @@ def write(results: Path) -> Path:
 
 
 def _part(name: str) -> str:
-    """A piece of the page that is ours and goes in as it is."""
+    """A piece of the page from the templates, unchanged."""
     return (Path(__file__).parent / "templates" / name).read_text(encoding="utf-8")
 
 

@@ -1,4 +1,4 @@
-"""One run as a picture: its motion beside the truth's, its errors, and what it does to the constants of the motion."""
+"""One run as a picture: its motion beside the true one, its errors, and the residuals of constants of the motion."""
 
 import textwrap
 from pathlib import Path
@@ -13,10 +13,10 @@ from symtop.model.scenes import Scene
 from symtop.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, legend_below, panels, save
 
 COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
-LEAST = 1e-17
+LEAST = 1e-17  # what is smaller is drawn here
 
 
-def draw(scene: Scene, run: xr.Dataset, truth: xr.Dataset, found: xr.Dataset, path: str | Path) -> Path:
+def draw(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Dataset, path: str | Path) -> Path:
     """Three panels into a PNG: theta and the truth's, errors in angles, residuals of energy and momenta."""
     figure, axes = panels(3, 1, height=2.3, sharex=True)
     times = run["time"].values
@@ -26,8 +26,8 @@ def draw(scene: Scene, run: xr.Dataset, truth: xr.Dataset, found: xr.Dataset, pa
     motion.set_ylabel("theta (degrees)")
     motion.set_title(textwrap.fill(f"{run.attrs['title']}: {run.attrs['outcome_message']}", 110))
     for name in ("axis", "attitude", "theta"):
-        if name in found:
-            _line(angles, times, found[name].values, COLORS[name], QUANTITIES[name])
+        if name in errors:
+            _line(angles, times, errors[name].values, COLORS[name], QUANTITIES[name])
     for name, values in residuals(scene, run).items():
         _line(constants, times, np.abs(values), COLORS[name], f"residual of {name}, relative")
     angles.set(yscale="log", ylabel="error (rad)")

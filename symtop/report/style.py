@@ -1,7 +1,7 @@
 """One look for every figure: an integrator has the same colour, marker and line everywhere.
 
-Colours are those of Okabe and Ito, told apart by readers with any common colour blindness; every series also has a
-marker or a line style of its own, and methods that run in plain Python are dashed wherever cost is drawn.
+Colours are those of Okabe and Ito, which readers with any common colour blindness can tell apart. Every series also has
+a marker or a line style of its own. Methods that run in plain Python are dashed wherever cost is drawn.
 """
 
 import zlib
@@ -27,27 +27,70 @@ class Look(NamedTuple):
     size: float = 5.0
 
 
+# Shades of a family: light enough to tell apart, of one hue so that families stay together.
+BLUES = (BLUE, "#7B9FD1", "#1B3A6B")
+GREENS = (GREEN, "#7CC9A8", "#00563F")
+ORANGES = (ORANGE, "#B37400", "#F5C766")
+BLACKS = (BLACK, "#555555", "#999999")
+REDS = (VERMILLION, "#F09A66", "#8A3C00")
+PURPLES = (PURPLE, "#8C4A73", "#E6B8D2")
+_SHADES = {
+    "discrete-lagrangian": BLUES,
+    "splitting": GREENS,
+    "runge-kutta": ORANGES,
+    "taylor": BLACKS,
+    "library": REDS,
+    "exact": (GREY,),
+    "other": PURPLES,
+}
+_MARKERS = "osv^<>DPXph8dH"
+
+# The looks of the integrators that ship with symtop. A new one gets a line here; the others keep theirs.
 _LOOKS = {
     "midpoint": Look(BLUE, "o", 8.0),
     "trapezoidal": Look(SKY, "s"),
     "simpson-linear": Look(PURPLE, "v"),
+    "midpoint-unreduced": Look(BLUE, "^"),
+    "trapezoidal-unreduced": Look(BLUES[1], "<"),
     "galerkin-simpson": Look(BLUE, "P"),
     "stormer-verlet": Look(GREEN, "^"),
+    "stormer-verlet-yoshida-4": Look(GREEN, "o"),
+    "stormer-verlet-suzuki-4": Look(GREENS[1], "s"),
+    "stormer-verlet-blanes-moan-6": Look(GREENS[2], "v"),
+    "strang": Look(GREEN, "<"),
+    "cayley": Look(GREENS[1], ">"),
+    "cayley-tuned": Look(GREENS[2], "D"),
+    "takahashi-imada": Look(GREEN, "P"),
+    "chin-4a": Look(GREENS[1], "X"),
+    "yoshida-4": Look(GREENS[2], "p"),
+    "suzuki-4": Look(GREEN, "h"),
+    "srkn-6-4": Look(GREENS[1], "8"),
+    "srkn-11-6": Look(GREENS[2], "d"),
+    "srkn-14-6": Look(GREEN, "H"),
+    "kahan-li-6": Look(GREENS[1], "o"),
+    "suzuki-umeno-8": Look(GREENS[2], "s"),
+    "kahan-li-8": Look(GREEN, "v"),
+    "sofroniou-spaletta-10": Look(GREENS[1], "<"),
+    "aba-8-6-4": Look(GREENS[2], ">"),
+    "aba-10-6-4": Look(GREEN, "D"),
+    "aba-10-4": Look(GREENS[1], "P"),
+    "rk4": Look(ORANGE, "o"),
+    "rk45-compiled": Look(ORANGES[1], "s"),
+    "gauss-2": Look(ORANGES[2], "v"),
+    "gauss-4": Look(ORANGE, "^"),
+    "gauss-6": Look(ORANGES[1], "<"),
+    "gauss-8": Look(ORANGES[2], ">"),
+    "gauss-10": Look(ORANGE, "D"),
+    "gauss-12": Look(ORANGES[1], "P"),
     "rk45": Look(VERMILLION, "D"),
+    "dop853": Look(VERMILLION, "o"),
+    "lsoda": Look(REDS[1], "s"),
+    "radau": Look(REDS[2], "v"),
     "taylor": Look(BLACK, "*", 8.0),
+    "taylor-longdouble": Look(BLACK, "o"),
+    "taylor-quad": Look(BLACKS[1], "s"),
     "exact": Look(GREY, "x"),
 }
-# Shades of a family: light enough to tell apart, of one hue so that families stay together.
-_SHADES = {
-    "discrete-lagrangian": (BLUE, "#7B9FD1", "#1B3A6B"),
-    "splitting": (GREEN, "#7CC9A8", "#00563F"),
-    "runge-kutta": (ORANGE, "#B37400", "#F5C766"),
-    "taylor": (BLACK, "#555555", "#999999"),
-    "library": (VERMILLION, "#F09A66", "#8A3C00"),
-    "exact": (GREY,),
-    "other": (PURPLE, "#8C4A73", "#E6B8D2"),
-}
-_MARKERS = "osv^<>DPXph8dH"
 
 OUTCOME_COLORS = {
     "accurate": GREEN,
@@ -63,18 +106,20 @@ OUTCOME_COLORS = {
 
 
 def look(name: str) -> Look:
-    """Colour and marker of an integrator: a fixed one, or a shade of its family and a marker by its place in it."""
+    """Colour and marker of an integrator.
+
+    Those that ship with symtop have a fixed look. An added one gets a shade of its family and a marker that no shipped
+    one of these shades has; which of them depends on its name alone, not on what else is registered.
+    """
     if name in _LOOKS:
         return _LOOKS[name]
     from symtop.methods.registry import integrators
 
-    known = integrators()
-    family = known[name].family if name in known else "other"
-    peers = [entry.name for entry in known.values() if entry.family == family and entry.name not in _LOOKS]
-    place = peers.index(name) if name in peers else zlib.crc32(name.encode())
-    taken = {_LOOKS[entry.name].marker for entry in known.values() if entry.family == family and entry.name in _LOOKS}
-    shades, free = _SHADES[family], [marker for marker in _MARKERS if marker not in taken]
-    return Look(shades[place % len(shades)], free[place % len(free)])
+    registered = integrators()
+    shades = _SHADES[registered[name].family if name in registered else "other"]
+    free = [Look(shade, marker) for marker in _MARKERS for shade in shades]
+    free = [one for one in free if all((one.color, one.marker) != shipped[:2] for shipped in _LOOKS.values())]
+    return free[zlib.crc32(name.encode()) % len(free)]
 
 
 def use() -> None:
@@ -141,6 +186,24 @@ def panels(rows: int, columns: int, width: float = 9.6, height: float = 3.4, **o
     """A grid of axes, always two-dimensional, with room for a legend below."""
     use()
     return plt.subplots(rows, columns, figsize=(width, height * rows + 0.8), squeeze=False, **options)
+
+
+def grid(count: int, columns: int, labels: tuple[str, str] = ("", ""), **options: Any) -> Any:
+    """A figure of `count` equal panels in so many columns, and its panels in reading order (one-dimensional).
+
+    `labels` are those of the x axes, below the lowest panel of each column, and of the y axes, at the left. `options`
+    are those of `panels`.
+    """
+    figure, axes = panels(-(-count // columns), columns, **options)
+    for axis in axes.flat[count:]:
+        axis.set_visible(False)
+    used = axes.flat[:count]
+    for axis in used[-columns:]:
+        axis.set_xlabel(labels[0])
+        axis.tick_params(which="both", labelbottom=True)  # shared axes leave it to a last row that may be hidden
+    for axis in used[::columns]:
+        axis.set_ylabel(labels[1])
+    return figure, used
 
 
 def legend_below(figure: Any, axes: Any) -> None:

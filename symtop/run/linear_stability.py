@@ -37,17 +37,6 @@ def few_steps(method: Integrator, chart: str, top: SymmetricTop, start: Angles, 
     return solve(method, chart, top, start, Plan.steps(h, np.arange(steps + 1)))
 
 
-def chart_of(method: Integrator) -> str:
-    """The smallest chart that shows the axis (alias for studies/stability: `Integrator.chart_for` says it)."""
-    return method.chart_for("axis")
-
-
-def inclination(chart: str, states: np.ndarray, top: SymmetricTop | None = None) -> np.ndarray:
-    """theta of states of a chart (alias for studies/stability: `view` says it)."""
-    with np.errstate(over="ignore"):  # a run may have blown up
-        return np.asarray(view(chart, top or SymmetricTop(1.0, 1.0, 1.0), states).theta)
-
-
 def with_momenta(top: SymmetricTop, theta: float, momenta: Momenta) -> Angles:
     """The state at rest in theta with these momenta; exact next to a pole, where p_phi - p_psi cos(theta) cancels."""
     x = 0.5 * theta

@@ -22,12 +22,11 @@ from symtop.methods.registry import Integrator, Plan, Run, integrator, solve
 from symtop.model import charts
 from symtop.model.scenes import OBSERVABLES, Scene, closed_form, scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import space_energy, view
+from symtop.model.view import view
 from symtop.run.guard import warning
 
 __all__ = [
     "as_dataset", "choose_chart", "make_plan", "sample_times", "simulate", "solve_plan",
-    "space_energy",  # alias for studies/stability
 ]  # fmt: skip
 
 MOST_STEPS = 20_000_000_000  # ten minutes of the fastest kernel

@@ -16,8 +16,6 @@ from symtop.base.validate import SymtopError, one_of
 from symtop.runner.study import Study
 
 STUDIES = "symtop_studies"  # the package that every shipped study belongs to
-ORDER = ("truth", "convergence", "work_precision", "drift", "stability", "reduction")  # of the report
-
 
 _elsewhere: dict[str, Path] = {}  # scripts of the user's own, by the name of their study
 
@@ -62,9 +60,10 @@ def install() -> ModuleType:
 
 
 def names() -> list[str]:
-    """Names of the studies that ship with symtop, in the order of the report."""
-    known = sorted(path.parent.name for path in folder().glob("*/study.py"))
-    return [name for name in ORDER if name in known] + [name for name in known if name not in ORDER]
+    """Names of the studies that ship with symtop, in the order of the report, which their package says."""
+    shipped = sorted(path.parent.name for path in folder().glob("*/study.py"))
+    order = install().ORDER
+    return [name for name in order if name in shipped] + [name for name in shipped if name not in order]
 
 
 def file_of(name: str) -> Path:

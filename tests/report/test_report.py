@@ -28,8 +28,8 @@ def results(tmp_path_factory):
     def cases(_):
         return [Case("spheroid", name, {"periods": [10.0, 40.0], "budget": 3e4}) for name in FEW]
 
-    found = runner.run(dataclasses.replace(study, cases=cases), folder, jobs=1, quiet=True)
-    assert found["failures"] == []
+    findings = runner.run(dataclasses.replace(study, cases=cases), folder, jobs=1, quiet=True)
+    assert findings["failures"] == []
     page.write(folder)
     return folder
 
@@ -68,8 +68,8 @@ POINT = """(() => {
 
 def test_pointing_at_a_run_shows_what_it_was(browser, results):
     browser.resize(1280, 900)
-    said = browser.evaluate(POINT % (0, 0))
-    name, error = re.fullmatch(r"(\S+) \(\S+\): .*error (\S+)", said).groups()
+    tip = browser.evaluate(POINT % (0, 0))
+    name, error = re.fullmatch(r"(\S+) \(\S+\): .*error (\S+)", tip).groups()
     cell = xr.load_dataset(results / "work_precision.nc").sel(scene="spheroid", integrator=name).isel(horizon=0)
     assert any(f"{value:.1e}" == error for value in cell["axis"].values)
     assert browser.evaluate(POINT % (0, 100_000)) == ""  # far from every run: nothing

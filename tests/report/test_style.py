@@ -1,9 +1,13 @@
 """Figures keep the colour of every integrator, whatever else is in the picture."""
 
+import dataclasses
+
 import numpy as np
+import pytest
 from PIL import Image
 
 import symtop
+from symtop.methods import registry
 from symtop.report import style
 
 
@@ -29,3 +33,42 @@ def test_a_compacted_picture_keeps_the_colour_of_a_small_marker(tmp_path):
 def test_no_two_integrators_look_alike():
     looks = [(style.look(name).color, style.look(name).marker) for name in symtop.integrators()]
     assert len(set(looks)) == len(looks)
+
+
+@pytest.fixture
+def clean_registry(monkeypatch):
+    monkeypatch.setattr(registry, "_registry", registry.integrators())  # a copy: what a test adds goes with it
+
+
+@pytest.mark.parametrize("model", ["rk4", "strang", "midpoint", "rk45", "taylor", "exact"])
+def test_an_added_integrator_changes_nobodys_look(clean_registry, model):
+    before = {name: style.look(name) for name in symtop.integrators()}
+    for name in ("heun-3", "ralston"):
+        symtop.register(dataclasses.replace(symtop.integrator(model), name=name))
+    assert {name: style.look(name) for name in before} == before
+
+
+def test_an_added_integrator_has_a_look_of_its_own_whatever_else_was_added(clean_registry):
+    symtop.register(dataclasses.replace(symtop.integrator("rk4"), name="heun-3"))
+    alone = style.look("heun-3")
+    assert (alone.color, alone.marker) not in {
+        style.look(name)[:2] for name in symtop.integrators() if name != "heun-3"
+    }
+    assert alone.color in style.ORANGES
+    symtop.register(dataclasses.replace(symtop.integrator("rk4"), name="bogacki-shampine"))
+    assert style.look("heun-3") == alone
+
+
+def test_every_shipped_integrator_has_a_line_in_the_table():
+    assert {name for name in symtop.integrators() if registry.is_built_in(name)} == set(style._LOOKS)
+
+
+@pytest.mark.parametrize(("count", "columns"), [(1, 1), (5, 3), (6, 3), (2, 4)])
+def test_a_grid_labels_its_left_and_its_lowest_panels(count, columns):
+    figure, axes = style.grid(count, columns, ("step", "error"), sharex=True, sharey=True)
+    assert len(axes) == count
+    assert sum(axis.get_visible() for axis in figure.axes) == count
+    assert [k for k, axis in enumerate(axes) if axis.get_ylabel()] == list(range(0, count, columns))
+    assert [k for k, axis in enumerate(axes) if axis.get_xlabel()] == list(range(max(0, count - columns), count))
+    lowest = [axis.xaxis.get_tick_params()["labelbottom"] for axis in axes[-columns:]]
+    assert all(lowest)

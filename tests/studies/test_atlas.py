@@ -1,15 +1,17 @@
 """Outcome maps against single runs, and the sentences against maps whose content is known."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.stability import atlas_figures, atlas_words, mechanism_words
-from symtop_studies.stability.mechanisms import family_limits, map_table
-from symtop_studies.stability.outcome_maps import NOT_RUN, family, ladder, outcome_map, row, spin_unit, with_spin
+from symtop_studies.stability import atlas, atlas_figures, atlas_words, mechanism_words
+from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row, row_plan, spin_unit, with_spin
+from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
 
 import symtop
+from symtop.base import datasets
 from symtop.measure.errors import errors_against
 from symtop.measure.verdicts import VERDICTS, verdict
 from symtop.methods.registry import integrator, integrators
@@ -26,38 +28,38 @@ STEPS = [0.011, 0.053, 0.17, 0.31, 0.83]
 @pytest.mark.parametrize("name", ["midpoint", "stormer-verlet", "strang", "gauss-4", "rk4"])
 def test_a_map_says_what_single_runs_say(name):
     """The same runs through `simulate`, the reference and `verdict`, sampled more densely."""
-    found = outcome_map("cusp", [0.3, 1.0, 8.0], integrator(name), STEPS, 12.0)
+    runs = outcome_map("cusp", [0.3, 1.0, 8.0], integrator(name), STEPS, 12.0)
     for place, ratio in enumerate((0.3, 1.0, 8.0)):
-        where = with_spin(scene("cusp"), ratio)
+        spun = with_spin(scene("cusp"), ratio)
         for column, value in enumerate(STEPS):
-            horizon = math.ceil(12.0 / value) * value * where.nutation_period
+            horizon = math.ceil(12.0 / value) * value * spun.nutation_period
             run = symtop.simulate(
-                where, name, step_size=value * where.nutation_period, horizon=horizon, samples=241, observe="axis",
+                spun, name, step_size=value * spun.nutation_period, horizon=horizon, samples=241, observe="axis",
                 guard=False,
             )  # fmt: skip
-            error = errors_against(where, run, reference(where, run["time"].values, "closed-form"))["axis"].values
-            mapped = VERDICTS[found.verdict[place, column]]
-            single = verdict(where, run, error)
+            error = errors_against(spun, run, reference(spun, run["time"].values, "closed-form"))["axis"].values
+            mapped = VERDICTS[runs.verdict[place, column]]
+            single = verdict(spun, run, error)
             assert (mapped == "accurate") == (single == "accurate"), (ratio, value, mapped, single)
             if run.attrs["outcome"] != "ok":
                 assert mapped == run.attrs["outcome"]
-                assert math.isnan(found.axis_error[place, column])
+                assert math.isnan(runs.axis_error[place, column])
             else:
-                assert found.axis_error[place, column] <= 1.0001 * error.max()
-                assert found.axis_error[place, column] >= 0.3 * error.max()
+                assert runs.axis_error[place, column] <= 1.0001 * error.max()
+                assert runs.axis_error[place, column] >= 0.3 * error.max()
 
 
 def test_adaptive_methods_are_mapped_over_their_tolerance():
-    found = outcome_map("cusp", [1.0], integrator("rk45-compiled"), [1e-10, 1e-6, 0.3], 12.0)
-    assert [VERDICTS[k] for k in found.verdict[0][:2]] == ["accurate", "accurate"]
-    assert VERDICTS[found.verdict[0][2]] != "accurate"
-    assert found.axis_error[0, 0] < 1e-6 < found.axis_error[0, 1]
+    runs = outcome_map("cusp", [1.0], integrator("rk45-compiled"), [1e-10, 1e-6, 0.3], 12.0)
+    assert [VERDICTS[k] for k in runs.verdict[0][:2]] == ["accurate", "accurate"]
+    assert VERDICTS[runs.verdict[0][2]] != "accurate"
+    assert runs.axis_error[0, 0] < 1e-6 < runs.axis_error[0, 1]
     exact = outcome_map("cusp", [0.3, 3.0], integrator("exact"), [math.nan], 12.0)
     assert (exact.verdict == 0).all()
 
 
 def test_rows_share_phases_and_are_not_commensurate_with_the_nutation():
-    runs = ladder(integrator("strang"), [0.01, 0.25, 2.0], 12.0)
+    runs = row_plan(integrator("strang"), [0.01, 0.25, 2.0], 12.0)
     assert runs.steps == (1200, 48, 6)
     assert np.isnan(runs.phases[2]).sum() == 49 - 7
     phases = np.sort(np.mod(runs.phases[0], 1.0))
@@ -67,9 +69,9 @@ def test_rows_share_phases_and_are_not_commensurate_with_the_nutation():
 
 def test_the_families_are_what_they_say():
     for ratio in (0.1, 1.0, 30.0):
-        where = with_spin(scene("cusp"), ratio)
-        assert where.start.spin * where.top.I3 / (2.0 * math.sqrt(where.top.I1 * where.top.mgl)) == pytest.approx(ratio)
-        assert where.start.theta == scene("cusp").start.theta
+        spun = with_spin(scene("cusp"), ratio)
+        assert spun.start.spin * spun.top.I3 / (2.0 * math.sqrt(spun.top.I1 * spun.top.mgl)) == pytest.approx(ratio)
+        assert spun.start.theta == scene("cusp").start.theta
     free = symtop.Scene("free", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(theta=1.0, psi_dot=2.0), 1.0)
     assert spin_unit(free) == 1.0
     assert closed_form(family("grazing")(1e-3)).theta_range[0] == pytest.approx(1.1e-3, rel=0.05)
@@ -103,16 +105,19 @@ A, B, L = "accurate", "bounded_but_wrong", "left_chart"
 def test_advice_reads_reach_and_failures_off_the_map():
     data = hand_made([[A, B, L], [A, B, L], [A, A, B], [A, A, B]])
     line = atlas_words.advice(data, "cusp", "midpoint")
-    assert line.use == "with steps up to 0.1 of a nutation on fast tops and up to 0.01 on slow tops"
-    assert line.fails == "it leaves its chart from 1 of a nutation on and is wrong without a sign in 33% of its map"
+    assert line.use == "with steps up to 0.1 nutation periods on fast tops and up to 0.01 on slow tops"
+    assert (
+        line.fails
+        == "it first leaves its chart at h = 1 nutation periods and is wrong with bounded energy in 33% of its map"
+    )
     assert line.sentence.startswith("Use it with steps up to 0.1")
 
 
 def test_advice_on_a_method_that_is_never_right_or_always():
     never = atlas_words.advice(hand_made([[B, B, L]] * 4), "cusp", "midpoint")
-    assert never.use == "with steps below 0.01 of a nutation only"
+    assert never.use == "with steps below 0.01 nutation periods only"
     always = atlas_words.advice(hand_made([[A, A, A]] * 4), "cusp", "midpoint")
-    assert always.fails == "it failed nowhere on the map"
+    assert always.fails == "it fails nowhere on the map"
     assert atlas_words.advice(hand_made([[A, A, A]] * 4), "cusp", "strang") is None
 
 
@@ -121,7 +126,9 @@ def test_advice_counts_a_failure_only_when_it_is_common():
     spins = np.geomspace(0.1, 30.0, 40)
     assert "chart" not in atlas_words.advice(hand_made(rows, parameter=spins), "cusp", "midpoint").fails
     rows[3] = [A, L, A]
-    assert "leaves its chart from 0.1" in atlas_words.advice(hand_made(rows, parameter=spins), "cusp", "midpoint").fails
+    assert (
+        "leaves its chart at h = 0.1 " in atlas_words.advice(hand_made(rows, parameter=spins), "cusp", "midpoint").fails
+    )
 
 
 def test_a_pole_that_spoils_is_named():
@@ -129,7 +136,7 @@ def test_a_pole_that_spoils_is_named():
     near = hand_made([[L, L, L], [L, L, L], [A, L, L], [A, A, L]], parameter=gaps, scene_name="grazing")
     both = xr.concat([hand_made([[A, A, A]] * 4), near], "scene")
     assert (
-        "spoiled by a pole closer than 0.01 rad, whatever its knob"
+        "needs steps less than half as long within 0.01 rad of a pole (right next to it, smaller than any on the map)"
         in atlas_words.advice(both, "cusp", "midpoint").fails
     )
     unspoiled = hand_made([[A, A, L]] * 4, parameter=gaps, scene_name="grazing")
@@ -144,14 +151,12 @@ def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
                                                           "periods": 1.0, "shown": 0.01})  # fmt: skip
     data = store.combine([(Case("grazing", "strang"), small), (Case("grazing", "midpoint"), large)])
     symtop_file = tmp_path / "maps.nc"
-    from symtop.base import datasets
-
     datasets.write(data, symtop_file)
     again = datasets.read(symtop_file)
     assert again["outcome"].dtype == np.uint8
     assert (again["outcome"].sel(integrator="strang").values[0, 2] == NOT_RUN).all()
-    assert atlas_words.cell(again, "grazing", "strang").outcome.shape == (2, 2)
-    assert atlas_words.cell(again, "grazing", "midpoint").outcome.shape == (3, 3)
+    assert atlas.stored_map(again, "grazing", "strang").outcome.shape == (2, 2)
+    assert atlas.stored_map(again, "grazing", "midpoint").outcome.shape == (3, 3)
 
 
 def test_maps_can_be_read_without_colours():
@@ -170,7 +175,7 @@ def test_maps_can_be_read_without_colours():
 
 
 def test_every_integrator_has_a_page():
-    pages = atlas_words.pages(list(integrators()))
+    pages = atlas.pages(list(integrators()))
     assert sorted(name for names in pages.values() for name in names) == sorted(integrators())
     assert max(map(len, pages.values())) <= 12
 
@@ -188,3 +193,24 @@ def test_the_full_grid_is_as_large_as_promised():
     for case in full:
         assert len(case.settings["ladder"]) >= 200
         assert len(case.settings["parameters"]) >= 120
+
+
+def test_every_named_column_is_written_and_every_variable_has_a_name():
+    """What figures and words read, they read by a name of `Column`; the quick grid writes each of them."""
+    study = runner.load("stability")
+    scenes = {"cusp", "grazing", "steady-fast", "sleeping", "separatrix", "goldstein"}
+    written = set()
+    for case in study.cases(True):
+        if case.integrator == "midpoint" and case.scene in scenes:
+            small = {key: value[:3] if isinstance(value, list) else value for key, value in case.settings.items()}
+            written |= set(study.measure(Case(case.scene, case.integrator, small)).data_vars)
+    assert written == {value for key, value in vars(Column).items() if key.isupper()}
+
+
+def test_the_midpoint_rule_is_known_by_its_nodes_and_not_by_its_name():
+    settings = {"steps": 20, "periods": 1, "step_size": 0.1, "tolerances": [1e-2, 1e-8], "solver_steps": 50}
+    renamed = dataclasses.replace(integrator("midpoint"), name="my-rule")
+    one, other = (sampling_table("goldstein", method, settings) for method in (integrator("midpoint"), renamed))
+    assert Column.TEXTBOOK_ENERGY in one
+    xr.testing.assert_identical(one, other)
+    assert Column.TEXTBOOK_ENERGY not in sampling_table("goldstein", integrator("trapezoidal"), settings)

@@ -142,9 +142,9 @@ def test_the_notebook_study_names_methods_of_order_two_whose_energy_is_worse_tha
 @pytest.mark.parametrize(
     ("one", "energy", "momentum", "says"),
     [
-        (1e-1, 1e-4, 1e-8, ("walk off", "keeps the energy", "but lets the momenta go")),
-        (1e-4, 1e-4, 1e-15, ("stay at", "keeps the energy", "and keeps the momenta")),
-        (1e-1, 1e-1, 1e-8, ("walk off", "lets the energy go", "and lets the momenta go")),
+        (1e-1, 1e-4, 1e-8, ("grows to", "conserves the energy", "but loses the momenta")),
+        (1e-4, 1e-4, 1e-15, ("stays at", "conserves the energy", "and conserves the momenta")),
+        (1e-1, 1e-1, 1e-8, ("grows to", "loses the energy", "and loses the momenta")),
     ],
 )
 def test_the_share_of_the_solver_is_read_from_the_numbers(one, energy, momentum, says):
