@@ -262,7 +262,7 @@ def test_what_cannot_be_judged_says_why():
         "pole": "no pole",
     }  # fmt: skip
     odd = dataclasses.replace(symtop.integrator("stormer-verlet"), conserves=frozenset({"cayley_energy"}))
-    assert "no formula for cayley_energy" in judge(odd, SPHEROID, quick=True)["invariant"].why  # in the angles
+    assert "no formula for cayley_energy" in judge(odd, SPHEROID, quick=True)["invariant"].why
 
 
 def test_an_energy_error_that_is_no_claim_is_refused():
