@@ -258,8 +258,8 @@ def test_what_cannot_be_judged_says_why():
     assert {found.verdict for found in judged} == {"undecided"}
     assert all("no luck" in found.why and len(found.why) < 260 for found in judged)
     assert {found.claim: found.declared for found in judged if found.declared} == {
-        "order": "2", "symmetric": "no", "energy": "kept", "p_phi": "kept", "invariant": "cayley_energy", "explicit": "yes",
-        "pole": "no pole",
+        "order": "2", "symmetric": "no", "energy": "kept", "p_phi": "kept", "invariant": "cayley_energy",
+        "explicit": "yes", "pole": "no pole",
     }  # fmt: skip
     odd = dataclasses.replace(symtop.integrator("stormer-verlet"), conserves=frozenset({"cayley_energy"}))
     assert "no formula for cayley_energy" in judge(odd, SPHEROID, quick=True)["invariant"].why
