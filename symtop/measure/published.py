@@ -41,7 +41,7 @@ def published_values() -> list[Published]:
 
 
 def _simo_wong() -> Published:
-    scene = scene("simo-wong")
+    scene = find_scene("simo-wong")
     energy = scene.top.energy(scene.start)
     source = "Simo & Wong 1991; Krysl 2005"
     return Published(source, "energy of the fast top", 1269.975, energy, 1e-3, "printed", tests=START)
