@@ -71,8 +71,8 @@ def test_mean_frequencies_of_a_structured_method_do_not_drift():
 @pytest.mark.parametrize(
     ("name", "accuracy", "patience", "why"),
     [
-        ("rk45-compiled", 1e-15, math.inf, meet.ROUNDING),  # its least tolerance
-        ("gauss-10", 1e-15, math.inf, meet.ROUNDING),  # a finer step that gains nothing
+        ("rk45-compiled", 1e-15, math.inf, meet.STOPPED),  # its least tolerance
+        ("gauss-10", 1e-15, math.inf, meet.STOPPED),  # a finer step that gains nothing
         ("stormer-verlet", 1e-6, 1e3, meet.BUDGET),
     ],
 )
@@ -97,7 +97,7 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
         if horizon < 60.0 or len(ended) >= 3:
             return real(scene, method, accuracy, quantity, horizon, *rest)
         ended.append(method.name)
-        return meet.Missed(meet.ROUNDING, 1.0)
+        return meet.Missed(meet.STOPPED, 1.0)
 
     monkeypatch.setattr(meet, "search", search)
     advice = symtop.recommend("spheroid", accuracy=1e-4, horizon=60.0)

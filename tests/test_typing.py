@@ -47,8 +47,9 @@ def lines(tmp_path, text):
     """What mypy says of a script, line by line."""
     script = tmp_path / "script.py"
     script.write_text(text, encoding="utf-8")
-    words = [sys.executable, "-m", "mypy", "--strict", "--config-file", os.devnull, "--ignore-missing-imports",
-             "--no-error-summary", "--follow-imports=silent", "--cache-dir", str(ROOT / ".mypy_cache"), str(script)]  # fmt: skip  # noqa: E501
+    options = ["--strict", "--ignore-missing-imports", "--no-error-summary", "--follow-imports=silent"]
+    places = ["--config-file", os.devnull, "--cache-dir", str(ROOT / ".mypy_cache"), str(script)]
+    words = [sys.executable, "-m", "mypy", *options, *places]
     done = subprocess.run(
         words,
         cwd=tmp_path,

@@ -53,16 +53,16 @@ def declared_energy(method: Integrator) -> str:
     return "bounded" if method.symplectic and method.knob == "step_size" else ""
 
 
-def judge(method: Integrator, where: Scene, *, quick: bool = False) -> Ledger:
+def judge(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
     """Measure every claim of a method on a scene; `quick` shortens the runs."""
     traces: dict[str, np.ndarray] = {}
-    findings = {"order": _attempt("order", _yes_no_number(method.order), lambda: _order(method, where, quick, traces))}
-    findings |= _structure(method, where, quick, traces)
-    findings |= _over_steps(method, where, quick, traces)
+    findings = {"order": _attempt("order", _yes_no_number(method.order), lambda: _order(method, scene, quick, traces))}
+    findings |= _structure(method, scene, quick, traces)
+    findings |= _over_steps(method, scene, quick, traces)
     findings["pole"] = _attempt("pole", _pole_claim(method), lambda: _pole(method))
     return Ledger(
         method.name,
-        where.name,
+        scene.name,
         tuple(findings[claim] for claim in CLAIMS),
         traces,
     )
@@ -81,47 +81,47 @@ def _yes_no_number(value: bool | int | None) -> str:
     return ("yes" if value else "no") if isinstance(value, bool) else str(value)
 
 
-def _agrees(*, declared: bool | None, found: bool | None) -> str:
-    if found is None:
+def _agrees(*, declared: bool | None, measured: bool | None) -> str:
+    if measured is None:
         return "undecided"
-    return "measured" if declared is None else "confirmed" if declared == found else "refuted"
+    return "measured" if declared is None else "confirmed" if declared == measured else "refuted"
 
 
 # ---- order -----------------------------------------------------------------------------------------------------------
 
 
-def _order(method: Integrator, where: Scene, quick: bool, traces: dict[str, np.ndarray]) -> Finding:
+def _order(method: Integrator, scene: Scene, quick: bool, traces: dict[str, np.ndarray]) -> Finding:
     declared = _yes_no_number(method.order)
     if method.knob is None:
         return Finding("order", declared, "", "inapplicable", "it has no step and no tolerance")
-    found = orders.measured_order(method, where, quick=quick)
-    traces["step_size"], traces["error"], traces["fitted"] = orders.settings_shown(found, SHOWN)
-    main = found.fits[found.observed]
+    fitted = orders.measured_order(method, scene, quick=quick)
+    traces["step_size"], traces["error"], traces["fitted"] = orders.settings_shown(fitted, SHOWN)
+    main = fitted.fits[fitted.observed]
     measured = str(main) if math.isfinite(main.slope) else ""
-    said = ", ".join(f"{name} {fit}" for name, fit in found.fits.items() if math.isfinite(fit.slope))
-    said = f"slopes {said} on {found.scene}" if said else "no slope"
+    slopes = ", ".join(f"{name} {fit}" for name, fit in fitted.fits.items() if math.isfinite(fit.slope))
+    slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
     if method.knob == "step_size":
         power = method.order or 1
         if math.isfinite(main.slope):
             power = max(1, min(power if method.order else 99, round(main.slope)))
-        limit = orders.limit(method, where, power)
-        if limit.miss > orders.ROUNDING and limit.miss > 10.0 * limit.doubt:
-            why = f"as its step goes to zero it goes to a motion that is wrong by {limit.miss:.1e} ({said})"
+        limit = orders.limit(method, scene, power)
+        if limit.miss > orders.TRUE_LIMIT and limit.miss > 10.0 * limit.doubt:
+            why = f"as its step goes to zero it goes to a motion that is wrong by {limit.miss:.1e} ({slopes})"
             return Finding(
                 "order", declared, f"wrong limit, {limit.miss:.0e}", "refuted" if declared else "measured", why,
-                limit.miss, orders.ROUNDING,
+                limit.miss, orders.TRUE_LIMIT,
             )  # fmt: skip
     if not measured:
-        return Finding("order", declared, "", "undecided", f"{main.reason} ({said})")
+        return Finding("order", declared, "", "undecided", f"{main.reason} ({slopes})")
     if method.order is None:
-        return Finding("order", declared, measured, "measured", said, main.slope, main.interval)
+        return Finding("order", declared, measured, "measured", slopes, main.slope, main.interval)
     band = BAND if method.knob == "step_size" else LOOSE_BAND
-    low = any(fit.slope + fit.interval < method.order - BESIDE for fit in found.fits.values())
+    low = any(fit.slope + fit.interval < method.order - BESIDE for fit in fitted.fits.values())
     off = abs(main.slope - method.order) > band + main.interval
     if off or (low and method.knob == "step_size"):
-        why = f"the error falls with another power of the step: {said}"
+        why = f"the error falls with another power of the step: {slopes}"
         return Finding("order", declared, measured, "refuted", why, main.slope, band + main.interval)
-    return Finding("order", declared, measured, "confirmed", said, main.slope, band + main.interval)
+    return Finding("order", declared, measured, "confirmed", slopes, main.slope, band + main.interval)
 
 
 # ---- structure of a step ---------------------------------------------------------------------------------------------
@@ -137,12 +137,12 @@ class _Chart(NamedTuple):
     why: str
 
 
-def _structure(method: Integrator, where: Scene, quick: bool, traces: dict[str, np.ndarray]) -> dict[str, Finding]:
+def _structure(method: Integrator, scene: Scene, quick: bool, traces: dict[str, np.ndarray]) -> dict[str, Finding]:
     brackets, returns = [], []
     names = method.charts()[-1:] if quick else method.charts()
     for chart in names:
         try:
-            step, start = maps.step_map(method, chart, where)
+            step, start = maps.step_map(method, chart, scene)
             defect = maps.symplectic_defect(step, start)
             gap = maps.restart_gap(step, start)
             brackets.append(_bracket(chart, defect, gap))
@@ -181,14 +181,14 @@ def _returned(chart: str, miss: float, gap: float) -> _Chart:
     return _Chart(chart, True if miss <= RETURNED else False if miss > MISSED else None, miss, RETURNED, why)
 
 
-def _over_charts(claim: str, declared: bool | None, found: list[_Chart]) -> Finding:
+def _over_charts(claim: str, declared: bool | None, by_chart: list[_Chart]) -> Finding:
     """No if any chart says no, yes if one says yes and none no."""
     for answer in (False, True, None):
-        agreeing = [one for one in found if one.answer is answer]
+        agreeing = [one for one in by_chart if one.answer is answer]
         if agreeing:
             worst = max(agreeing, key=lambda one: one.value if math.isfinite(one.value) else -1.0)
             words = {True: f"yes, {worst.value:.0e}", False: f"no, {worst.value:.0e}", None: ""}[answer]
-            verdict = _agrees(declared=declared, found=answer)
+            verdict = _agrees(declared=declared, measured=answer)
             why = f"{worst.why}, in the {worst.chart} chart"
             return Finding(claim, _yes_no_number(declared), words, verdict, why, worst.value, worst.resolution)
     return undecided(claim, _yes_no_number(declared), "no chart could be tried")
@@ -201,24 +201,24 @@ KINDS = ("kept", "bounded", "random walk", "growing", "drift")  # from best to w
 BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")
 
 
-def _over_steps(method: Integrator, where: Scene, quick: bool, traces: dict[str, np.ndarray]) -> dict[str, Finding]:
+def _over_steps(method: Integrator, scene: Scene, quick: bool, traces: dict[str, np.ndarray]) -> dict[str, Finding]:
     """Everything that one long run in each chart shows; the worst chart decides, and the finding names it."""
-    runs, found = [], []
+    runs, by_chart = [], []
     for chart in method.charts():
         try:
-            run = long.long_run(method, where, chart, quick=quick)
+            run = long.long_run(method, scene, chart, quick=quick)
         except SymtopError as error:
-            found.append(_unseen(method, str(error)))
+            by_chart.append(_unseen(method, str(error)))
             continue
         runs.append(run)
         rest = [_invariant(method, run), _explicit(method, run), _work(method, run)]
-        found.append({one.claim: one for one in [*(_kept(method, run, claim) for claim in CONSTANTS), *rest]})
+        by_chart.append({one.claim: one for one in [*(_kept(method, run, claim) for claim in CONSTANTS), *rest]})
     if runs:
         least = min(runs, key=lambda run: run.steps)
         traces["steps_run"], traces["nutations_run"] = np.array(least.steps), np.array(least.nutations)
     return {
-        claim: _worst([_named(one[claim], chart) for one, chart in zip(found, method.charts(), strict=True)])
-        for claim in found[0]
+        claim: _worst([_named(one[claim], chart) for one, chart in zip(by_chart, method.charts(), strict=True)])
+        for claim in by_chart[0]
     }
 
 
@@ -228,8 +228,8 @@ def _declared(method: Integrator, claim: str) -> str:
         return declared_energy(method)
     if claim in CONSTANTS:
         return "kept" if claim in (method.conserves or ()) else ""
-    own = sorted((method.conserves or frozenset()) - set(CONSTANTS))
-    return {"invariant": ", ".join(own), "explicit": _yes_no_number(method.explicit)}.get(claim, "")
+    others = sorted((method.conserves or frozenset()) - set(CONSTANTS))
+    return {"invariant": ", ".join(others), "explicit": _yes_no_number(method.explicit)}.get(claim, "")
 
 
 def _unseen(method: Integrator, error: str) -> dict[str, Finding]:
@@ -238,13 +238,13 @@ def _unseen(method: Integrator, error: str) -> dict[str, Finding]:
     return {claim: undecided(claim, _declared(method, claim), error) for claim in claims}
 
 
-def _named(found: Finding, chart: str) -> Finding:
+def _named(finding: Finding, chart: str) -> Finding:
     """The finding with its chart, where the reason does not speak of it already."""
-    plain = found.verdict == "inapplicable" or found.why.endswith(" chart")
-    return found if plain else found._replace(why=f"{found.why}, in the {chart} chart")
+    plain = finding.verdict == "inapplicable" or finding.why.endswith(" chart")
+    return finding if plain else finding._replace(why=f"{finding.why}, in the {chart} chart")
 
 
-def _worst(found: list[Finding]) -> Finding:
+def _worst(findings: list[Finding]) -> Finding:
     """The finding that decides: by its verdict, then by the kind of growth, then by its number."""
 
     def badness(one: Finding) -> tuple[int, int, float]:
@@ -252,7 +252,7 @@ def _worst(found: list[Finding]) -> Finding:
         growth = KINDS.index(kind) if kind in KINDS else -1
         return BADNESS.index(one.verdict), growth, one.value if math.isfinite(one.value) else -1.0
 
-    return max(found, key=badness)
+    return max(findings, key=badness)
 
 
 def _span(run: long.LongRun) -> str:
@@ -267,26 +267,26 @@ def _kept(method: Integrator, run: long.LongRun, claim: str) -> Finding:
     return _constant(claim, declared, run, run.constants[claim])
 
 
-def _constant(claim: str, declared: str, run: long.LongRun, found: long.Constant) -> Finding:
-    kind = found.kind
-    measured = f"{kind}, {found.largest:.0e}".replace("0e+00", "0") if kind != "unknown" else ""
-    why = f"largest relative change {found.largest:.1e} in {_span(run)}, {found.a_step:.0e} in one step at most"
+def _constant(claim: str, declared: str, run: long.LongRun, constant: long.Constant) -> Finding:
+    kind = constant.kind
+    measured = f"{kind}, {constant.largest:.0e}".replace("0e+00", "0") if kind != "unknown" else ""
+    why = f"largest relative change {constant.largest:.1e} in {_span(run)}, {constant.a_step:.0e} in one step at most"
     if kind not in ("kept", "unknown"):
-        why += f", growth exponent {found.exponent:.2f} +- {found.interval:.2f}"
+        why += f", growth exponent {constant.exponent:.2f} +- {constant.interval:.2f}"
         if kind == "drift":
-            why += f", drifting by {found.rise / max(run.steps, 1):.1e} a step"
+            why += f", drifting by {constant.rise / max(run.steps, 1):.1e} a step"
     if run.outcome not in ("ok", "not_finite") or (kind in ("kept", "bounded") and run.outcome != "ok"):
         why += f"; but the run {run.message}"
-        return Finding(claim, declared, measured, "undecided", why, found.largest, found.floor)
+        return Finding(claim, declared, measured, "undecided", why, constant.largest, constant.floor)
     if kind == "unknown":
         why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"
-        return Finding(claim, declared, measured, "undecided", why, found.largest, found.floor)
-    if declared == "bounded" and found.grows is None:
+        return Finding(claim, declared, measured, "undecided", why, constant.largest, constant.floor)
+    if declared == "bounded" and constant.grows is None:
         why += ", which leaves open whether it grows"
-        return Finding(claim, declared, measured, "undecided", why, found.largest, found.floor)
-    true = {"kept": kind == "kept", "bounded": not found.grows}.get(declared)
+        return Finding(claim, declared, measured, "undecided", why, constant.largest, constant.floor)
+    true = {"kept": kind == "kept", "bounded": not constant.grows}.get(declared)
     verdict = "measured" if true is None else "confirmed" if true else "refuted"
-    return Finding(claim, declared, measured, verdict, why, found.largest, found.floor)
+    return Finding(claim, declared, measured, verdict, why, constant.largest, constant.floor)
 
 
 def _invariant(method: Integrator, run: long.LongRun) -> Finding:
@@ -294,12 +294,12 @@ def _invariant(method: Integrator, run: long.LongRun) -> Finding:
     declared = _declared(method, "invariant")
     if not declared:
         return Finding("invariant", "", "", "inapplicable", "it claims no invariant of its own")
-    own = declared.split(", ")
-    known = [name for name in own if name in run.constants]
-    if known != own:
-        unknown = ", ".join(name for name in own if name not in run.constants)
+    claimed = declared.split(", ")
+    judged = [name for name in claimed if name in run.constants]
+    if judged != claimed:
+        unknown = ", ".join(name for name in claimed if name not in run.constants)
         return undecided("invariant", declared, f"the battery has no formula for {unknown}")
-    worst = max(known, key=lambda name: run.constants[name].largest)
+    worst = max(judged, key=lambda name: run.constants[name].largest)
     return _constant("invariant", "kept", run, run.constants[worst])._replace(declared=declared)
 
 
@@ -311,7 +311,7 @@ def _explicit(method: Integrator, run: long.LongRun) -> Finding:
     if method.knob is None:
         return Finding("explicit", declared, "", "inapplicable", "it makes no steps")
     if run.iterations > 0.0:
-        verdict = _agrees(declared=method.explicit, found=False)
+        verdict = _agrees(declared=method.explicit, measured=False)
         why = f"it reports {run.iterations:.2f} iterations a step"
         return Finding("explicit", declared, "no", verdict, why, run.iterations, 0.0)
     if run.steady_cost:
@@ -319,7 +319,7 @@ def _explicit(method: Integrator, run: long.LongRun) -> Finding:
         if method.explicit is False:
             why = f"it reports no iterations and {cost}; so does a method that solves linear equations"
             return Finding("explicit", declared, "", "undecided", why, 0.0, 0.0)
-        verdict = _agrees(declared=method.explicit, found=True)
+        verdict = _agrees(declared=method.explicit, measured=True)
         return Finding("explicit", declared, "yes", verdict, f"it reports no iterations and {cost}", 0.0, 0.0)
     return undecided("explicit", declared, "it reports no iterations, but its steps do not all cost the same")
 
@@ -338,20 +338,20 @@ def _pole_claim(method: Integrator) -> str:
 
 
 def _pole(method: Integrator) -> Finding:
-    declared, found = _pole_claim(method), long.passages(method)
-    said = "; ".join(
+    declared, passed = _pole_claim(method), long.passages(method)
+    sentence = "; ".join(
         f"{one.chart}: passes, off by {one.error:.0e} and {one.finer:.0e} with finer steps" if one.passes
         else f"{one.chart}: ends there ({one.outcome})" if one.outcome != "ok"
         else f"{one.chart}: comes out wrong by {one.error:.0e}, {one.finer:.0e} with finer steps"
-        for one in found
+        for one in passed
     )  # fmt: skip
-    judged = [one for one in found if one.chart != "angles"] or found
+    judged = [one for one in passed if one.chart != "angles"] or passed
     words = ["passes" if one.passes else "wrong" if one.outcome == "ok" else "ends there" for one in judged]
     measured = ", ".join(dict.fromkeys(words))
     worst = max(one.finer for one in judged)
     if not declared:
-        return Finding("pole", declared, measured, "measured", said, worst, long.POLE_RIGHT)
+        return Finding("pole", declared, measured, "measured", sentence, worst, long.POLE_RIGHT)
     if any(one.outcome not in ("ok", "left_chart", "not_finite") for one in judged):
-        return Finding("pole", declared, measured, "undecided", said, worst, long.POLE_RIGHT)
+        return Finding("pole", declared, measured, "undecided", sentence, worst, long.POLE_RIGHT)
     verdict = "confirmed" if all(one.passes for one in judged) else "refuted"
-    return Finding("pole", declared, measured, verdict, said, worst, long.POLE_RIGHT)
+    return Finding("pole", declared, measured, verdict, sentence, worst, long.POLE_RIGHT)

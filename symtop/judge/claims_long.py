@@ -40,7 +40,7 @@ PILOT = 400  # steps of the run that is sampled at every step
 EVALUATIONS = {"compiled": 2e8, "python": 4e4}
 TOLERANCE = 1e-6  # of an adaptive method without a default of its own
 KEPT = 1e-11
-ROUNDING = 2e-13  # a change in one step that may be rounding, where |p| is small beside what makes it up
+ROUNDING_OF_A_STEP = 2e-13  # a change in one step that may be rounding, where |p| is small beside what makes it up
 BOUNDED = 0.25  # an exponent that exceeds it with its whole interval is growth
 SURE = 8.0
 VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
@@ -60,13 +60,13 @@ class Constant(NamedTuple):
     @property
     def kind(self) -> str:
         """kept, bounded, random walk, drift, or just growing; unknown without a size or an exponent to judge it by."""
-        found = behaviour(self.largest, self.exponent, self.interval, self.floor)
-        if found == "kept":
-            return found
+        word = behaviour(self.largest, self.exponent, self.interval, self.floor)
+        if word == "kept":
+            return word
         if not (math.isfinite(self.largest) and math.isfinite(self.exponent)):
             return "unknown"
         drifts = abs(self.certain) > SURE and abs(self.rise) > VISIBLE * self.largest
-        return "drift" if drifts else found
+        return "drift" if drifts else word
 
     @property
     def grows(self) -> bool | None:
@@ -90,54 +90,54 @@ class LongRun(NamedTuple):
     steady_cost: bool  # every run of the same number of steps cost the same, at two step sizes
 
 
-def _run(method: Integrator, where: Scene, steps: float, step: float, samples: int) -> xr.Dataset:
+def _run(method: Integrator, scene: Scene, steps: float, step: float, samples: int) -> xr.Dataset:
     """A run for `steps` times `step`: of that many steps, or for that time at the tolerance."""
     if method.knob == "step_size":
         return simulate(
-            where, method, step_size=step, horizon=round(steps) * step, samples=samples, observe="axis", guard=False
+            scene, method, step_size=step, horizon=round(steps) * step, samples=samples, observe="axis", guard=False
         )
     given = None if method.knob is None or method.default_tolerance is not None else TOLERANCE
-    return simulate(where, method, tolerance=given, horizon=steps * step, samples=samples, observe="axis", guard=False)
+    return simulate(scene, method, tolerance=given, horizon=steps * step, samples=samples, observe="axis", guard=False)
 
 
-def long_run(method: Integrator, where: Scene, chart: str, *, quick: bool = False) -> LongRun:
+def long_run(method: Integrator, scene: Scene, chart: str, *, quick: bool = False) -> LongRun:
     """A million steps of a compiled method in one of its charts, fewer where that would take minutes."""
     method = method.only(chart)
     for finer in FINER:  # a motion that passes close to a pole needs shorter steps
-        step = where.time_scale() / (STEPS_A_NUTATION * finer)
-        pilot = _run(method, where, PILOT, step, PILOT + 1)
+        step = scene.time_scale() / (STEPS_A_NUTATION * finer)
+        pilot = _run(method, scene, PILOT, step, PILOT + 1)
         cost = max(float(pilot.attrs["force_evaluations"]) / PILOT, 1.0)
         most = QUICK_STEPS if quick else STEPS
         steps = min(most, EVALUATIONS[method.tier] / cost) * method.speed
         if method.knob is None:
             steps = PILOT  # a formula has no steps: nothing adds up
-        run = _run(method, where, max(steps, PILOT), step, SAMPLES)
+        run = _run(method, scene, max(steps, PILOT), step, SAMPLES)
         if run.attrs["outcome"] == "ok" or method.knob != "step_size":
             break
-    other = _run(method, where, PILOT, 0.21 * step, PILOT + 1)
+    other = _run(method, scene, PILOT, 0.21 * step, PILOT + 1)
     made = max(int(run.attrs["steps"]), 1)
-    found, small = constants(where, run), constants(where, pilot)
+    changes, small = constants(scene, run), constants(scene, pilot)
     return LongRun(
-        {name: _judged(run["time"].values, values, small[name], made) for name, values in found.items()},
+        {name: _judged(run["time"].values, values, small[name], made) for name, values in changes.items()},
         str(run.attrs["outcome"]),
         str(run.attrs["outcome_message"]),
         str(run.attrs["chart"]),
         int(run.attrs["steps"]),
-        float(run.attrs["reached_time"]) / where.time_scale(),
+        float(run.attrs["reached_time"]) / scene.time_scale(),
         float(run.attrs["force_evaluations"]) / made,
         float(run.attrs["newton_iterations"]) / made,
         len({data.attrs["force_evaluations"] / max(data.attrs["steps"], 1) for data in (pilot, other)}) == 1,
     )
 
 
-def constants(where: Scene, run: xr.Dataset) -> dict[str, Array]:
+def constants(scene: Scene, run: xr.Dataset) -> dict[str, Array]:
     """Relative change of every constant that the run's chart has, at its samples."""
-    found = residuals(where, run)
+    changes = residuals(scene, run)
     if run.attrs["chart"] != "angles":
-        found["axis_length"] = np.linalg.norm(run["axis"].values, axis=1) - 1.0
+        changes["axis_length"] = np.linalg.norm(run["axis"].values, axis=1) - 1.0
     if run.attrs["chart"] != "angles" and math.isfinite(run.attrs["step_size"]):
-        found["cayley_energy"] = _cayley_residual(where.top, run)
-    return found
+        changes["cayley_energy"] = _cayley_residual(scene.top, run)
+    return changes
 
 
 def _cayley_residual(top: SymmetricTop, run: xr.Dataset) -> Array:
@@ -165,7 +165,7 @@ def _judged(time: Array, values: Array, every_step: Array, steps: int) -> Consta
     power, line = growth(time, values), trend(time, values)
     sure = abs(line.slope) / line.interval if line.interval > 0.0 else 0.0
     a_step = float(jumps.max()) if jumps.size else math.nan
-    floor = max(KEPT, a_step * math.sqrt(steps)) if a_step <= ROUNDING else KEPT
+    floor = max(KEPT, a_step * math.sqrt(steps)) if a_step <= ROUNDING_OF_A_STEP else KEPT
     largest = float(size.max()) if size.size else math.nan
     return Constant(largest, a_step, power.slope, power.interval, floor, line.rise, sure)
 
@@ -198,7 +198,7 @@ class Passage(NamedTuple):
 
 def passages(method: Integrator) -> list[Passage]:
     """What happens at a pole, in every chart of the method."""
-    found = []
+    rows = []
     for chart in method.charts():
         only = method.only(chart)
         ends, errors_there = [], []
@@ -214,5 +214,5 @@ def passages(method: Integrator) -> list[Passage]:
             ends.append(str(run.attrs["outcome"]))
             miss = errors_against(POLE, run, truth)["axis"].values
             errors_there.append(float(np.nanmax(miss)) if np.isfinite(miss).any() else math.nan)
-        found.append(Passage(chart, next((end for end in ends if end != "ok"), "ok"), *errors_there))
-    return found
+        rows.append(Passage(chart, next((end for end in ends if end != "ok"), "ok"), *errors_there))
+    return rows

@@ -22,7 +22,8 @@ from symtop.measure.accuracy import error_table, step_ladder, tolerance_ladder
 from symtop.measure.order import Fit, order
 from symtop.methods.registry import Integrator
 from symtop.model import charts
-from symtop.model.scenes import Scene, closed_form, scene
+from symtop.model.scenes import Scene, closed_form
+from symtop.model.scenes import scene as find_scene
 from symtop.run.simulation import simulate
 
 Array = NDArray[np.float64]
@@ -34,7 +35,7 @@ DENSE, DECADES = 10, 2.0
 FURTHER = 0.5  # an error that does not fall must not ask for a million times the steps
 SHARE = 0.37  # of a nutation: length of the runs that are extrapolated to h = 0
 STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
-ROUNDING = 1e-11  # a limit as close as this is the true motion
+TRUE_LIMIT = 1e-11  # a limit as close as this is the true motion
 
 
 class Order(NamedTuple):
@@ -53,58 +54,58 @@ def observable(method: Integrator) -> str:
     return "attitude" if set(method.solvers) & {"angles", "attitude"} else "axis"
 
 
-def measured_order(method: Integrator, where: Scene, *, quick: bool = False) -> Order:
+def measured_order(method: Integrator, scene: Scene, *, quick: bool = False) -> Order:
     """Slopes of the errors of attitude, theta and energy, where they can be judged."""
     if method.knob is None:
         raise SymtopError(f"{method.name} has neither a step nor a tolerance")
-    found = _slopes(method, where, NUTATIONS, quick)
+    fitted = _slopes(method, scene, NUTATIONS, quick)
     if quick or method.knob != "step_size" or method.order is None or method.tier == "python":
-        return found
+        return fitted
     for nutations in LONGER:
-        if math.isfinite(found.fits[found.observed].slope):
+        if math.isfinite(fitted.fits[fitted.observed].slope):
             break
-        again = _slopes(method, scene(FALLBACK), nutations, quick)
-        found = again if math.isfinite(again.fits[again.observed].slope) else found
-    return found
+        again = _slopes(method, find_scene(FALLBACK), nutations, quick)
+        fitted = again if math.isfinite(again.fits[again.observed].slope) else fitted
+    return fitted
 
 
-def _slopes(method: Integrator, where: Scene, nutations: float, quick: bool) -> Order:
-    horizon = nutations * where.time_scale()
+def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool) -> Order:
+    horizon = nutations * scene.time_scale()
     if method.knob == "step_size":
-        settings = step_ladder(method, where, horizon, 11 if quick else 13, FINEST[method.tier])
+        settings = step_ladder(method, scene, horizon, 11 if quick else 13, FINEST[method.tier])
     else:
         settings = tolerance_ladder(method, 9 if quick else 13)
     main = observable(method)
-    table = error_table(where, method, settings, horizon, observe=main)
-    found = _fitted(method, where, main, horizon, table)
-    if math.isfinite(found.fits[main].slope) or method.knob != "step_size":
-        return found
-    dense = _asymptotic(method, found)
+    table = error_table(scene, method, settings, horizon, observe=main)
+    fitted = _fitted(method, scene, main, horizon, table)
+    if math.isfinite(fitted.fits[main].slope) or method.knob != "step_size":
+        return fitted
+    dense = _asymptotic(method, fitted)
     if not dense:
-        return found
-    table = xr.concat([table, error_table(where, method, dense, horizon, observe=main)], "setting")
-    return _fitted(method, where, main, horizon, table)
+        return fitted
+    table = xr.concat([table, error_table(scene, method, dense, horizon, observe=main)], "setting")
+    return _fitted(method, scene, main, horizon, table)
 
 
-def _fitted(method: Integrator, where: Scene, main: str, horizon: float, table: xr.Dataset) -> Order:
+def _fitted(method: Integrator, scene: Scene, main: str, horizon: float, table: xr.Dataset) -> Order:
     step = table["step_size"].values if method.knob == "step_size" else horizon / table["steps"].values
-    omega = 2.0 * math.pi / where.nutation_period
+    omega = 2.0 * math.pi / scene.nutation_period
     fits = {
         name: order(step, table[name].values, table[f"{name}_bound"].values, omega, method.order)
         for name in (main, "theta", "energy")
     }
-    return Order(where.name, step, table[main].values, table[f"{main}_bound"].values, fits, main)
+    return Order(scene.name, step, table[main].values, table[f"{main}_bound"].values, fits, main)
 
 
-def _asymptotic(method: Integrator, found: Order) -> list[float]:
+def _asymptotic(method: Integrator, fitted: Order) -> list[float]:
     """Steps from where rounding ends to an error `DECADES` above it."""
-    good = np.flatnonzero(np.isfinite(found.error) & (found.error > 50.0 * found.bound))
+    good = np.flatnonzero(np.isfinite(fitted.error) & (fitted.error > 50.0 * fitted.bound))
     if good.size == 0:
         return []
-    finest = good[np.argmin(found.step_size[good])]
+    finest = good[np.argmin(fitted.step_size[good])]
     power = method.order or 2
-    further = (20.0 * found.bound[finest] / found.error[finest]) ** (1.0 / power)
-    first = float(found.step_size[finest]) * max(float(further), FURTHER)
+    further = (20.0 * fitted.bound[finest] / fitted.error[finest]) ** (1.0 / power)
+    first = float(fitted.step_size[finest]) * max(float(further), FURTHER)
     return [first * 10.0 ** (DECADES / power * k / (DENSE - 1)) for k in range(DENSE)]
 
 
@@ -115,10 +116,10 @@ class Limit(NamedTuple):
     doubt: float  # of the extrapolation
 
 
-def limit(method: Integrator, where: Scene, power: int) -> Limit:
+def limit(method: Integrator, scene: Scene, power: int) -> Limit:
     """How far from the true motion a run ends in the limit of small steps, for a method whose order is `power`."""
     fewest = STEPS.get(power, 200) // (1 if method.tier == "compiled" else 20)
-    ends = [_signed_error(method, where, SHARE * where.time_scale(), fewest * 2**k) for k in range(3)]
+    ends = [_signed_error(method, scene, SHARE * scene.time_scale(), fewest * 2**k) for k in range(3)]
     once = [_without(power, ends[k], ends[k + 1]) for k in range(2)]
     size = [float(np.max(np.abs(value))) for value in (ends[2], once[1], _without(power + 1, once[0], once[1]))]
     return Limit(min(size[0], size[2]), abs(size[2] - size[1]))
@@ -129,24 +130,24 @@ def _without(power: int, coarse: Array, fine: Array) -> Array:
     return fine + (fine - coarse) / (2.0**power - 1.0)
 
 
-def _signed_error(method: Integrator, where: Scene, horizon: float, steps: int) -> Array:
+def _signed_error(method: Integrator, scene: Scene, horizon: float, steps: int) -> Array:
     run = simulate(
-        where, method, step_size=horizon / steps, horizon=horizon, samples=2, observe=observable(method), guard=False
+        scene, method, step_size=horizon / steps, horizon=horizon, samples=2, observe=observable(method), guard=False
     )
     if run.attrs["outcome"] != "ok":
         raise SymtopError(f"a run of {steps} steps over {horizon:.3g} {run.attrs['outcome_message']}")
-    last, true = run.isel(time=-1), closed_form(where)(np.array([horizon]))
+    last, true = run.isel(time=-1), closed_form(scene)(np.array([horizon]))
     axis = charts.axis_from_angles(true.theta[0], true.phi[0])
-    slip = (float(last["p_theta"]) - where.top.I1 * float(true.theta_dot[0])) / where.momentum_scale
+    slip = (float(last["p_theta"]) - scene.top.I1 * float(true.theta_dot[0])) / scene.momentum_scale
     turn = [float(last["psi"]) - float(true.psi[0])] if "psi" in run else []
     return np.array([*(last["axis"].values - axis), slip, *turn])
 
 
-def settings_shown(found: Order, count: int) -> Sequence[Array]:
+def settings_shown(fitted: Order, count: int) -> Sequence[Array]:
     """Steps, errors and the mask of the fit, in order of the step and padded to one length, for a dataset."""
-    rank = np.argsort(found.step_size)[:count]
+    rank = np.argsort(fitted.step_size)[:count]
     padded = np.full((3, count), math.nan)
-    used = found.fits[found.observed].used
-    for row, values in zip(padded, (found.step_size, found.error, used.astype(float)), strict=True):
+    used = fitted.fits[fitted.observed].used
+    for row, values in zip(padded, (fitted.step_size, fitted.error, used.astype(float)), strict=True):
         row[: rank.size] = values[rank]
     return list(padded)

@@ -37,8 +37,8 @@ class Finding(NamedTuple):
 
     def sentence(self, name: str) -> str:
         """The verdict in words."""
-        said = f"claims {self.declared}" if self.declared else "claims nothing"
-        return f"{name}, {spoken(self.claim)}: {said}; {self.verdict}: {self.why}."
+        claimed = f"claims {self.declared}" if self.declared else "claims nothing"
+        return f"{name}, {spoken(self.claim)}: {claimed}; {self.verdict}: {self.why}."
 
     def plain(self) -> dict[str, str | float | None]:
         """The finding as JSON can hold it: no number is null."""
@@ -64,16 +64,16 @@ class Ledger:
     traces: dict[str, np.ndarray]  # errors by step, defects by differencing width, length of the long run
 
     def __getitem__(self, claim: str) -> Finding:
-        return next(found for found in self.findings if found.claim == claim)
+        return next(finding for finding in self.findings if finding.claim == claim)
 
     def sentences(self) -> list[str]:
         """One sentence a verdict."""
-        return [found.sentence(self.integrator) for found in self.findings]
+        return [finding.sentence(self.integrator) for finding in self.findings]
 
     def dataset(self) -> xr.Dataset:
         """Dimensions ``claim``, ``setting`` (steps of the order) and ``width`` (of the differencing)."""
         columns = {
-            name: ("claim", [getattr(found, name) for found in self.findings])
+            name: ("claim", [getattr(finding, name) for finding in self.findings])
             for name in ("declared", "measured", "verdict", "why", "value", "resolution")
         }
         axes = {"step_size": "setting", "error": "setting", "fitted": "setting"}

@@ -91,17 +91,17 @@ def error_row(
     knob = knobs(method, setting)
     run = simulate(scene, method, **knob, horizon=horizon, samples=SAMPLES, observe=observe, guard=False)
     truth = reference(scene, run["time"].values, precision="closed-form")
-    found = errors_against(scene, run, truth)
+    shown = errors_against(scene, run, truth)
     row: dict[str, float | str] = {name: run.attrs[name] for name in _COUNTS}
     failed = run.attrs["outcome"] != "ok"
     for name in QUANTITIES:
-        values = found[name].values if name in found else np.array([math.nan])
+        values = shown[name].values if name in shown else np.array([math.nan])
         row[name] = math.nan if failed else float(np.max(values))
         row[f"{name}_end"] = math.nan if failed else float(values[-1])
         row[f"{name}_bound"] = judge_limit(scene, truth, name)
     if not phases:
         return row
-    if not failed and "attitude" not in found:
+    if not failed and "attitude" not in shown:
         wide = simulate(scene, method, **knob, horizon=horizon, samples=SAMPLES, observe="attitude", guard=False)
         values = attitude_error(wide, truth)
         row["attitude"], row["attitude_end"] = float(np.max(values)), float(values[-1])

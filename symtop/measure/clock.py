@@ -1,4 +1,4 @@
-"""The clock of a nutation: how far a run is ahead of the truth or behind it, whatever else is wrong with it.
+"""The phase of the nutation: how far a run is ahead of the truth or behind it.
 
 The true (u, u'), u = cos(theta), runs round a closed curve once a nutation. A state of a run, on that curve or near it,
 has the phase of the point of the curve that lies in its direction from the middle:
@@ -20,22 +20,22 @@ NODES = 4096
 NARROWEST = 1e-6  # rad: a nutation narrower than this has no phase to speak of
 
 
-def has_phase(where: Scene) -> bool:
-    """Does this motion nutate, and in a finite time?"""
-    highest, lowest = closed_form(where).theta_range
-    return lowest - highest > NARROWEST and math.isfinite(where.nutation_period)
+def has_phase(scene: Scene) -> bool:
+    """Does this motion nutate, with a finite period?"""
+    highest, lowest = closed_form(scene).theta_range
+    return lowest - highest > NARROWEST and math.isfinite(scene.nutation_period)
 
 
 class Clock:
     """The phase of the nutation of a scene as a function of (theta, theta')."""
 
-    def __init__(self, where: Scene) -> None:
+    def __init__(self, scene: Scene) -> None:
         from scipy.interpolate import CubicSpline  # 0.3 s to import
 
-        self.period = where.nutation_period
-        exact = closed_form(where)
-        if not has_phase(where):
-            raise SymtopError(f"scene {where.name} has no nutation whose phase could be measured")
+        self.period = scene.nutation_period
+        exact = closed_form(scene)
+        if not has_phase(scene):
+            raise SymtopError(f"scene {scene.name} has no nutation whose phase could be measured")
         times = self.period * np.arange(NODES + 1) / NODES
         motion = exact(times)
         u, v = np.cos(motion.theta), -np.sin(motion.theta) * motion.theta_dot
@@ -57,8 +57,8 @@ class Clock:
         """Phase of states less that of the truth at the same times (samples,), rad, unwrapped; NaN stays."""
         turn = self._sign * self._angle(np.cos(theta), -np.sin(theta) * theta_dot)
         phase = (turn - self._first) + self._lag(turn)
-        found = phase - 2.0 * math.pi * np.mod(time / self.period, 1.0)
-        good = np.isfinite(found)
-        start = math.remainder(float(found[good][0]), 2.0 * math.pi) - float(found[good][0]) if good.any() else 0.0
-        found[good] = np.unwrap(found[good]) + start
-        return np.asarray(found)
+        ahead = phase - 2.0 * math.pi * np.mod(time / self.period, 1.0)
+        good = np.isfinite(ahead)
+        start = math.remainder(float(ahead[good][0]), 2.0 * math.pi) - float(ahead[good][0]) if good.any() else 0.0
+        ahead[good] = np.unwrap(ahead[good]) + start
+        return np.asarray(ahead)

@@ -52,24 +52,24 @@ def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
     """
     run = simulate(scene, method, observe="nutation", guard=False, **settings)
     time = run["time"].values
-    found: dict[str, Any] = {"sample_time": ("sample", time), "outcome": run.attrs["outcome"]}
-    found["steps"] = run.attrs["steps"]
+    columns: dict[str, Any] = {"sample_time": ("sample", time), "outcome": run.attrs["outcome"]}
+    columns["steps"] = run.attrs["steps"]
     period = scene.nutation_period
     late = time > (SETTLED * period if math.isfinite(period) else 0.0)
     for name, values in residuals(scene, run).items():
-        line, power = trend(time, values), growth(time, values)
-        found[f"{name}_residual"] = ("sample", values)
-        found[f"{name}_largest"] = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else np.nan
-        found[f"{name}_slope"], found[f"{name}_interval"], found[f"{name}_rise"] = line
-        found[f"{name}_exponent"], found[f"{name}_exponent_interval"] = power.slope, power.interval
-        found |= _laws(name, law(power), time[late], values[late])
+        drifting, power = trend(time, values), growth(time, values)
+        columns[f"{name}_residual"] = ("sample", values)
+        columns[f"{name}_largest"] = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else np.nan
+        columns[f"{name}_slope"], columns[f"{name}_interval"], columns[f"{name}_rise"] = drifting
+        columns[f"{name}_exponent"], columns[f"{name}_exponent_interval"] = power.slope, power.interval
+        columns |= _laws(name, law(power), time[late], values[late])
     phase = np.full(time.size, np.nan)
     if has_phase(scene):
         phase = Clock(scene).error(time, run["theta"].values, run["p_theta"].values / scene.top.I1)
     power = growth(time, phase, 1.0)
-    found["phase_largest"] = float(np.nanmax(np.abs(phase))) if np.isfinite(phase).any() else np.nan
-    found["phase_exponent"], found["phase_exponent_interval"] = power.slope, power.interval
-    return xr.Dataset(found | _laws("phase", law(power), time[late], phase[late]))
+    columns["phase_largest"] = float(np.nanmax(np.abs(phase))) if np.isfinite(phase).any() else np.nan
+    columns["phase_exponent"], columns["phase_exponent_interval"] = power.slope, power.interval
+    return xr.Dataset(columns | _laws("phase", law(power), time[late], phase[late]))
 
 
 def _laws(name: str, named: str, time: np.ndarray, values: np.ndarray) -> dict[str, Any]:

@@ -134,16 +134,16 @@ def change_point(time: ArrayLike, size: ArrayLike, least: int = 5) -> Change | N
 
     def broken(place: float) -> tuple[float, np.ndarray]:
         columns = np.stack([np.ones(n), u, np.maximum(u - place, 0.0)], axis=1)
-        found = np.linalg.lstsq(columns, v, rcond=None)[0]
-        return float(np.sum((v - columns @ found) ** 2)), found
+        coefficients = np.linalg.lstsq(columns, v, rcond=None)[0]
+        return float(np.sum((v - columns @ coefficients) ** 2)), coefficients
 
     straight = float(np.polyfit(u, v, 1, full=True)[1][0]) if n > 2 else 0.0
     places = u[least - 1 : n - least + 1]
-    rest, place, found = min((*broken(place)[:1], place, broken(place)[1]) for place in map(float, places))
+    rest, place, coefficients = min((*broken(place)[:1], place, broken(place)[1]) for place in map(float, places))
     gain = n * math.log(max(straight, TINY) / max(rest, TINY)) - 2.0 * math.log(n)
-    if gain <= 0.0 or rest > 0.5 * straight or abs(found[2]) < 0.25:
+    if gain <= 0.0 or rest > 0.5 * straight or abs(coefficients[2]) < 0.25:
         return None
-    return Change(math.exp(place), float(found[1]), float(found[1] + found[2]))
+    return Change(math.exp(place), float(coefficients[1]), float(coefficients[1] + coefficients[2]))
 
 
 class Horizon(NamedTuple):

@@ -14,7 +14,6 @@ from symtop.measure.timing import bare_run, timings
 from symtop.measure.work import coarsest_step
 from symtop.methods.registry import Integrator, integrators
 from symtop.model.scenes import Scene
-from symtop.run.simulation import choose_chart
 
 SHORT = 12.37  # nutations of a trial run
 AIM = 0.5  # of the target: what the secant steers for
@@ -31,7 +30,7 @@ class Missed(NamedTuple):
     error: float = math.inf
 
 
-ROUNDING = "Stopped by rounding or by what the method's settings allow"
+STOPPED = "Stopped by rounding or by what the method's settings allow"
 BUDGET = "Not within the work that a run may take"
 FAILED = "No run ended well"
 TRIED = f"Not within {TRIES} runs"
@@ -108,35 +107,35 @@ def search(
     best, last, failing = None, None, math.inf  # failing: the finest setting known to miss the target
     why, smallest = TRIED, math.inf
     for _ in range(TRIES):
-        found = attempt(scene, method, setting, horizon, quantity)
-        smallest = min(smallest, found.error)
-        if found.error <= accuracy:
-            best = found if best is None or setting > best.setting else best
-            if found.error >= LEAST * accuracy or setting >= most:
+        met = attempt(scene, method, setting, horizon, quantity)
+        smallest = min(smallest, met.error)
+        if met.error <= accuracy:
+            best = met if best is None or setting > best.setting else best
+            if met.error >= LEAST * accuracy or setting >= most:
                 break
         else:
             failing = min(failing, setting)
-            if last is not None and last.setting > setting and last.error < FLAT * found.error:
-                why = ROUNDING  # a finer setting gains nothing
+            if last is not None and last.setting > setting and last.error < FLAT * met.error:
+                why = STOPPED  # a finer setting gains nothing
                 break
-        power = _slope(last, found, power, float(method.order or 12))
-        last, setting = found, min(max(setting * _factor(found.error, accuracy, power, step=step), least), most)
+        power = _slope(last, met, power, float(method.order or 12))
+        last, setting = met, min(max(setting * _factor(met.error, accuracy, power, step=step), least), most)
         if best is not None and setting >= failing:
             setting = math.sqrt(best.setting * failing)
             if failing < 1.15 * best.setting:
                 break
-        work = found.evaluations * (last.setting / setting if step else 1.0)
+        work = met.evaluations * (last.setting / setting if step else 1.0)
         if setting == last.setting or work > patience:
-            why = BUDGET if work > patience else ROUNDING
+            why = BUDGET if work > patience else STOPPED
             break
     return best or Missed(FAILED if math.isinf(smallest) and why != BUDGET else why, smallest)
 
 
-def _slope(last: Met | None, found: Met, power: float, order: float) -> float:
+def _slope(last: Met | None, met: Met, power: float, order: float) -> float:
     """The local order between two runs, where they show one."""
-    if last is None or last.setting == found.setting or not 0.0 < found.error < math.inf or not last.error < math.inf:
+    if last is None or last.setting == met.setting or not 0.0 < met.error < math.inf or not last.error < math.inf:
         return power
-    seen = math.log(max(last.error, 1e-300) / found.error) / math.log(last.setting / found.setting)
+    seen = math.log(max(last.error, 1e-300) / met.error) / math.log(last.setting / met.setting)
     return float(min(max(seen, 0.5), 2.0 * order))
 
 
@@ -148,8 +147,8 @@ def _factor(error: float, accuracy: float, power: float, *, step: bool) -> float
     return float(min(max(factor, 0.02 if step else 1e-5), 8.0 if step else 1e4))
 
 
-def seconds(scene: Scene, found: Met, quantity: str, horizon: float) -> float:
+def seconds(scene: Scene, met: Met, quantity: str, horizon: float) -> float:
     """Wall time of a bare run to a horizon with a setting: measured, or scaled from the run it was found by."""
-    chart = choose_chart(found.integrator, observed(quantity))
-    run = timings([bare_run(scene, found.integrator, chart, found.setting, found.horizon)], batches=3, batch=0.004)
-    return float(run[0].best) * horizon / found.horizon
+    chart = met.integrator.chart_for(observed(quantity))
+    run = timings([bare_run(scene, met.integrator, chart, met.setting, met.horizon)], batches=3, batch=0.004)
+    return float(run[0].best) * horizon / met.horizon

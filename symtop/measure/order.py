@@ -1,4 +1,4 @@
-"""The order of a method: the slope of log error on log step, where it is honest to fit one.
+"""The order of a method: the slope of log error on log step, where a line can be fitted.
 
 A point counts if its error is above ten times the reference's own bound, below 1e-2, still above the run's round-off,
 and h omega < 0.3 for a method of order 2 (in proportion more for higher orders, whose steps have more stages). Then the

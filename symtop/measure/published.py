@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.model.scenes import closed_form, scene
+from symtop.model.scenes import closed_form
+from symtop.model.scenes import scene as find_scene
 from symtop.run.reference import reference
 
 REMARK = "an asymmetric free body: tests the solver beside us, not symtop"
@@ -40,8 +41,8 @@ def published_values() -> list[Published]:
 
 
 def _simo_wong() -> Published:
-    where = scene("simo-wong")
-    energy = where.top.energy(where.start)
+    scene = find_scene("simo-wong")
+    energy = scene.top.energy(scene.start)
     source = "Simo & Wong 1991; Krysl 2005"
     return Published(source, "energy of the fast top", 1269.975, energy, 1e-3, "printed", tests=START)
 
@@ -59,11 +60,11 @@ def _bruls_cardona_arnold() -> list[Published]:
 
 
 def _woodhouse() -> list[Published]:
-    where, rows = scene("separatrix"), []
-    g = math.sqrt(where.top.mgl / where.top.I1)
+    scene, rows = find_scene("separatrix"), []
+    g = math.sqrt(scene.top.mgl / scene.top.I1)
     for t in (1.0, 5.0):
         exact = 1.0 / (1.0 + 1.0 / math.cosh(g * t))
-        ours = math.cos(float(closed_form(where)(np.array([t])).theta[0]))
+        ours = math.cos(float(closed_form(scene)(np.array([t])).theta[0]))
         rows.append(
             Published(
                 "Woodhouse, problem 5.3", f"cos theta on the separatrix at t = {t:g}", exact, ours, 1e-13, "formula"
@@ -73,8 +74,8 @@ def _woodhouse() -> list[Published]:
 
 
 def _kinon_betsch() -> list[Published]:
-    where = scene("kinon-betsch")
-    motion = closed_form(where)(np.linspace(0.0, where.horizon, 301))
+    scene = find_scene("kinon-betsch")
+    motion = closed_form(scene)(np.linspace(0.0, scene.horizon, 301))
     return [
         Published("Kinon & Betsch", "largest tilt (deg)", 60.0, math.degrees(motion.theta.max()), 1e-10, "consistency"),
         Published("Kinon & Betsch", "precession rate", 10.0, float(motion.phi_dot.mean()), 1e-10, "consistency"),
@@ -82,11 +83,11 @@ def _kinon_betsch() -> list[Published]:
 
 
 def _hairer() -> list[Published]:
-    where = scene("hairer-lubich-wanner")
-    momenta = where.top.momenta(where.start)
+    scene = find_scene("hairer-lubich-wanner")
+    momenta = scene.top.momenta(scene.start)
     source = "Hairer, Lubich & Wanner, figure VII.5.3"
     return [
-        Published(source, "energy", 1.72, where.top.energy(where.start), 1e-12, "consistency", tests=START),
+        Published(source, "energy", 1.72, scene.top.energy(scene.start), 1e-12, "consistency", tests=START),
         Published(source, "vertical angular momentum", 1.04, momenta.p_phi, 1e-12, "consistency", tests=START),
     ]
 

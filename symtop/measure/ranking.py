@@ -69,21 +69,21 @@ def cheapest(
 
     Each takes part with its run of least work if that was raced, else with that of least cost.
     """
-    known = cell[list({quantity, cost, "outcome", "force_evaluations", "seconds_race"} & set(cell.data_vars))]
-    table = known.transpose("integrator", "setting")
+    needed = cell[list({quantity, cost, "outcome", "force_evaluations", "seconds_race"} & set(cell.data_vars))]
+    table = needed.transpose("integrator", "setting")
     price = table[cost].values
     good = meeting(table, target, quantity) & (table["outcome"].values == "ok") & np.isfinite(price)
     entered, least = least_work(table, target, quantity), np.argmin(np.where(good, price, np.inf), axis=-1)
     tiers = cell["tier"].transpose("integrator", ...).values.reshape(price.shape[0], -1)[:, 0]
-    found = []
+    places = []
     for row, name in enumerate(cell["integrator"].values):
         k = int(entered[row])
         if k < 0 or not good[row].any() or tier not in (None, str(tiers[row])):
             continue
         if cost != "seconds" or not (good[row, k] and table["seconds_race"].values[row, k] > 0.0):
             k = int(least[row])
-        found.append(Place(float(price[row, k]), str(name), str(tiers[row]), k, float(table[quantity].values[row, k])))
-    return sorted(found)
+        places.append(Place(float(price[row, k]), str(name), str(tiers[row]), k, float(table[quantity].values[row, k])))
+    return sorted(places)
 
 
 def _worst_miss(cell: xr.Dataset) -> float:
@@ -216,9 +216,9 @@ def crossing(
     """
     curves = []
     for name in (first, second):
-        own = cell.sel(integrator=name)
-        x, y = own[cost].values, own[quantity].values
-        good = np.isfinite(x) & np.isfinite(y) & (own["outcome"].values == "ok")
+        runs = cell.sel(integrator=name)
+        x, y = runs[cost].values, runs[quantity].values
+        good = np.isfinite(x) & np.isfinite(y) & (runs["outcome"].values == "ok")
         order = np.argsort(x[good])
         x, y = x[good][order], np.minimum.accumulate(np.maximum(y[good][order], 1e-17))
         if x.size < 2:
@@ -237,9 +237,9 @@ def crossing(
     return Crossing(name, first, second, float(ahead.mean()), *ends, float(won[-1]), error, gain)
 
 
-def growth_at_equal_settings(own: xr.Dataset, quantity: str, far: int = -1) -> float:
+def growth_at_equal_settings(runs: xr.Dataset, quantity: str, far: int = -1) -> float:
     """Median ratio of an error at a long horizon to that at the first one, over settings that were run at both."""
-    near, later = own.isel(horizon=0), own.isel(horizon=far)
+    near, later = runs.isel(horizon=0), runs.isel(horizon=far)
     ratios = [
         later[quantity].values[j] / near[quantity].values[k]
         for k, setting in enumerate(near["setting_value"].values)

@@ -242,13 +242,13 @@ def _largest(matrix: Any) -> float:
 def return_miss(step: StepMap, start: Angles) -> float:
     """Distance from the start after a step forth and back; a solver that takes no negative step runs reversed."""
     before = step.at(start)
-    there = step.restart(step.image(step.point(start)))
+    arrived = step.restart(step.image(step.point(start)))
     if step.method.knob == "step_size":
         try:
-            return step.gap(step.shown(step.run(there, -step.h)), before)
+            return step.gap(step.shown(step.run(arrived, -step.h)), before)
         except SymtopError:
             pass
-    back = step.restart(step.shown(step.run(reversed_rates(there), step.h)))
+    back = step.restart(step.shown(step.run(reversed_rates(arrived), step.h)))
     return step.gap(step.at(reversed_rates(back)), before)
 
 

@@ -1,10 +1,10 @@
-"""Time of a function call, kept honest.
+"""The time that a function call takes.
 
 The first call (compilation, caches) is stored apart. After it, calls are made in batches that last at least
 `BATCH` seconds, several functions interleaved in random order so that a slow spell of the machine hits all of
 them; every batch is kept. The minimum is the estimate (noise only adds), the spread says how far to trust it.
 Batches come in rounds: one of every function, shuffled, then the next round. Samples of one round are neighbours in
-time, and the ratio of two of them is worth more than the ratio of two minima.
+time, and the ratio of two of them is less noisy than the ratio of two minima.
 """
 
 import math
@@ -75,7 +75,7 @@ def timings(
     for _ in range(batches):
         for index in draw.sample(range(len(functions)), len(functions)):
             samples[index].append(_batch(functions[index], calls[index]) / calls[index])
-    return [Timing(tuple(found), first) for found, first in zip(samples, firsts, strict=True)]
+    return [Timing(tuple(taken), first) for taken, first in zip(samples, firsts, strict=True)]
 
 
 def bare_run(scene: Scene, method: Integrator, chart: str, setting: float, horizon: float) -> Callable[[], Run]:

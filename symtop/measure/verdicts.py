@@ -26,7 +26,8 @@ OUTSIDE = 0.1  # of the nutation's width, or rad if it has none
 STEADY = 1e-6  # rad; a nutation narrower than this is a steady precession, known to rounding only
 DRIFT = 0.01  # of the energy's scale
 GROWING = 1.3  # the second half's largest energy error over the first half's; bounded errors have 1
-ROUNDING = 1e-9  # of the momentum scale: a gap p_phi -+ p_psi below this has no sign to change
+NO_GAP = 1e-9  # of the momentum scale: a gap p_phi -+ p_psi below this has no sign to change
+ROUNDING = NO_GAP  # alias for studies/stability/outcome_maps.py
 
 JUDGED = ("accurate", "bounded_but_wrong", "drifting", "wrong_regime")
 VERDICTS = (*JUDGED, *OUTCOMES[1:])
@@ -77,14 +78,14 @@ def judge(
     word = np.where(steady, BOUNDED_BUT_WRONG, DRIFTING)
     word = np.where(inside & ~np.asarray(passed_pole, dtype=bool), word, WRONG_REGIME)
     word = np.where(accurate, 0, word)
-    found: NDArray[np.uint8] = np.where(ended == 0, word, ended + _EARLY).astype(np.uint8)
-    return found
+    verdicts: NDArray[np.uint8] = np.where(ended == 0, word, ended + _EARLY).astype(np.uint8)
+    return verdicts
 
 
 def _pole_passed(scene: Scene, run: xr.Dataset) -> NDArray[np.bool_]:
     """At which samples the axis has passed a pole on the side that its momenta forbid."""
     momenta = scene.top.momenta(scene.start)
-    least = ROUNDING * scene.momentum_scale
+    least = NO_GAP * scene.momentum_scale
     passed = np.zeros(run.sizes["time"], dtype=bool)
     p_phi, p_psi = run["p_phi"].values, run["p_psi"].values
     for gap, now in ((momenta.north, p_phi - p_psi), (momenta.south, p_phi + p_psi)):
@@ -101,11 +102,11 @@ def verdict(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> str:
     theta = run["theta"].values
     energy = np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     half = energy.size // 2
-    found = judge(
+    index = judge(
         barriers(scene), ended, np.max(axis_error), theta.min(), theta.max(),
         energy[:half].max(), energy[half:].max(), _pole_passed(scene, run).any(),
     )  # fmt: skip
-    return VERDICTS[int(found)]
+    return VERDICTS[int(index)]
 
 
 class Judgement(NamedTuple):
@@ -137,12 +138,12 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
     when = f"t = {times[first]:.6g}"
     if word == "wrong_regime" and beyond[first]:
         bounds = f"{truth.highest:.4g} to {truth.lowest:.4g}"
-        said = f"at {when} theta was {theta[first]:.4g} rad, where the true motion never goes ({bounds})"
+        sentence = f"at {when} theta was {theta[first]:.4g} rad, where the true motion never goes ({bounds})"
     elif word == "wrong_regime":
-        said = f"at {when} the axis had passed a pole on the side that its momenta forbid"
+        sentence = f"at {when} the axis had passed a pole on the side that its momenta forbid"
     elif word == "drifting":
-        said = f"the energy error passed {DRIFT:.0%} at {when} and grew on, to {energy.max():.2g}"
+        sentence = f"the energy error passed {DRIFT:.0%} at {when} and grew on, to {energy.max():.2g}"
     else:
         kept = f"while the energy stayed within {energy.max():.2g}"
-        said = f"the axis error passed {truth.accurate:.2g} rad at {when} {kept}"
-    return Judgement(word, float(times[first]), said)
+        sentence = f"the axis error passed {truth.accurate:.2g} rad at {when} {kept}"
+    return Judgement(word, float(times[first]), sentence)

@@ -1,10 +1,10 @@
-"""The least work that reaches an accuracy: settings that are found, not guessed.
+"""The least work that reaches an accuracy, found by a search over the steps or tolerances of each method.
 
-A fixed ladder of steps gives a method the first rung below a target, up to a rung's ratio too expensive; a ranking of
-such costs ranks the rungs. So each method walks from coarse to fine, about `DECADES` of error a step, until the
+A fixed ladder of steps gives a method the first rung below a target, up to a rung's ratio too expensive, and a ranking
+of such costs depends on the rungs. So each method walks from coarse to fine, about `DECADES` of error a step, until the
 finest target is met, rounding stops it, or the next run would exceed a budget of force evaluations. Then each target is
 approached from the two runs around it: log error is close to a straight line in log step, so that one or two more runs
-come within a `CLOSE` part of the target. Every run is kept. What was not tried is said: `stopped` names the reason.
+come within a `CLOSE` part of the target. Every run is kept, and `stopped` names the reason why there is no finer one.
 
 No fixed step is longer than a quarter of a nutation: such a run is judged at its own steps, and half a step a nutation
 may be right there and nowhere else. Adaptive methods are judged between their steps too and need no such limit.

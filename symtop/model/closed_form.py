@@ -4,7 +4,8 @@ The attitude is written in the two complex half-angle functions of Klein and Som
 
     A = cos(theta/2) exp(i (phi + psi)/2),        B = sin(theta/2) exp(i (phi - psi)/2),
 
-which are quotients theta_k(z - i y)/theta_4(z), z = pi tau/2K, times an exponential (constants: `symtop.exact_mp`).
+which are quotients theta_k(z - i y)/theta_4(z), z = pi tau/2K, times an exponential (constants:
+`symtop.model.precise_form`).
 theta_4 is common to both and cancels in every angle. About each turning point, at x quarter periods from it, one
 function belongs to the pole that the axis is near and one to the pole that it is far from; up to a common real factor,
 with polynomials P of degree 3 in C,

@@ -91,8 +91,8 @@ def spinning(spin: float, precession: float = 0.0, *, name: str = "", purpose: s
     """The family over spin: I1 = 2, I3 = 1, mgl = 2, let go at theta = 0.8 with w3 = `spin` and a precession."""
     theta, w3, turn = 0.8, finite("spin", spin), finite("precession", precession)
     start = Angles(theta=theta, phi_dot=turn, psi_dot=w3 - turn * math.cos(theta))
-    said = purpose or f"let go at theta = {theta} with a spin of {w3:g}"
-    return Scene(name or f"spinning-{w3:.12g}", SymmetricTop(2.0, 1.0, 2.0), start, 20.0, said)
+    words = purpose or f"let go at theta = {theta} with a spin of {w3:g}"
+    return Scene(name or f"spinning-{w3:.12g}", SymmetricTop(2.0, 1.0, 2.0), start, 20.0, words)
 
 
 def grazing(delta: float, *, name: str = "", purpose: str = "") -> Scene:
@@ -105,8 +105,8 @@ def grazing(delta: float, *, name: str = "", purpose: str = "") -> Scene:
     cosine = math.cos(theta)
     precession = (gap + 2.0 * math.sin(0.5 * theta) ** 2) / math.sin(theta) ** 2  # (p_phi - p_psi cos) / I1 sin^2
     start = Angles(theta=theta, theta_dot=-1.2, phi_dot=precession, psi_dot=1.0 - precession * cosine)
-    said = purpose or f"passes the upper pole with p_phi - p_psi = {gap:g}"
-    return Scene(name or f"grazing-{gap:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 4.22, said)
+    words = purpose or f"passes the upper pole with p_phi - p_psi = {gap:g}"
+    return Scene(name or f"grazing-{gap:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 4.22, words)
 
 
 def sleeping(spin: float, tilt: float = 1e-3, *, name: str = "", purpose: str = "") -> Scene:
@@ -116,8 +116,10 @@ def sleeping(spin: float, tilt: float = 1e-3, *, name: str = "", purpose: str = 
     sqrt(4 - spin^2)/2 until the top lies at about acos(spin^2/2 - 1), rises again, and so on.
     """
     w3 = finite("spin", spin)
-    said = purpose or f"let go almost upright with a spin of {w3:g}"
-    return Scene(name or f"sleeping-{w3:.12g}", SymmetricTop(1.0, 1.0, 1.0), Angles(theta=tilt, psi_dot=w3), 60.0, said)
+    words = purpose or f"let go almost upright with a spin of {w3:g}"
+    return Scene(
+        name or f"sleeping-{w3:.12g}", SymmetricTop(1.0, 1.0, 1.0), Angles(theta=tilt, psi_dot=w3), 60.0, words
+    )
 
 
 def steady(spin: float, *, name: str = "", purpose: str = "") -> Scene:
@@ -280,5 +282,5 @@ def scene(name: "str | Scene") -> Scene:
     """The scene of that name; a Scene is returned as it is."""
     if isinstance(name, Scene):
         return name
-    known = scenes()
-    return known[one_of("scene", name, known)]
+    catalogue = scenes()
+    return catalogue[one_of("scene", name, catalogue)]

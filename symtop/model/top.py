@@ -236,7 +236,7 @@ class SymmetricTop:
         """The two values of cos(theta) between which this motion nutates, lower one first.
 
         They are the roots in [-1, 1] of ``(1-u^2)(alpha - beta u) - (b - a u)^2`` to about 1e-14, or 1e-8 where
-        the two coincide; `symtop.exact` has them to any precision.
+        the two coincide; `symtop.model.closed_form` has them to any precision.
         """
         excess, beta, a, b = self._cubic(at)
 

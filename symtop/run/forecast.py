@@ -1,4 +1,4 @@
-"""What a run is going to be worth, forecast from a short piece of it before it starts.
+"""The error of a run, forecast from a short piece of it before it starts.
 
 The method itself is run for two nutations or a tenth of the run, and compared with the closed form (0.2 us a point). A
 nutation is a closed orbit of the reduced top; its return map is 1 + N with N^2 = 0 (the motion is integrable:
@@ -90,7 +90,7 @@ class Probe(NamedTuple):
 
 
 class Forecast(NamedTuple):
-    """What a run is going to be worth."""
+    """The forecast of one run."""
 
     axis_error: float  # expected largest, rad; inf if the probe did not get through, 0 if there is nothing to probe
     rounding: float  # what rounding alone will make of it, rad: large on a separatrix, whatever the method
@@ -185,9 +185,9 @@ def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
 
 
 def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Forecast:
-    """What this run is going to be worth. Costs a probe and never touches the run.
+    """Forecast the error of a run from a short run (a probe) of the same method; the run itself is not changed.
 
-    A method without a knob has nothing to get wrong and is not probed.
+    A method without a step or a tolerance, such as the closed form, is not probed.
     """
     marks = landmarks(scene)
     steps, passage = marks.period / plan.step_size, marks.rate * plan.step_size
@@ -222,8 +222,8 @@ def step_map(scene: Scene, method: Integrator, chart: str, step: float) -> chart
             seen = view(chart, top, np.asarray(run.states)[0])
             ends.append(np.array([seen.theta, seen.p_theta]))
         columns.append((ends[0] - ends[1]) / (2.0 * ASIDE * size))
-    found = np.stack(columns, axis=1)
-    return found if np.isfinite(found).all() else None
+    matrix = np.stack(columns, axis=1)
+    return matrix if np.isfinite(matrix).all() else None
 
 
 def _with_momenta(top: SymmetricTop, theta: float, theta_dot: float, north: float, south: float) -> Angles:

@@ -1,18 +1,18 @@
-"""The guard before a run: one sentence with a remedy where a run is not going to be worth its time, else silence.
+"""The guard: one sentence with a remedy before a run whose error is expected to be large, nothing before any other.
 
-Whether a run will go wrong is measured (`symtop.forecast`: the method on a short piece, against the closed form); why
-is read from exact landmarks of the motion. In this order:
+Whether the error will be large is measured (`symtop.run.forecast` runs the method on a short piece and compares it with
+the closed form). The cause is read from exact landmarks of the motion, in this order:
 
-    instability   a step turns small nutations by no angle at all: they grow (Verlet beyond h omega = 2)
-    separatrix    the motion itself multiplies rounding by more than any method can bear
+    instability   small nutations grow at every step (Verlet beyond h omega = 2)
+    separatrix    the motion itself amplifies rounding until it decides the answer
     pole          the axis precesses by a radian or more in one step at its closest approach to a pole (angles only)
     aliasing      fewer than two steps a nutation
     resonance     a step turns the nutation by a third or a quarter of a turn (Verlet at h omega = sqrt 3)
-    early end     the probe did not get through
-    growth        small errors of every nutation add up until the horizon
+    early end     the short run ended early
+    growth        the errors of the nutations add up until the horizon
 
-The guard never changes a run. It does not mind how many samples are kept: long runs have fewer than two a nutation by
-right, and `simulate` dithers those that would fall on the same phases.
+The guard never changes a run. It does not look at the number of samples: a long run may have fewer than two a nutation,
+and `simulate` dithers samples that would fall on the same phases.
 """
 
 import math
@@ -33,12 +33,12 @@ COARSE = 1.0  # rad of precession in a step
 
 
 def warning(scene: Scene, method: Integrator, chart: str, plan: Plan) -> str:
-    """What the user should know before this run, in one sentence with a remedy; empty if all is well."""
+    """Warn before the run if a large error is expected: one sentence with a remedy, else an empty one."""
     if method.knob is None:
         return ""
-    found, marks = forecast(scene, method, chart, plan), landmarks(scene)
-    said = _unstable(scene, method, chart, plan, marks) or _cause(scene, method, chart, plan, marks, found)
-    return f"{method.name} on {scene.name}: {said}" if said else ""
+    expected, marks = forecast(scene, method, chart, plan), landmarks(scene)
+    reason = _unstable(scene, method, chart, plan, marks) or _cause(scene, method, chart, plan, marks, expected)
+    return f"{method.name} on {scene.name}: {reason}" if reason else ""
 
 
 def _turn(scene: Scene, method: Integrator, chart: str, step: float) -> float:
@@ -64,24 +64,24 @@ def _unstable(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
     )
 
 
-def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks, found: Forecast) -> str:
+def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks, expected: Forecast) -> str:
     """Why the run will go wrong, and what to do; empty if it will not."""
-    if found.rounding > EXPECTED and found.rounding >= min(found.axis_error, 1.0):
+    if expected.rounding > EXPECTED and expected.rounding >= min(expected.axis_error, 1.0):
         return (
             "the motion passes so close to a separatrix that rounding alone decides when it falls; no method and no "
             f"step help, shorten the horizon to less than one nutation of {marks.period:.4g}"
         )
-    if not found.axis_error > EXPECTED:
+    if not expected.axis_error > EXPECTED:
         return ""
-    size = f"expect an axis error of {min(found.axis_error, math.pi):.1g} rad by t = {plan.horizon:.4g}"
+    size = f"expect an axis error of {min(expected.axis_error, math.pi):.1g} rad by t = {plan.horizon:.4g}"
     step, frequency = plan.step_size, marks.frequency
-    if chart == "angles" and found.passage > COARSE:
+    if chart == "angles" and expected.passage > COARSE:
         return (
             f"{size}: the axis passes the {marks.pole} pole at {marks.gap:.2g} rad and precesses there by "
-            f"{found.passage:.2g} rad in a step; take a step below {0.1 / marks.rate:.1g} or an integrator whose chart "
-            "has no poles, such as strang"
+            f"{expected.passage:.2g} rad in a step; take a step below {0.1 / marks.rate:.1g} or an integrator whose "
+            "chart has no poles, such as strang"
         )
-    if found.steps_per_nutation < 2.0:
+    if expected.steps_per_nutation < 2.0:
         return (
             f"{size}: a step of {step:.4g} jumps over the nutation, whose period is {marks.period:.4g}; take a step "
             f"below {marks.period / 20.0:.2g}"
@@ -92,20 +92,20 @@ def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Land
             if abs(order * turn - 2.0 * math.pi) < NEAR * order:
                 return (
                     f"{size}: a step turns the nutation by {turn:.4g} rad, close to 1/{order} of a turn, a resonance "
-                    f"(h omega = {step * frequency:.3f}); take a step of about {_smaller(method, plan, found):.2g}"
+                    f"(h omega = {step * frequency:.3f}); take a step of about {_smaller(method, plan, expected):.2g}"
                 )
-    if found.outcome != "ok":
-        return f"expect the run to be {sentence(found.outcome, found.reached, plan.horizon)}"
+    if expected.outcome != "ok":
+        return f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon)}"
     if method.knob == "tolerance":
-        tolerance = max(plan.tolerance * AIM / min(found.axis_error, 1.0), method.least_tolerance)
+        tolerance = max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance)
         return f"{size}: errors add up over {plan.horizon / marks.period:.3g} nutations; try tolerance {tolerance:.1g}"
     return (
-        f"{size}: a step is 1/{found.steps_per_nutation:.3g} of a nutation and errors add up over "
-        f"{plan.horizon / marks.period:.3g} of them; take a step of about {_smaller(method, plan, found):.2g}"
+        f"{size}: a step is 1/{expected.steps_per_nutation:.3g} of a nutation and errors add up over "
+        f"{plan.horizon / marks.period:.3g} of them; take a step of about {_smaller(method, plan, expected):.2g}"
     )
 
 
-def _smaller(method: Integrator, plan: Plan, found: Forecast) -> float:
+def _smaller(method: Integrator, plan: Plan, expected: Forecast) -> float:
     """The step at which the forecast would be `AIM`, if the method keeps its order."""
-    step = plan.step_size * math.pow(AIM / min(found.axis_error, 1.0), 1.0 / (method.order or 1))
-    return min(step, plan.step_size * found.steps_per_nutation / 20.0) if found.axis_error > 1.0 else step
+    step = plan.step_size * math.pow(AIM / min(expected.axis_error, 1.0), 1.0 / (method.order or 1))
+    return min(step, plan.step_size * expected.steps_per_nutation / 20.0) if expected.axis_error > 1.0 else step

@@ -1,4 +1,4 @@
-"""Linear stability of a method, seen from outside: a few steps of the method itself, next to a motion that stands.
+"""Linear stability of a method, from a few of its own steps next to a motion at rest in theta.
 
 Near a steady precession the method's reduced map has a fixed point, and the inclination obeys a recurrence
 
@@ -7,7 +7,7 @@ Near a steady precession the method's reduced map has a fixed point, and the inc
 t is the trace of the linearised map. |t| <= 2: the discrete nutation turns by acos(t/2) a step; beyond, it grows.
 |t| = 2 is the linear limit, t = -1 a third of a turn a step, the resonance that leaves no neighbourhood of the fixed
 point (Moser; Verlet is there at h omega = sqrt 3 and the midpoint rule at 2 sqrt 3). So t(h), which four steps of any
-method show, has the limit and the resonances in it; nothing is assumed about how the method works.
+method show, has the limit and the resonances in it, for any method.
 
 Near the upright (sleeping) top the axis z = e_x + i e_y obeys the same with c = 0 and complex t and d, |d| = 1, in
 charts without poles; in the angles chart the inclination does if p_phi = p_psi. The top sleeps while t^2/d lies in
@@ -66,7 +66,7 @@ def trace(method: Integrator, scene: Scene, h: float, rounds: int = 6) -> Trace:
     """The trace of the map of one step h at the fixed point that the method has near a steady precession."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
     chart, standing = method.chart_for("axis"), scene.start.theta
-    theta, found, moved = standing, NO_TRACE, math.inf
+    theta, traced, moved = standing, NO_TRACE, math.inf
     for _ in range(rounds):
         if not 1e-3 < theta < math.pi - 1e-3:
             return NO_TRACE
@@ -81,9 +81,9 @@ def trace(method: Integrator, scene: Scene, h: float, rounds: int = 6) -> Trace:
         if denominator == 0.0:
             return NO_TRACE
         last, moved = moved, abs(c / denominator)
-        found = Trace(t, d, theta)
+        traced = Trace(t, d, theta)
         if moved < NUDGE:
-            return found
+            return traced
         if moved > 2.0 * last:
             return NO_TRACE
         theta += c / denominator
@@ -152,7 +152,7 @@ def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[f
     symmetric, nutations grow or shrink at every step: there the limit is where they begin to grow by 1e-4 a step, and a
     third of a turn has no meaning.
     """
-    found = [trace(method, scene, float(h)) for h in grid]
+    traces = [trace(method, scene, float(h)) for h in grid]
 
     def unstable(at: Trace) -> bool:
         if not method.symmetric:
@@ -164,7 +164,7 @@ def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[f
 
     ends = []
     for happens in (unstable, turned):
-        first = next((k for k, at in enumerate(found) if happens(at)), 0)
+        first = next((k for k, at in enumerate(traces) if happens(at)), 0)
         a, b = (float(grid[first - 1]), float(grid[first])) if first else (math.nan, math.nan)
         for _ in range(40 if first else 0):
             middle = 0.5 * (a + b)

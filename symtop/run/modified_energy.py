@@ -94,5 +94,5 @@ def oscillation(x: Array, y: Array, values: Array, harmonics: int = HARMONICS) -
     least, largest = float(x.min()), float(x.max())
     curve = Oscillation(0.5 * (least + largest), 0.5 * (largest - least), float(np.abs(y).max()), np.zeros(0))
     columns = np.concatenate([np.ones((x.size, 1)), _harmonics(curve.angle(x, y), harmonics)], axis=1)
-    found = np.linalg.lstsq(columns, values - level, rcond=None)[0]
-    return curve._replace(coefficients=found[1:], level=level, missing=float(found[0]))
+    fitted = np.linalg.lstsq(columns, values - level, rcond=None)[0]
+    return curve._replace(coefficients=fitted[1:], level=level, missing=float(fitted[0]))

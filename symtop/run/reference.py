@@ -91,9 +91,9 @@ def _seen(scene: Scene, times: charts.Array, quaternions: Any, phis: Any, psis: 
     precise = PreciseForm(scene.top, scene.start, DIGITS)
     rows = []
     with workdps(DIGITS + 10):
-        for t, *found, phi, psi in zip(times, *quaternions.T, phis, psis, strict=True):
+        for t, *numbers, phi, psi in zip(times, *quaternions.T, phis, psis, strict=True):
             true = w, x, y, z = precise.quaternion(float(t))
-            attitude = [_mpf(value) for value in found]
+            attitude = [_mpf(value) for value in numbers]
             if sum(a * b for a, b in zip(attitude, true, strict=True)) < 0:
                 attitude = [-value for value in attitude]
             turn = 2.0 * float(mp.norm([a - b for a, b in zip(attitude, true, strict=True)]))
@@ -168,27 +168,27 @@ def _closed_checks(scene: Scene, horizon: float) -> tuple[Checks, float]:
     if scenes().get(scene.name) != scene:
         return _checked(scene, horizon)
 
-    def found() -> xr.Dataset:
+    def computed() -> xr.Dataset:
         checks, overlap = _checked(scene, horizon)
         columns = {name: ("check", values) for name, values in zip(Checks._fields, checks, strict=True)}
         return xr.Dataset({**columns, "overlap": ((), overlap)})
 
-    data = _kept(_cache_path(scene, np.array([horizon]), "checks"), found, None)
+    data = _kept(_cache_path(scene, np.array([horizon]), "checks"), computed, None)
     return Checks(*(data[name].values for name in Checks._fields)), float(data["overlap"])
 
 
 def _checked(scene: Scene, horizon: float) -> tuple[Checks, float]:
     times = check_times(scene, horizon)
-    found = _closed_values(scene, times)
-    checks = _seen(scene, times, found["quaternion"], found["phi"], found["psi"])
+    shown = _closed_values(scene, times)
+    checks = _seen(scene, times, shown["quaternion"], shown["phi"], shown["psi"])
     if not have_heyoka():
         return checks, math.nan
     overlap = check_times(scene, min(horizon, OVERLAP))
     integrated, _ = integrate(scene, overlap, "longdouble")
     gap = charts.attitude_distance(_closed_values(scene, overlap)["quaternion"], integrated[:, :4].astype(float))
     _, phi, psi = charts.angles_from_quaternion(integrated[:, :4])
-    own = _seen(scene, overlap, integrated[:, :4], phi, psi).attitude  # an unstable motion amplifies its rounding
-    return checks, float(max(np.max(gap - 2.0 * own), 0.0))
+    rounding = _seen(scene, overlap, integrated[:, :4], phi, psi).attitude  # an unstable motion amplifies its rounding
+    return checks, float(max(np.max(gap - 2.0 * rounding), 0.0))
 
 
 def _integrated(scene: Scene, times: charts.Array, precision: str) -> tuple[dict[str, Any], Checks]:
@@ -199,39 +199,39 @@ def _integrated(scene: Scene, times: charts.Array, precision: str) -> tuple[dict
     attitude = states[:, :4]
     theta, phi, psi = charts.angles_from_quaternion(attitude)
     motion = closed_form(scene)(grid)
-    found = {
+    shown = {
         "theta": theta,
         "phi": _unwrapped(phi, motion.phi),
         "psi": _unwrapped(psi, motion.psi),
         "axis": charts.axis_from_quaternion(attitude),
         "quaternion": attitude,
     }
-    here, there = place[: times.size], place[times.size :]
-    checks = _seen(scene, check, attitude[there], found["phi"][there], found["psi"][there])
-    return {name: values[here] for name, values in found.items()}, checks
+    asked_for, at_checks = place[: times.size], place[times.size :]
+    checks = _seen(scene, check, attitude[at_checks], shown["phi"][at_checks], shown["psi"][at_checks])
+    return {name: values[asked_for] for name, values in shown.items()}, checks
 
 
 def _compute(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
     """Values, low halves and bounds at increasing, distinct times."""
     overlap = math.nan
     if precision == "closed-form":
-        found = _closed_values(scene, times)
+        shown = _closed_values(scene, times)
         checks, overlap = _closed_checks(scene, float(times[-1]))
         grain = 4.0 * EPSILON
     else:
-        found, checks = _integrated(scene, times, precision)
+        shown, checks = _integrated(scene, times, precision)
         grain = 8.0 * max(taylor.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
     variables: dict[str, Any] = {}
-    stored = {name: _split(values) for name, values in found.items()}
+    stored = {name: _split(values) for name, values in shown.items()}
     for name, (high, low) in stored.items():
         dims = ("time", {"axis": "component", "quaternion": "part"}[name]) if high.ndim > 1 else ("time",)
         variables[name] = (dims, high)
         if precision != "closed-form":
             variables[f"{name}_lo"] = (dims, low)
-    found = {name: high for name, (high, _) in stored.items()}
-    bounds = _bounds(times, found, checks, grain, overlap)
+    shown = {name: high for name, (high, _) in stored.items()}
+    bounds = _bounds(times, shown, checks, grain, overlap)
     if precision != "closed-form":
-        _raise_to_distance(bounds, found, _closed_values(scene, times))
+        _raise_to_distance(bounds, shown, _closed_values(scene, times))
     variables.update({f"{name}_error_bound": ("time", bound) for name, bound in bounds.items()})
     variables.update({name: ("time", np.full(times.size, value)) for name, value in _constants(scene).items()})
     coordinates = {"time": times, "component": ["x", "y", "z"], "part": ["w", "x", "y", "z"]}
@@ -239,26 +239,26 @@ def _compute(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
 
 
 def _bounds(
-    times: charts.Array, found: dict[str, Any], checks: Checks, grain: float, overlap: float
+    times: charts.Array, shown: dict[str, Any], checks: Checks, grain: float, overlap: float
 ) -> dict[str, charts.Array]:
     """Error bounds from the checks; `overlap` counts in full if the closed form and an integration disagree."""
     doubt = overlap if overlap > SUSPICIOUS else 0.0
-    sine = np.maximum(np.sin(found["theta"]), TINY)
+    sine = np.maximum(np.sin(shown["theta"]), TINY)
     axis = _envelope(checks, "axis", times) + grain + doubt
     attitude = _envelope(checks, "attitude", times) + grain + doubt
     # an error of the axis turns phi by 1/sin(theta) of it, and psi by the rest of the attitude's error
-    turn = np.maximum(_envelope(checks, "phi", times), axis / sine) + grain * np.abs(found["phi"])
-    spin = np.maximum(_envelope(checks, "psi", times), attitude + axis / sine) + grain * np.abs(found["psi"])
+    turn = np.maximum(_envelope(checks, "phi", times), axis / sine) + grain * np.abs(shown["phi"])
+    spin = np.maximum(_envelope(checks, "psi", times), attitude + axis / sine) + grain * np.abs(shown["psi"])
     return {"axis": axis, "attitude": attitude, "theta": axis, "phi": turn, "psi": spin}
 
 
-def _raise_to_distance(bounds: dict[str, charts.Array], found: dict[str, Any], closed: dict[str, Any]) -> None:
+def _raise_to_distance(bounds: dict[str, charts.Array], shown: dict[str, Any], closed: dict[str, Any]) -> None:
     """Where an integration visibly differs from the closed form in double, that distance is its error at that time."""
-    distances = {name: np.abs(found[name] - closed[name]) for name in ("theta", "phi", "psi")}
-    distances["axis"] = charts.axis_distance(found["axis"], closed["axis"])
-    distances["attitude"] = charts.attitude_distance(found["quaternion"], closed["quaternion"])
+    distances = {name: np.abs(shown[name] - closed[name]) for name in ("theta", "phi", "psi")}
+    distances["axis"] = charts.axis_distance(shown["axis"], closed["axis"])
+    distances["attitude"] = charts.attitude_distance(shown["quaternion"], closed["quaternion"])
     for name, distance in distances.items():
-        scale = np.abs(found[name]) if name in ("phi", "psi") else 1.0
+        scale = np.abs(shown[name]) if name in ("phi", "psi") else 1.0
         grain = 4.0 * EPSILON * np.maximum(scale, 1.0)
         visible = distance > 8.0 * grain
         bounds[name] = np.where(visible, np.maximum(bounds[name], distance + grain), bounds[name])
@@ -293,8 +293,10 @@ def reference(scene: "str | Scene", times: ArrayLike, precision: str = "longdoub
     one_of("precision", precision, PRECISIONS)
     source = precision if have_heyoka() else "closed-form"
     if source != precision:
-        said = f"heyoka is not installed: the closed form in double stands in for precision {precision!r}, unchecked"
-        warnings.warn(said, SymtopWarning, stacklevel=2)
+        sentence = (
+            f"heyoka is not installed: the closed form in double stands in for precision {precision!r}, unchecked"
+        )
+        warnings.warn(sentence, SymtopWarning, stacklevel=2)
     distinct, place = np.unique(wanted, return_inverse=True)
     data = _cached(chosen, distinct, source)
     if wanted.size != distinct.size or not np.array_equal(wanted, distinct):

@@ -128,9 +128,9 @@ def simulate(
     default: what the scene is watched for) picks the smallest chart of the integrator that shows it. A run of fewer
     steps than `samples` shows every step.
 
-    Before the run the `guard` (`symtop.guard`) forecasts what it will be worth and warns (`SymtopWarning`) in one
-    sentence with a remedy if that is little; the run is the same either way. Give a function to be handed the sentence
-    instead, or False for silence where failures are what is looked for. `budget` is the most steps of a fixed-step run
+    Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
+    error is expected; the run is the same either way. Give a function to be handed the sentence instead, or False for
+    no warning. `budget` is the most steps of a fixed-step run
     (`MOST_STEPS` by default; more are refused) and the most force evaluations, or Taylor steps, of an adaptive one,
     which then ends `out_of_budget` (by default after one or two minutes).
 
@@ -145,12 +145,12 @@ def simulate(
     chart = method.chart_for(watched)
     limit = None if budget is None else positive("budget", budget)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, end, count, limit)
-    said = warning(chosen, method, chart, plan) if guard is not False else "off"
-    if guard is not False and said:
+    caution = warning(chosen, method, chart, plan) if guard is not False else "off"
+    if guard is not False and caution:
         if callable(guard):
-            guard(said)
+            guard(caution)
         else:
-            warnings.warn(said, SymtopWarning, stacklevel=2)
+            warnings.warn(caution, SymtopWarning, stacklevel=2)
     run = solve_plan(method, chart, chosen.top, chosen.start, plan, f" on {chosen.name}")
     return datasets.describe(
         as_dataset(chosen, chart, plan, run),
@@ -168,7 +168,7 @@ def simulate(
         outcome=run.outcome,
         outcome_message=sentence(run.outcome, run.reached, end),
         reached_time=run.reached,
-        guard=said,
+        guard=caution,
         sampling="dithered" if dithered else "uniform",
         top={"I1": chosen.top.I1, "I3": chosen.top.I3, "mgl": chosen.top.mgl},
         start={name: getattr(chosen.start, name) for name in chosen.start.__slots__},
@@ -178,27 +178,29 @@ def simulate(
 MOST_SAMPLES = 10_000_000
 
 
-def solve_plan(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan, where: str = "") -> Run:
-    """What a solver makes of a plan, checked; SymtopError if it breaks or returns something else."""
+def solve_plan(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan, context: str = "") -> Run:
+    """Run a solver and check what it returns; SymtopError if it raises or returns anything but a Run that fits."""
     try:
         return _checked(method, chart, plan, solve(method, chart, top, start, plan))
     except SymtopError:
         raise
     except Exception as error:
-        said = " ".join(str(error).split())
-        raise SymtopError(f"integrator {method.name} failed{where}: {type(error).__name__}: {said}") from error
+        reason = " ".join(str(error).split())
+        raise SymtopError(f"integrator {method.name} failed{context}: {type(error).__name__}: {reason}") from error
 
 
 def _checked(method: Integrator, chart: str, plan: Plan, run: object) -> Run:
-    """What a solver returned, if it is what a solver returns; NaN before the end is an outcome of its own."""
+    """The run, if its shapes and its outcome are what they must be; states that are not finite become an outcome."""
     shape = (plan.times.size, charts.DIMENSIONS[chart])
     if not isinstance(run, Run) or np.shape(run.states) != shape or np.iscomplexobj(run.states):
-        found = np.shape(run.states) if isinstance(run, Run) else type(run).__name__
-        raise SymtopError(f"integrator {method.name} must return a Run with real states of shape {shape}, not {found}")
-    if np.shape(run.p_phi) != shape[:1] or np.shape(run.p_psi) != shape[:1] or run.outcome not in OUTCOMES:
-        known = ", ".join(OUTCOMES)
+        returned = np.shape(run.states) if isinstance(run, Run) else type(run).__name__
         raise SymtopError(
-            f"integrator {method.name} must return p_phi and p_psi of shape {shape[:1]} and an outcome of {known}"
+            f"integrator {method.name} must return a Run with real states of shape {shape}, not {returned}"
+        )
+    if np.shape(run.p_phi) != shape[:1] or np.shape(run.p_psi) != shape[:1] or run.outcome not in OUTCOMES:
+        outcomes = ", ".join(OUTCOMES)
+        raise SymtopError(
+            f"integrator {method.name} must return p_phi and p_psi of shape {shape[:1]} and an outcome of {outcomes}"
         )
     whole: Any = np.isfinite(run.states).all(axis=1)
     if run.outcome == "ok" and not whole.all():

@@ -1,0 +1,59 @@
+"""The two constructors of a plan, and the scales of a scene."""
+
+import math
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.methods.registry import Plan, solve
+
+SCENE = symtop.scene("spheroid")
+
+
+def test_a_plan_of_steps_says_the_same_in_steps_and_in_times():
+    plan = Plan.steps(0.1, [0, 3, 7])
+    assert plan.marks.dtype == np.int64
+    np.testing.assert_array_equal(plan.times, np.array([0, 3, 7]) * 0.1)
+    assert plan.horizon == 7.0 * 0.1
+    assert math.isnan(plan.tolerance)
+    assert Plan.steps(8.0 / 3.0, [3], 8.0).horizon == 8.0  # where the product would be rounded
+
+
+def test_a_plan_with_a_tolerance_has_no_steps():
+    plan = Plan.until([0.5, 2.0], 1e-6, budget=100.0)
+    assert (plan.horizon, plan.marks.size, plan.tolerance, plan.most(5.0)) == (2.0, 0, 1e-6, 100.0)
+    assert math.isnan(plan.step_size)
+    assert Plan.until([1.0], 1e-6).most(5.0) == 5.0
+
+
+def test_a_step_back_undoes_a_step():
+    verlet = symtop.integrator("stormer-verlet")
+    there = solve(verlet, "angles", SCENE.top, SCENE.start, Plan.steps(0.01, [1])).states[0]
+    momenta = SCENE.top.momenta(SCENE.start)
+    phi_dot = (momenta.p_phi - momenta.p_psi * math.cos(there[0])) / (SCENE.top.I1 * math.sin(there[0]) ** 2)
+    psi_dot = momenta.p_psi / SCENE.top.I3 - phi_dot * math.cos(there[0])
+    after = symtop.Angles(there[0], there[2], there[3], there[1] / SCENE.top.I1, phi_dot, psi_dot)
+    plan = Plan.steps(-0.01, [1])
+    assert plan.horizon == plan.times[0] == -0.01
+    back = solve(verlet, "angles", SCENE.top, after, plan).states[0]
+    start = [SCENE.start.theta, SCENE.top.I1 * SCENE.start.theta_dot, SCENE.start.phi, SCENE.start.psi]
+    assert back == pytest.approx(start, abs=1e-13)
+
+
+def test_a_scene_has_a_time_scale_even_on_a_separatrix():
+    assert SCENE.time_scale() == SCENE.time_scale(3.0) == SCENE.nutation_period
+    start = symtop.Angles(theta=0.0, psi_dot=1.0)  # upright and too slow to stay there: it falls after all time
+    endless = symtop.Scene("endless", symtop.SymmetricTop(1.0, 1.0, 1.0), start, 20.0)
+    assert math.isinf(endless.nutation_period)
+    assert endless.time_scale() == endless.horizon / 8.0
+    assert endless.time_scale(4.0) == 0.5
+
+
+def test_the_scales_of_errors_are_those_of_the_scene():
+    momenta = SCENE.top.momenta(SCENE.start)
+    assert SCENE.momentum_scale == max(abs(momenta.p_phi), abs(momenta.p_psi))
+    assert SCENE.energy_scale == SCENE.top.energy(SCENE.start) + SCENE.top.mgl
+    resting = symtop.Scene("rest", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(theta=1.0), 1.0)
+    assert resting.momentum_scale > 0.0
+    assert resting.energy_scale > 0.0
