@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from symtop.methods.angles import chart_outcome
 from symtop.methods.compiled import compile_kernel, register_jitable
-from symtop.methods.euler_lagrange import LEAST_TOLERANCE, as_run, field_angles, unreduced
+from symtop.methods.euler_lagrange import LEAST_TOLERANCE, as_run, field_angles, with_rates
 from symtop.methods.outcomes import NOT_FINITE, OK, OUT_OF_BUDGET, OUTCOMES, STEP_TOO_SMALL
 from symtop.methods.registry import Array, Integrator, Plan, Run
 from symtop.methods.runge_kutta import later_stages, store, weighted
@@ -171,7 +171,7 @@ class Walk(NamedTuple):
 
 def walk(top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_PRINCE, record: int = 0) -> Walk:
     """Integrate to the horizon; the ends of the first `record` steps are kept."""
-    par, state = unreduced(top, start)
+    par, state = with_rates(top, start)
     found, ends = np.full((plan.times.size, len(state)), np.nan), np.full(record, np.nan)
     slopes = np.empty((len(pair.error), len(state)))
     slopes[0] = field_angles(par, state)

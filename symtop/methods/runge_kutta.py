@@ -23,7 +23,7 @@ from numba.cpython.unsafe.tuple import tuple_setitem
 from symtop.base.validate import SymtopError, row
 from symtop.methods.angles import chart_outcome
 from symtop.methods.compiled import register_jitable
-from symtop.methods.euler_lagrange import field_angles, observe_angles, to_angles, unreduced
+from symtop.methods.euler_lagrange import field_angles, observe_angles, to_angles, with_rates
 from symtop.methods.fixed_step import fixed_step
 from symtop.methods.loop import driver
 from symtop.methods.registry import Integrator
@@ -156,7 +156,7 @@ def runge_kutta(
         family="runge-kutta",
         summary=summary or f"explicit Runge-Kutta method with {len(weights)} stages",
         solvers={
-            "angles": fixed_step(march_angles, rule, unreduced, 1, implicit=False, present=to_angles),
+            "angles": fixed_step(march_angles, rule, with_rates, 1, implicit=False, present=to_angles),
             "axis": fixed_step(march_axis, rule, on_axis, 1, implicit=False),
         },
         order=order,

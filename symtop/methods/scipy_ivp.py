@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from symtop.methods.euler_lagrange import LEAST_TOLERANCE, accelerations, as_run, unreduced
+from symtop.methods.euler_lagrange import LEAST_TOLERANCE, accelerations, as_run, with_rates
 from symtop.methods.registry import Integrator, Plan, Run, Solver
 from symtop.model.top import Angles, SymmetricTop
 
@@ -53,7 +53,7 @@ def solver(method: str) -> Solver:
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         from scipy import integrate  # 0.6 s to import
 
-        _, y0 = unreduced(top, start)
+        _, y0 = with_rates(top, start)
         rhs = EulerLagrange(top)
         found = np.full((plan.times.size, len(y0)), np.nan)
         steps = seen = 0
