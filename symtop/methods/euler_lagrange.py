@@ -69,8 +69,8 @@ def to_angles(par: Any, times: Array, states: Array) -> Array:
 
 
 def as_run(
-    top: SymmetricTop, times: Array, found: Array, steps: int, evaluations: int, outcome: str, reached: float
+    top: SymmetricTop, times: Array, states: Array, steps: int, evaluations: int, outcome: str, reached: float
 ) -> Run:
     """Samples of the unreduced state, shape (samples, 6), with p_theta and both momenta recomputed from the rates."""
-    p_phi, p_psi = momenta(top, found[:, 0], found[:, 4], found[:, 5])
-    return Run(to_angles(top, times, found), p_phi, p_psi, steps, evaluations, 0, outcome, reached)
+    p_phi, p_psi = momenta(top, states[:, 0], states[:, 4], states[:, 5])
+    return Run(to_angles(top, times, states), p_phi, p_psi, steps, evaluations, 0, outcome, reached)

@@ -55,11 +55,12 @@ def solver(method: str) -> Solver:
 
         _, y0 = with_rates(top, start)
         rhs = EulerLagrange(top)
-        found = np.full((plan.times.size, len(y0)), np.nan)
+        states = np.full((plan.times.size, len(y0)), np.nan)
         steps = seen = 0
         outcome = "ok"
         with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # LSODA's failures; they are in its status as well
+            # LSODA's failures, which are in its status as well. Nothing else is silenced: filters belong to all threads
+            warnings.filterwarnings("ignore", "lsoda: ", UserWarning)
             make: Callable[..., Any] = getattr(integrate, method)
             stepper = make(rhs, 0.0, y0, plan.horizon, rtol=plan.tolerance, atol=plan.tolerance)
             while stepper.status == "running" and outcome == "ok":
@@ -71,14 +72,14 @@ def solver(method: str) -> Solver:
                     steps += 1
                     now = int(np.searchsorted(plan.times, stepper.t, side="right"))
                     if now > seen:
-                        found[seen:now] = stepper.dense_output()(plan.times[seen:now]).T  # DOP853 evaluates f here too
+                        states[seen:now] = stepper.dense_output()(plan.times[seen:now]).T  # DOP853 evaluates f here too
                         seen = now
                 except (OverflowError, ZeroDivisionError, ValueError):  # sin of infinity, or no finite Jacobian
                     outcome = "not_finite"
                     break
                 outcome = _judge(stepper, rhs.calls, plan.most(EVALUATIONS))
         reached = plan.horizon if outcome == "ok" else float(stepper.t)
-        return as_run(top, plan.times, found, steps, rhs.calls, outcome, reached)
+        return as_run(top, plan.times, states, steps, rhs.calls, outcome, reached)
 
     return solve
 

@@ -112,7 +112,7 @@ def test_bad_tableaux_are_refused(a, b, c, words):
 
 def _walk(scene, tolerance, horizon, pair=dormand_prince.DORMAND_PRINCE):
     plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon, 301)
-    return plan, dormand_prince.walk(scene.top, scene.start, plan, pair, record=100_000)
+    return plan, dormand_prince.adaptive_run(scene.top, scene.start, plan, pair, record=100_000)
 
 
 def _assert_same_steps(scene, tolerance, horizon, close, pair=dormand_prince.DORMAND_PRINCE):
@@ -127,7 +127,7 @@ def _assert_same_steps(scene, tolerance, horizon, close, pair=dormand_prince.DOR
     assert mine.evaluations == theirs.nfev
     np.testing.assert_allclose(np.diff(mine.ends, prepend=0.0), np.diff(theirs.t), rtol=close)
     sampled = solve_ivp(rhs, (0.0, horizon), start, t_eval=plan.times, **knobs)
-    np.testing.assert_allclose(mine.found, sampled.y.T, atol=1e-9)
+    np.testing.assert_allclose(mine.states, sampled.y.T, atol=1e-9)
 
 
 def test_the_tableau_is_scipys():
@@ -172,7 +172,7 @@ def test_adaptive_outcomes(monkeypatch):
     plan, run = _walk(scene, 1e-9, 8.0)
     assert run.outcome == "out_of_budget"
     assert 0.0 < run.reached < 8.0
-    assert np.array_equal(np.isfinite(run.found[:, 0]), plan.times <= run.reached)
+    assert np.array_equal(np.isfinite(run.states[:, 0]), plan.times <= run.reached)
 
 
 def test_blocks_do_not_show(monkeypatch):
@@ -180,7 +180,7 @@ def test_blocks_do_not_show(monkeypatch):
     whole = _walk(scene, 1e-7, 8.0)[1]
     monkeypatch.setattr(dormand_prince, "BLOCK", 100)
     parts = _walk(scene, 1e-7, 8.0)[1]
-    np.testing.assert_array_equal(parts.found, whole.found)
+    np.testing.assert_array_equal(parts.states, whole.states)
     np.testing.assert_array_equal(parts.ends, whole.ends)
     assert parts.evaluations == whole.evaluations
 
