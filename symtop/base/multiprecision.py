@@ -8,7 +8,6 @@ import threading
 from typing import Any
 
 
-
 class _Contexts(threading.local):
     def __init__(self) -> None:
         self.by_digits: dict[int, Any] = {}

@@ -58,7 +58,7 @@ class Quadrature(NamedTuple):
 
 
 class _Sums(NamedTuple):
-    """Means over the nodes; `start` and `end` name a sum with the weight w (1-a) or w a, a node's share of either end."""
+    """Sums over the nodes; one with `start` or `end` in its name has the weight w (1-a) or w a, the share of that end."""
 
     high: float  # sum w cos^2(theta/2)
     low: float  # sum w sin^2(theta/2)
@@ -211,7 +211,7 @@ def _correct(step: Any, trial: Any, d: float) -> Any:
 
 
 @register_jitable
-def _free_flight(step: Any) -> float:
+def _free_flight(step: Any) -> Any:
     return step.flight
 
 

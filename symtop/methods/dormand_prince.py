@@ -120,7 +120,7 @@ def _try_steps(
 def march(  # type: ignore[no-untyped-def]
     par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, states, ends
 ):
-    """Steps until the end, a failure or `budget` evaluations; `states` takes the samples, `ends` the first step ends."""
+    """Steps until the end, a failure or `budget` evaluations; fills `states` with samples, `ends` with step ends."""
     evaluations = 0
     outcome = OK
     while t < end and outcome == OK and evaluations < budget:
@@ -133,7 +133,9 @@ def march(  # type: ignore[no-untyped-def]
             ends[steps] = t
         steps += 1
         while seen < len(times) and times[seen] <= t:
-            store(states, seen, _interpolate(pair.dense, before, slopes, t - start, (times[seen] - start) / (t - start)))
+            store(
+                states, seen, _interpolate(pair.dense, before, slopes, t - start, (times[seen] - start) / (t - start))
+            )
             seen += 1
         outcome = chart_outcome(state[0])
         for m in range(len(state)):
@@ -168,7 +170,9 @@ class AdaptiveRun(NamedTuple):
     reached: float
 
 
-def adaptive_run(top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_PRINCE, record: int = 0) -> AdaptiveRun:
+def adaptive_run(
+    top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_PRINCE, record: int = 0
+) -> AdaptiveRun:
     """Integrate to the horizon; the ends of the first `record` steps are kept."""
     par, state = with_rates(top, start)
     states, ends = np.full((plan.times.size, len(state)), np.nan), np.full(record, np.nan)
@@ -180,12 +184,27 @@ def adaptive_run(top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = 
     block = int(min(BLOCK, budget))
     while t < plan.horizon and outcome == OK:
         state, t, step, steps, seen, effort, outcome = march(
-            par, pair, plan.tolerance, plan.horizon, plan.times, block, state, slopes, t, step, steps, seen, states, ends
+            par,
+            pair,
+            plan.tolerance,
+            plan.horizon,
+            plan.times,
+            block,
+            state,
+            slopes,
+            t,
+            step,
+            steps,
+            seen,
+            states,
+            ends,
         )
         evaluations += effort
         if outcome == OK and t < plan.horizon and evaluations > budget:
             outcome = OUT_OF_BUDGET
-    return AdaptiveRun(states, ends[:steps], steps, evaluations, OUTCOMES[outcome], plan.horizon if outcome == OK else t)
+    return AdaptiveRun(
+        states, ends[:steps], steps, evaluations, OUTCOMES[outcome], plan.horizon if outcome == OK else t
+    )
 
 
 def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:

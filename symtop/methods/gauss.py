@@ -75,9 +75,7 @@ def _legendre_zero(degree: int, near: Any) -> Any:
 def gauss_rule(stages: int) -> GaussRule:
     """Coefficients of the method with that many stages, from `DIGITS` digits; milliseconds, once."""
     mp = context(DIGITS)
-    c = [
-        (1 + _legendre_zero(stages, mp.cos(mp.pi * (k - 0.25) / (stages + 0.5)))) / 2 for k in range(stages, 0, -1)
-    ]
+    c = [(1 + _legendre_zero(stages, mp.cos(mp.pi * (k - 0.25) / (stages + 0.5)))) / 2 for k in range(stages, 0, -1)]
     others = [[node for k, node in enumerate(c) if k != j] for j in range(stages)]
     tops = [mp.fprod(c[j] - node for node in others[j]) for j in range(stages)]
     b = [_antiderivative(others[j], mp.one) / tops[j] for j in range(stages)]

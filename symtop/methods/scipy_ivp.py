@@ -115,7 +115,7 @@ def built_in() -> list[Integrator]:
     """SciPy's methods under the names of this registry."""
     return [
         _entry("RK45", "Dormand-Prince 5(4)", 5, "dormand-prince-1980", explicit=True),
-        _entry("DOP853", "Dormand-Prince 8(5,3)", 8, "hairer-norsett-wanner-1993", explicit=True),
-        _entry("LSODA", "Adams or BDF of variable order", None, "petzold-1983", explicit=False),
+        _entry("DOP853", "Dormand-Prince 8(5,3)", 8, "prince-dormand-1981 hairer-norsett-wanner-1993", explicit=True),
+        _entry("LSODA", "Adams or BDF of variable order", None, "petzold-1983 hindmarsh-1983", explicit=False),
         _entry("Radau", "implicit Radau IIA", 5, "hairer-wanner-1996", explicit=False),
     ]
