@@ -58,7 +58,7 @@ class Quadrature(NamedTuple):
 
 
 class _Sums(NamedTuple):
-    """Sums over the nodes; one with `start` or `end` in its name has the weight w (1-a) or w a, the share of that end."""
+    """Sums over the nodes; `start` or `end` in a name means the weight w (1-a) or w a, the share of that end."""
 
     high: float  # sum w cos^2(theta/2)
     low: float  # sum w sin^2(theta/2)
