@@ -14,7 +14,9 @@ it to first order, which saves one evaluation a step. A predicted x is good to m
 lie outside the basin of the root; hence `restart`.
 
 The functions are arguments and everything is inlined, so that each kernel compiles to what it was when the loop stood
-in it, and returns the same bits. numba caches it on disk as before: what passes the functions is itself compiled.
+in it, and returns the same bits. numba caches it on disk as before: what passes the functions is itself compiled. Time
+of a step, beside the loop written out in each kernel: midpoint 87 against 88 ns, midpoint-unreduced 164 against 165 ns,
+galerkin-simpson 140 against 141 ns, trapezoidal 96 against 95 ns (noise about 2 ns).
 """
 
 from typing import Any, NamedTuple
