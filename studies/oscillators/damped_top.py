@@ -21,10 +21,10 @@ from symtop.methods import unreduced
 from symtop.methods.compiled import register_jitable
 from symtop.methods.discrete_lagrangian import RULES, quadrature
 from symtop.methods.loop import March, Marks, driver
+from symtop.methods.unreduced import unreduced_step, with_momenta
 from symtop.model.top import Angles, SymmetricTop
 
 begin = unreduced.begin
-solved = unreduced.solved
 observe = unreduced.observe
 
 
@@ -58,19 +58,16 @@ def _damped_inertia(par: Any, sums: Any, h: float) -> Any:
     return sums.across + 0.5 * h * par.c_phi, par.I3 + 0.5 * h * par.c_psi
 
 
+@register_jitable
+def _damped_momenta(par: Any, sums: Any, v: float, u: float, h: float) -> Any:
+    """D2 L_d + F_d^+, from the sums and from nothing else: the balance is a result, not an input."""
+    p_phi = sums.across * v + sums.mixed * u - 0.5 * h * par.c_phi * v
+    return p_phi, sums.mixed * v + par.I3 * u - 0.5 * h * par.c_psi * u
+
+
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations."""
-    (w, v, u), sums, effort, outcome = solved(_damped_inertia, par, rule, state, carry, h)
-    # p1 is D2 L_d + F_d^+, formed from the sums and from nothing else: the balance is a result, not an input
-    step = (
-        h * w,
-        h * v,
-        h * u,
-        par.I1 * w + h * sums.after - state[3],
-        sums.across * v + sums.mixed * u - 0.5 * h * par.c_phi * v - state[4],
-        sums.mixed * v + par.I3 * u - 0.5 * h * par.c_psi * u - state[5],
-    )
-    return step, ((w, v, u), carry[0], carry[1]), effort, outcome
+    return unreduced_step(_damped_inertia, _damped_momenta, par, rule, state, carry, h)
 
 
 march = driver(begin, increment, observe)
@@ -82,6 +79,5 @@ def damped_run(top: SymmetricTop, start: Angles, friction: Friction, rule: str, 
     `rule` is a name of `discrete_lagrangian.RULES`. SymtopError for a pole, an unknown rule or a bad friction.
     """
     numbers = quadrature(*RULES[one_of("rule", rule, RULES)][:2])[0]
-    state = unreduced.whole(top, start)[1]
-    par = DampedTop(top.I1, top.I3, top.mgl, *friction.checked())
-    return march(par, numbers, state, h, marks)
+    bare, state = with_momenta(top, start)
+    return march(DampedTop(*bare, *friction.checked()), numbers, state, h, marks)

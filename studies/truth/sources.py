@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from symtop.base.multiprecision import context
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.run.reference import integrate
@@ -35,7 +36,5 @@ def axes(scene: Scene, times: charts.Array, precision: str, chart: str) -> Any:
 
 def distance(found: Any, true: Any) -> float:
     """Length of the difference of two axes, one in any arithmetic and one in 45 digits."""
-    from mpmath import mp, mpf, workdps
-
-    with workdps(50):
-        return float(mp.norm([mpf(str(a)) - b for a, b in zip(found, true, strict=True)]))
+    mp = context(50)
+    return float(mp.norm([mp.mpf(str(a)) - b for a, b in zip(found, true, strict=True)]))

@@ -15,6 +15,7 @@ import platform
 import shutil
 import subprocess
 import tempfile
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
@@ -24,6 +25,8 @@ import xarray as xr
 
 from symtop import __version__
 from symtop.base.validate import SymtopError
+
+_one_thread = threading.RLock()  # two threads inside the netCDF library at once end the process (segmentation fault)
 
 # name: (long name, units)
 VARIABLES: dict[str, tuple[str, str]] = {
@@ -169,11 +172,12 @@ def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
     """Write a netCDF file so that it is whole or not there, whatever happens meanwhile; a tree as netCDF groups."""
     with replacing(path) as partial:
         try:
-            if isinstance(data, xr.Dataset):
-                data.to_netcdf(partial, engine="netcdf4", encoding=_encoding(data))
-            else:
-                parts = {f"/{name}": _encoding(group) for name, group in groups(data).items()}
-                data.to_netcdf(partial, engine="netcdf4", encoding=parts)
+            with _one_thread:
+                if isinstance(data, xr.Dataset):
+                    data.to_netcdf(partial, engine="netcdf4", encoding=_encoding(data))
+                else:
+                    parts = {f"/{name}": _encoding(group) for name, group in groups(data).items()}
+                    data.to_netcdf(partial, engine="netcdf4", encoding=parts)
         except RuntimeError as error:  # the netCDF library's own word for a disk that is full
             raise OSError(None, _room(partial.parent) or str(error)) from error
     return Path(path)
@@ -202,7 +206,7 @@ def fingerprint(data: xr.Dataset) -> str:
 def read(path: str | os.PathLike[str]) -> xr.Dataset:
     """Load a netCDF file completely into memory and close it."""
     try:
-        with xr.open_dataset(path, engine="netcdf4") as data:
+        with _one_thread, xr.open_dataset(path, engine="netcdf4") as data:
             return data.load()
     except (OSError, ValueError, RuntimeError) as error:
         raise SymtopError(f"cannot read {path} as netCDF: {error}") from error
@@ -211,7 +215,7 @@ def read(path: str | os.PathLike[str]) -> xr.Dataset:
 def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:
     """Load a netCDF file completely into memory and close it: a tree if it has groups, otherwise a dataset."""
     try:
-        with xr.open_datatree(path, engine="netcdf4") as tree:
+        with _one_thread, xr.open_datatree(path, engine="netcdf4") as tree:
             tree.load()
     except (OSError, ValueError, RuntimeError) as error:
         raise SymtopError(f"cannot read {path} as netCDF: {error}") from error

@@ -5,14 +5,12 @@
     POST /run  /netcdf  /script                   one run: as arrays, as a file, as a script
 
 It listens on 127.0.0.1. It answers only requests that name this machine as their host, and POST requests only if they
-send JSON, so that a page of another origin cannot use it. Runs take turns, because mpmath has one precision for all
-threads.
+send JSON, so that a page of another origin cannot use it.
 """
 
 import contextlib
 import json
 import tempfile
-import threading
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -31,8 +29,6 @@ PAGES = {
 }
 LONGEST_BODY = 65_536  # bytes of a POST request
 POLICY = "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-
-_one_run = threading.Lock()
 
 
 def _run(chosen: answers.Setup) -> tuple[bytes, str]:
@@ -96,8 +92,7 @@ class Handler(BaseHTTPRequestHandler):
                 self._refuse(413, f"a question must be at most {LONGEST_BODY} bytes, not {length}")
                 return
             chosen = answers.setup(_parsed(self.rfile.read(length)))
-            with _one_run:
-                body, kind = ACTIONS[self.path](chosen)
+            body, kind = ACTIONS[self.path](chosen)
         except SymtopError as error:
             # The page shows the sentence in place of a run, as an ordinary answer; a file cannot be replaced by it.
             self._refuse(200 if self.path == "/run" else 400, str(error))

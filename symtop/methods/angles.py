@@ -25,6 +25,14 @@ class ReducedTop(NamedTuple):
     south: float  # p_phi + p_psi
 
 
+class BareTop(NamedTuple):
+    """The top without its momenta, for kernels whose state has them or the rates."""
+
+    I1: float
+    I3: float
+    mgl: float
+
+
 @register_jitable
 def chart_outcome(theta: float) -> int:
     """Is theta still a point of the chart?"""

@@ -36,14 +36,14 @@ def palindrome(outer: Sequence[float], *, odd: bool) -> tuple[float, ...]:
 
 def exact_sum(values: Sequence[float], total: float = 1.0) -> tuple[float, ...]:
     """The same coefficients with what is missing from `total` given to the middle one, or to the middle two equally."""
-    found, n = list(values), len(values)
-    surplus = math.fsum((*found, -total))
+    closed, n = list(values), len(values)
+    surplus = math.fsum((*closed, -total))
     if n % 2:
-        found[n // 2] -= surplus
+        closed[n // 2] -= surplus
     else:
-        found[n // 2 - 1] -= 0.5 * surplus
-        found[n // 2] -= 0.5 * surplus
-    return tuple(found)
+        closed[n // 2 - 1] -= 0.5 * surplus
+        closed[n // 2] -= 0.5 * surplus
+    return tuple(closed)
 
 
 def strang_steps(order: int, outer: Sequence[float]) -> Table:

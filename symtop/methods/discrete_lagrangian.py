@@ -37,6 +37,7 @@ from symtop.methods.compiled import register_jitable
 from symtop.methods.fixed_step import fixed_step
 from symtop.methods.fused import fused
 from symtop.methods.loop import driver
+from symtop.methods.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton
 from symtop.methods.outcomes import NOT_CONVERGED
 from symtop.methods.registry import Array, Integrator, Plan, Run, Solver
 from symtop.model.top import Angles, Momenta, SymmetricTop
@@ -56,30 +57,30 @@ class Quadrature(NamedTuple):
     iterations: int = 50
 
 
-SMALLEST = 1e-18  # radians: no correction below this can matter to an angle
-ROUNDING = 1e-12  # radians: a correction below this that does not halve is rounding (a steady precession has no other)
-
-
 class _Sums(NamedTuple):
-    up: float  # sum w cos^2(theta/2)
-    down: float  # sum w sin^2(theta/2)
-    C: float
-    S: float
-    Y: float
-    P0: float  # sum w (1-a) s
-    P1: float  # sum w a s
-    Q0: float  # sum w (1-a) s c
-    Q1: float
-    dP0: float  # slopes of these four with respect to d
-    dP1: float
-    dQ0: float
-    dQ1: float
+    """Sums over the nodes; `start` or `end` in a name means the weight w (1-a) or w a, the share of that end."""
+
+    high: float  # sum w cos^2(theta/2)
+    low: float  # sum w sin^2(theta/2)
+    cosine: float  # C
+    square_sine: float  # S
+    variance: float  # Y, of the cosine
+    sine_start: float  # sum w (1-a) s
+    sine_end: float  # sum w a s
+    product_start: float  # sum w (1-a) s c
+    product_end: float  # sum w a s c
+    sine_start_slope: float  # slopes of these four with respect to d
+    sine_end_slope: float
+    product_start_slope: float
+    product_end_slope: float
 
 
 @register_jitable
 def _node_sums(rule: Any, theta: float, d: float, sin_start: float, cos_start: float) -> Any:
     """All sums over the nodes; a node at 0 uses the half-angle sine and cosine of the start."""
-    up = down = S = P0 = P1 = Q0 = Q1 = dP0 = dP1 = dQ0 = dQ1 = 0.0
+    high = low = square_sine = 0.0
+    sine_start = sine_end = product_start = product_end = 0.0
+    sine_start_slope = sine_end_slope = product_start_slope = product_end_slope = 0.0
     first = shift = square = 0.0
     for i in range(len(rule.nodes)):
         a, w = rule.nodes[i], rule.weights[i]
@@ -88,27 +89,41 @@ def _node_sums(rule: Any, theta: float, d: float, sin_start: float, cos_start: f
         else:
             x = 0.5 * (theta + a * d)
             sin_x, cos_x = np.sin(x), np.cos(x)
-        low, high = sin_x * sin_x, cos_x * cos_x
-        s, c = 2.0 * sin_x * cos_x, high - low
+        sin2_x, cos2_x = sin_x * sin_x, cos_x * cos_x
+        s, c = 2.0 * sin_x * cos_x, cos2_x - sin2_x
         if i == 0:
-            first = low
+            first = sin2_x
         # Y = 4 var(sin^2 x), shifted by the first node: no cancellation at either pole
-        gap = low - first
+        gap = sin2_x - first
         shift += w * gap
         square += w * gap * gap
-        up += w * high
-        down += w * low
-        S += w * s * s
+        high += w * cos2_x
+        low += w * sin2_x
+        square_sine += w * s * s
         left, right, double = w * (1.0 - a), w * a, (c - s) * (c + s)
-        P0 += left * s
-        P1 += right * s
-        Q0 += left * s * c
-        Q1 += right * s * c
-        dP0 += left * a * c
-        dP1 += right * a * c
-        dQ0 += left * a * double
-        dQ1 += right * a * double
-    return _Sums(up, down, up - down, S, 4.0 * (square - shift * shift), P0, P1, Q0, Q1, dP0, dP1, dQ0, dQ1)
+        sine_start += left * s
+        sine_end += right * s
+        product_start += left * s * c
+        product_end += right * s * c
+        sine_start_slope += left * a * c
+        sine_end_slope += right * a * c
+        product_start_slope += left * a * double
+        product_end_slope += right * a * double
+    return _Sums(
+        high,
+        low,
+        high - low,
+        square_sine,
+        4.0 * (square - shift * shift),
+        sine_start,
+        sine_end,
+        product_start,
+        product_end,
+        sine_start_slope,
+        sine_end_slope,
+        product_start_slope,
+        product_end_slope,
+    )
 
 
 @register_jitable
@@ -132,19 +147,22 @@ class _Forces(NamedTuple):
 def _forces(par: Any, sums: Any) -> Any:
     """The precession rate and both force sums of a step, with their slopes."""
     spread = par.I1 - par.I3
-    inverse = 1.0 / (par.I1 * sums.S + par.I3 * sums.Y)
-    v = (par.north * sums.up + par.south * sums.down) * inverse
-    v_slope = (par.p_psi * sums.P1 - 2.0 * v * (spread * sums.Q1 + par.I3 * sums.C * sums.P1)) * inverse
-    bracket = v * (par.p_psi - v * par.I3 * sums.C) - par.mgl
-    bracket_slope = v_slope * (par.p_psi - 2.0 * v * par.I3 * sums.C) + v * v * par.I3 * sums.P1
+    inverse = 1.0 / (par.I1 * sums.square_sine + par.I3 * sums.variance)
+    v = (par.north * sums.high + par.south * sums.low) * inverse
+    inertia_slope = spread * sums.product_end + par.I3 * sums.cosine * sums.sine_end  # half of dD/dd
+    v_slope = (par.p_psi * sums.sine_end - 2.0 * v * inertia_slope) * inverse
+    bracket = v * (par.p_psi - v * par.I3 * sums.cosine) - par.mgl
+    bracket_slope = v_slope * (par.p_psi - 2.0 * v * par.I3 * sums.cosine) + v * v * par.I3 * sums.sine_end
     square, square_slope = spread * v * v, 2.0 * spread * v * v_slope
+    W0_slope = bracket_slope * sums.sine_start + bracket * sums.sine_start_slope
+    W1_slope = bracket_slope * sums.sine_end + bracket * sums.sine_end_slope
     return _Forces(
         v,
-        bracket * sums.P0 - square * sums.Q0,
-        bracket * sums.P1 - square * sums.Q1,
+        bracket * sums.sine_start - square * sums.product_start,
+        bracket * sums.sine_end - square * sums.product_end,
         v_slope,
-        bracket_slope * sums.P0 + bracket * sums.dP0 - square_slope * sums.Q0 - square * sums.dQ0,
-        bracket_slope * sums.P1 + bracket * sums.dP1 - square_slope * sums.Q1 - square * sums.dQ1,
+        W0_slope - square_slope * sums.product_start - square * sums.product_start_slope,
+        W1_slope - square_slope * sums.product_end - square * sums.product_end_slope,
     )
 
 
@@ -155,36 +173,61 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return (W0, W0, W0, W0)
 
 
+class _Step(NamedTuple):
+    """The scalar equation of one step, d = flight - scale W0(d)."""
+
+    par: Any
+    rule: Any
+    theta: float
+    sin_start: float
+    cos_start: float
+    h: float
+    lever: float  # h / I1
+    momentum: float
+    flight: float  # what d is without any force
+    scale: float  # h^2 / I1
+
+
+class _Trial(NamedTuple):
+    """What the equation is made of at one d."""
+
+    sums: _Sums
+    force: _Forces
+
+
+@register_jitable
+def _evaluate(step: Any, d: float) -> Any:
+    sums = _node_sums(step.rule, step.theta, d, step.sin_start, step.cos_start)
+    return _Trial(sums, _forces(step.par, sums))
+
+
+@register_jitable
+def _correct(step: Any, trial: Any, d: float) -> Any:
+    """Newton's correction, judged against the step's own increment."""
+    force = trial.force
+    change = (step.lever * (step.momentum - step.h * force.W0) - d) / (1.0 + step.scale * force.W0_slope)
+    enough = step.rule.tolerance * (abs(step.flight) + abs(step.scale * force.W0)) + NEGLIGIBLE_ANGLE
+    return Correction(change, d + change, abs(change), enough, ANGLE_GRAIN)
+
+
+@register_jitable
+def _free_flight(step: Any) -> Any:
+    return step.flight
+
+
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
-    theta = state[0]
     # h^2/I1 rounded once and for all would do work of one sign: h and h/I1 are all that the increments know
     lever = h / par.I1
     flight, scale = lever * state[1], lever * h
-    sin_start, cos_start = _start_trig(rule, theta)
+    sin_start, cos_start = _start_trig(rule, state[0])
     # W0 is smooth in time: the cubic through its last four values predicts the next one. At 300 steps a nutation that
     # leaves 1.1 to 1.6 iterations, where a parabola left 1.8 to 2.0.
-    d = flight - scale * (4.0 * (carry[0] + carry[2]) - 6.0 * carry[1] - carry[3])
-    sums = _node_sums(rule, theta, d, sin_start, cos_start)
-    force = _forces(par, sums)
-    correction = 0.0
-    size = np.inf
-    effort = 1
-    outcome = NOT_CONVERGED
-    while True:
-        correction = (lever * (state[1] - h * force.W0) - d) / (1.0 + scale * force.W0_slope)
-        last, size = size, abs(correction)
-        if size <= rule.tolerance * (abs(flight) + abs(scale * force.W0)) + SMALLEST or 0.5 * last <= size <= ROUNDING:
-            d += correction
-            outcome = chart_outcome(theta + d)
-            break
-        if effort >= rule.iterations:
-            break
-        # the prediction may lie outside the basin of the root: then begin again from free flight
-        d = flight if effort == rule.iterations // 2 else d + correction
-        sums = _node_sums(rule, theta, d, sin_start, cos_start)
-        force = _forces(par, sums)
-        effort += 1
+    guess = flight - scale * (4.0 * (carry[0] + carry[2]) - 6.0 * carry[1] - carry[3])
+    equation = _Step(par, rule, state[0], sin_start, cos_start, h, lever, state[1], flight, scale)
+    solution = newton(_evaluate, _correct, _free_flight, equation, guess, rule.iterations)
+    (sums, force), correction = solution.trial, solution.correction.change
+    outcome = chart_outcome(state[0] + solution.correction.after) if solution.converged else NOT_CONVERGED
     # what was evaluated before the last correction follows it to first order; the remainder is its square. Added before
     # the product with h, what follows would be rounded to one side for whole stretches of an orbit: some starts lost
     # 3e-14 of their energy in 1e8 steps, and wander by 3e-15 now
@@ -194,9 +237,10 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     # theta moves by the very force that moves p. What Newton's last division leaves instead is off by a twentieth of a
     # rounding, but always to the same side: the energy drifted by 4e-14 in 3e6 steps
     d = lever * (state[1] - kick0)
-    C = sums.C - sums.P1 * correction
-    step = (d, -(kick0 + kick1), turn, fused(h, par.p_psi / par.I3, -(turn * C)))
-    return step, (force.W0 + force.W0_slope * correction, carry[0], carry[1], carry[2]), effort, outcome
+    cosine = sums.cosine - sums.sine_end * correction
+    step = (d, -(kick0 + kick1), turn, fused(h, par.p_psi / par.I3, -(turn * cosine)))
+    work = solution.evaluations
+    return step, (force.W0 + force.W0_slope * correction, carry[0], carry[1], carry[2]), work, outcome
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
@@ -205,8 +249,9 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     sin_start, cos_start = _start_trig(rule, theta)
     sums = _node_sums(rule, theta, d, sin_start, cos_start)
     v, u = dstate[2] / h, dstate[3] / h
-    square = sums.Y + sums.C * sums.C
-    return par.I1 * sums.S * v + par.I3 * (square * v + sums.C * u), par.I3 * (u + sums.C * v)
+    square_cosine = sums.variance + sums.cosine * sums.cosine
+    p_phi = par.I1 * sums.square_sine * v + par.I3 * (square_cosine * v + sums.cosine * u)
+    return p_phi, par.I3 * (u + sums.cosine * v)
 
 
 march = driver(begin, increment, observe)

@@ -17,12 +17,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.cpython.unsafe.tuple import tuple_setitem
 from numpy.typing import NDArray
 
 from symtop.methods.angles import chart_outcome
-from symtop.methods.compiled import compile_kernel, register_jitable
-from symtop.methods.euler_lagrange import LEAST_TOLERANCE, as_run, field_angles, unreduced
+from symtop.methods.compiled import compile_kernel, register_jitable, set_item
+from symtop.methods.euler_lagrange import LEAST_TOLERANCE, as_run, field_angles, with_rates
 from symtop.methods.outcomes import NOT_FINITE, OK, OUT_OF_BUDGET, OUTCOMES, STEP_TOO_SMALL
 from symtop.methods.registry import Array, Integrator, Plan, Run
 from symtop.methods.runge_kutta import later_stages, store, weighted
@@ -69,7 +68,7 @@ DORMAND_PRINCE = Embedded(
 def _plus(state: Any, step: Any) -> Any:
     total = state
     for m in range(len(state)):
-        total = tuple_setitem(total, m, state[m] + step[m])
+        total = set_item(total, m, state[m] + step[m])
     return total
 
 
@@ -89,7 +88,7 @@ def _interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any
     weights = dense[0] + dense[1][:3]  # a tuple of seven
     for i in range(len(dense)):
         row = dense[i]
-        weights = tuple_setitem(weights, i, x * (row[0] + x * (row[1] + x * (row[2] + x * row[3]))))
+        weights = set_item(weights, i, x * (row[0] + x * (row[1] + x * (row[2] + x * row[3]))))
     return _plus(state, weighted(weights, state, slopes, h))
 
 
@@ -119,9 +118,9 @@ def _try_steps(
 
 
 def march(  # type: ignore[no-untyped-def]
-    par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, found, ends
+    par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, states, ends
 ):
-    """Steps until the end, a failure or `budget` evaluations; `found` takes the samples, `ends` the first step ends."""
+    """Steps until the end, a failure or `budget` evaluations; fills `states` with samples, `ends` with step ends."""
     evaluations = 0
     outcome = OK
     while t < end and outcome == OK and evaluations < budget:
@@ -134,7 +133,9 @@ def march(  # type: ignore[no-untyped-def]
             ends[steps] = t
         steps += 1
         while seen < len(times) and times[seen] <= t:
-            store(found, seen, _interpolate(pair.dense, before, slopes, t - start, (times[seen] - start) / (t - start)))
+            store(
+                states, seen, _interpolate(pair.dense, before, slopes, t - start, (times[seen] - start) / (t - start))
+            )
             seen += 1
         outcome = chart_outcome(state[0])
         for m in range(len(state)):
@@ -158,10 +159,10 @@ def first_step(par: Any, state: tuple[float, ...], end: float, tolerance: float)
     return float(min(100.0 * trial, guess, end))
 
 
-class Walk(NamedTuple):
+class AdaptiveRun(NamedTuple):
     """What one adaptive run returns."""
 
-    found: Array  # (samples, 6), NaN after a failure
+    states: Array  # (samples, 6), NaN after a failure
     ends: NDArray[np.float64]  # times at the ends of the accepted steps, as many as were asked for
     steps: int
     evaluations: int
@@ -169,10 +170,12 @@ class Walk(NamedTuple):
     reached: float
 
 
-def walk(top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_PRINCE, record: int = 0) -> Walk:
+def adaptive_run(
+    top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_PRINCE, record: int = 0
+) -> AdaptiveRun:
     """Integrate to the horizon; the ends of the first `record` steps are kept."""
-    par, state = unreduced(top, start)
-    found, ends = np.full((plan.times.size, len(state)), np.nan), np.full(record, np.nan)
+    par, state = with_rates(top, start)
+    states, ends = np.full((plan.times.size, len(state)), np.nan), np.full(record, np.nan)
     slopes = np.empty((len(pair.error), len(state)))
     slopes[0] = field_angles(par, state)
     t, step = 0.0, first_step(par, state, plan.horizon, plan.tolerance)
@@ -181,18 +184,33 @@ def walk(top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_
     block = int(min(BLOCK, budget))
     while t < plan.horizon and outcome == OK:
         state, t, step, steps, seen, effort, outcome = march(
-            par, pair, plan.tolerance, plan.horizon, plan.times, block, state, slopes, t, step, steps, seen, found, ends
+            par,
+            pair,
+            plan.tolerance,
+            plan.horizon,
+            plan.times,
+            block,
+            state,
+            slopes,
+            t,
+            step,
+            steps,
+            seen,
+            states,
+            ends,
         )
         evaluations += effort
         if outcome == OK and t < plan.horizon and evaluations > budget:
             outcome = OUT_OF_BUDGET
-    return Walk(found, ends[:steps], steps, evaluations, OUTCOMES[outcome], plan.horizon if outcome == OK else t)
+    return AdaptiveRun(
+        states, ends[:steps], steps, evaluations, OUTCOMES[outcome], plan.horizon if outcome == OK else t
+    )
 
 
 def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
     """A solver of the registry."""
-    done = walk(top, start, plan)
-    return as_run(top, plan.times, done.found, done.steps, done.evaluations, done.outcome, done.reached)
+    done = adaptive_run(top, start, plan)
+    return as_run(top, plan.times, done.states, done.steps, done.evaluations, done.outcome, done.reached)
 
 
 def built_in() -> list[Integrator]:

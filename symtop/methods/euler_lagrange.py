@@ -12,24 +12,16 @@ be seen. The chart ends at theta = 0 and pi. Source: Goldstein, Classical Mechan
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from symtop.methods.angles import require_chart
+from symtop.methods.angles import BareTop, require_chart
 from symtop.methods.compiled import register_jitable
 from symtop.methods.registry import Array, Run
 from symtop.model.top import Angles, SymmetricTop
 
 LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws the line
-
-
-class UnreducedTop(NamedTuple):
-    """The numbers of the top that the unreduced equations need."""
-
-    I1: float
-    I3: float
-    mgl: float
 
 
 @register_jitable
@@ -51,11 +43,11 @@ def field_angles(par: Any, y: Any) -> Any:
     return y[3], y[4], y[5], theta_ddot, phi_ddot, psi_ddot
 
 
-def unreduced(top: SymmetricTop, at: Angles) -> tuple[UnreducedTop, tuple[float, ...]]:
+def with_rates(top: SymmetricTop, at: Angles) -> tuple[BareTop, tuple[float, ...]]:
     """Kernel parameters and state of a start."""
     require_chart(at)
     state = (at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot)
-    return UnreducedTop(top.I1, top.I3, top.mgl), state
+    return BareTop(top.I1, top.I3, top.mgl), state
 
 
 @register_jitable
@@ -77,8 +69,8 @@ def to_angles(par: Any, times: Array, states: Array) -> Array:
 
 
 def as_run(
-    top: SymmetricTop, times: Array, found: Array, steps: int, evaluations: int, outcome: str, reached: float
+    top: SymmetricTop, times: Array, states: Array, steps: int, evaluations: int, outcome: str, reached: float
 ) -> Run:
     """Samples of the unreduced state, shape (samples, 6), with p_theta and both momenta recomputed from the rates."""
-    p_phi, p_psi = momenta(top, found[:, 0], found[:, 4], found[:, 5])
-    return Run(to_angles(top, times, found), p_phi, p_psi, steps, evaluations, 0, outcome, reached)
+    p_phi, p_psi = momenta(top, states[:, 0], states[:, 4], states[:, 5])
+    return Run(to_angles(top, times, states), p_phi, p_psi, steps, evaluations, 0, outcome, reached)

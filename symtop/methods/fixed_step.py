@@ -74,5 +74,5 @@ def fixed_step(
 
 def inside(solver: Solver) -> FixedStep | None:
     """The fixed-step loop inside a solver, if it has one that can be run in stretches."""
-    found = getattr(solver, "solve", solver)
-    return found if isinstance(found, FixedStep) and isinstance(found.loop, Loop) else None
+    inner = getattr(solver, "solve", solver)
+    return inner if isinstance(inner, FixedStep) and isinstance(inner.loop, Loop) else None

@@ -36,9 +36,9 @@ import numpy as np
 
 from symtop.methods.angles import chart_outcome, reduced
 from symtop.methods.compiled import register_jitable
-from symtop.methods.discrete_lagrangian import ROUNDING, SMALLEST
 from symtop.methods.fixed_step import fixed_step, inside
 from symtop.methods.loop import driver
+from symtop.methods.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton
 from symtop.methods.outcomes import NOT_CONVERGED
 from symtop.methods.registry import Integrator
 
@@ -154,16 +154,43 @@ def _evaluate(par: Any, start: Any, theta_m: float, theta_1: float) -> Any:
     )
 
 
+class _Step(NamedTuple):
+    """The two equations of one step."""
+
+    par: Any
+    rule: Any
+    theta: float
+    start: _Node
+    flight: float  # h p / I1, what d is without any force
+    scale: float  # h^2 / I1
+
+
 @register_jitable
-def _correction(found: Any, m: float, d: float, flight: float, scale: float) -> Any:
+def _at(step: Any, unknowns: Any) -> Any:
+    """The trial at m = thetam - theta0 and d = theta1 - theta0."""
+    m, d = unknowns
+    return _evaluate(step.par, step.start, step.theta + m, step.theta + d)
+
+
+@register_jitable
+def _correct(step: Any, trial: Any, unknowns: Any) -> Any:
     """Newton's correction of (m, d) for flight - d - scale (V0 + 2 Vm)/6 = 0 and d/2 - m + scale Vm/8 = 0."""
-    V0, Vm = found.V0, found.Vm
-    short = flight - d - scale * (V0.value + 2.0 * Vm.value) / 6.0
+    m, d = unknowns
+    V0, Vm, scale = trial.V0, trial.Vm, step.scale
+    short = step.flight - d - scale * (V0.value + 2.0 * Vm.value) / 6.0
     bow = 0.5 * d - m + scale * Vm.value / 8.0
     short_m, short_d = scale * (V0.by_m + 2.0 * Vm.by_m) / 6.0, 1.0 + scale * (V0.by_1 + 2.0 * Vm.by_1) / 6.0
     bow_m, bow_d = 1.0 - scale * Vm.by_m / 8.0, -0.5 - scale * Vm.by_1 / 8.0
     inverse = 1.0 / (short_d * bow_m - short_m * bow_d)
-    return (bow * short_d - short * bow_d) * inverse, (short * bow_m - bow * short_m) * inverse
+    fix_m, fix_d = (bow * short_d - short * bow_d) * inverse, (short * bow_m - bow * short_m) * inverse
+    reach = abs(step.flight) + scale * (abs(V0.value) + abs(Vm.value))
+    enough = step.rule.tolerance * reach + NEGLIGIBLE_ANGLE
+    return Correction((fix_m, fix_d), (m + fix_m, d + fix_d), abs(fix_m) + abs(fix_d), enough, ANGLE_GRAIN)
+
+
+@register_jitable
+def _free_flight(step: Any) -> Any:
+    return 0.5 * step.flight, step.flight
 
 
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
@@ -184,35 +211,17 @@ def _predict(carry: Any, flight: float, scale: float) -> Any:
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
-    theta = state[0]
     flight = h * state[1] / par.I1
     scale = h * h / par.I1
-    start = _node(par, theta)
-    m, d = _predict(carry, flight, scale)
-    found = _evaluate(par, start, theta + m, theta + d)
-    effort = 1
-    size = np.inf
-    outcome = NOT_CONVERGED
-    while True:
-        fix = _correction(found, m, d, flight, scale)
-        reach = abs(flight) + scale * (abs(found.V0.value) + abs(found.Vm.value))
-        last, size = size, abs(fix[0]) + abs(fix[1])
-        if size <= rule.tolerance * reach + SMALLEST or 0.5 * last <= size <= ROUNDING:
-            d += fix[1]
-            outcome = chart_outcome(theta + d)
-            break
-        if effort >= rule.iterations:
-            break
-        m, d = m + fix[0], d + fix[1]
-        if effort == rule.iterations // 2:
-            m, d = 0.5 * flight, flight  # the prediction may lie outside the basin of the root
-        found = _evaluate(par, start, theta + m, theta + d)
-        effort += 1
+    equations = _Step(par, rule, state[0], _node(par, state[0]), flight, scale)
+    solution = newton(_at, _correct, _free_flight, equations, _predict(carry, flight, scale), rule.iterations)
+    trial, fix, d = solution.trial, solution.correction.change, solution.correction.after[1]
+    outcome = chart_outcome(state[0] + d) if solution.converged else NOT_CONVERGED
     # what was evaluated before the last correction follows it to first order; the remainder is its square
-    V0, Vm, V1 = _follow(found.V0, fix), _follow(found.Vm, fix), _follow(found.V1, fix)
-    plus, minus = _follow(found.plus, fix), _follow(found.minus, fix)
+    V0, Vm, V1 = _follow(trial.V0, fix), _follow(trial.Vm, fix), _follow(trial.V1, fix)
+    plus, minus = _follow(trial.plus, fix), _follow(trial.minus, fix)
     step = (d, -h * (V0 + 4.0 * Vm + V1) / 6.0, 0.5 * h * (plus + minus), 0.5 * h * (plus - minus))
-    return step, ((V0, Vm), carry[0], carry[1], carry[2]), effort, outcome
+    return step, ((V0, Vm), carry[0], carry[1], carry[2]), solution.evaluations, outcome
 
 
 @register_jitable

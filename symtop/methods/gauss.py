@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.base.multiprecision import context
 from symtop.methods.compiled import register_jitable, set_item
 from symtop.methods.fixed_step import FixedStep, Prepare, Present, fixed_step
 from symtop.methods.loop import Loop, driver
@@ -73,24 +74,20 @@ def _legendre_zero(degree: int, near: Any) -> Any:
 @functools.lru_cache(maxsize=len(STAGES))
 def gauss_rule(stages: int) -> GaussRule:
     """Coefficients of the method with that many stages, from `DIGITS` digits; milliseconds, once."""
-    from mpmath import mp, workdps
-
-    with workdps(DIGITS):
-        c = [
-            (1 + _legendre_zero(stages, mp.cos(mp.pi * (k - 0.25) / (stages + 0.5)))) / 2 for k in range(stages, 0, -1)
-        ]
-        others = [[node for k, node in enumerate(c) if k != j] for j in range(stages)]
-        tops = [mp.fprod(c[j] - node for node in others[j]) for j in range(stages)]
-        b = [_antiderivative(others[j], mp.one) / tops[j] for j in range(stages)]
-        mu, predict = np.full((stages, stages), 0.5), np.empty((stages, stages))
-        for i in range(stages):
-            for j in range(stages):
-                basis = mp.fprod(1 + c[i] - node for node in others[j]) / tops[j]
-                predict[i, j] = float(b[i] / b[j] * basis)
-                if i > j:  # the larger of the pair, mu_ij; 1 - mu_ij is then exact (Sterbenz)
-                    mu[i, j] = float(_antiderivative(others[j], c[i]) / tops[j] / b[j])
-                    mu[j, i] = 1.0 - mu[i, j]
-        return GaussRule(mu, np.array([float(value) for value in b]), predict)
+    mp = context(DIGITS)
+    c = [(1 + _legendre_zero(stages, mp.cos(mp.pi * (k - 0.25) / (stages + 0.5)))) / 2 for k in range(stages, 0, -1)]
+    others = [[node for k, node in enumerate(c) if k != j] for j in range(stages)]
+    tops = [mp.fprod(c[j] - node for node in others[j]) for j in range(stages)]
+    b = [_antiderivative(others[j], mp.one) / tops[j] for j in range(stages)]
+    mu, predict = np.full((stages, stages), 0.5), np.empty((stages, stages))
+    for i in range(stages):
+        for j in range(stages):
+            basis = mp.fprod(1 + c[i] - node for node in others[j]) / tops[j]
+            predict[i, j] = float(b[i] / b[j] * basis)
+            if i > j:  # the larger of the pair, mu_ij; 1 - mu_ij is then exact (Sterbenz)
+                mu[i, j] = float(_antiderivative(others[j], c[i]) / tops[j] / b[j])
+                mu[j, i] = 1.0 - mu[i, j]
+    return GaussRule(mu, np.array([float(value) for value in b]), predict)
 
 
 @register_jitable

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symtop.base.validate import SymtopError, SymtopWarning, finite, label, one_of, positive, whole
+from symtop.methods.about import paragraphs
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View
 
@@ -105,7 +106,8 @@ class Integrator:
 
     `solvers` maps a chart (angles, axis, attitude) to a function. `knob` is what a user turns: ``step_size``,
     ``tolerance`` or nothing. `tier` says what executes the inner loop, so that languages are never ranked
-    against each other unsaid. Raises SymtopError for a field that makes no sense.
+    against each other unsaid. `summary` is a line about it, `about` a paragraph; the built-in ones have theirs from
+    `about.md`. Raises SymtopError for a field that makes no sense.
     """
 
     name: str
@@ -127,6 +129,7 @@ class Integrator:
     sleeps_from: Callable[[float], float] | None = None  # spin of the sleeping top (I1 = I3 = mgl = 1) at a step h
     same_steps_as: str | None = None  # a compiled integrator that takes the same steps
     speed: float = 1.0  # of a step, in units of others of its tier: 0.002 for arithmetic in software
+    about: str = field(default="", repr=False, compare=False, metadata={"words": True})  # a paragraph: what it is, when
 
     def __post_init__(self) -> None:
         label("name", self.name)
@@ -224,7 +227,8 @@ def _load() -> None:
         module = importlib.import_module(f"symtop.methods.{_BUILT_IN[len(_loaded)]}")
         _loaded.append(module.__name__)
         for entry in module.built_in():
-            _registry.setdefault(entry.name, entry)
+            told = replace(entry, about=entry.about or paragraphs().get(entry.name, ""))
+            _registry.setdefault(entry.name, told)
             _shipped.add(entry.name)
     if not _announced:
         _announced.append(ENTRY_POINTS)

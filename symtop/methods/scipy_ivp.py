@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from symtop.methods.euler_lagrange import LEAST_TOLERANCE, accelerations, as_run, unreduced
+from symtop.methods.euler_lagrange import LEAST_TOLERANCE, accelerations, as_run, with_rates
 from symtop.methods.registry import Integrator, Plan, Run, Solver
 from symtop.model.top import Angles, SymmetricTop
 
@@ -53,13 +53,14 @@ def solver(method: str) -> Solver:
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         from scipy import integrate  # 0.6 s to import
 
-        _, y0 = unreduced(top, start)
+        _, y0 = with_rates(top, start)
         rhs = EulerLagrange(top)
-        found = np.full((plan.times.size, len(y0)), np.nan)
+        states = np.full((plan.times.size, len(y0)), np.nan)
         steps = seen = 0
         outcome = "ok"
         with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # LSODA's failures; they are in its status as well
+            # LSODA's failures, which are in its status as well. Nothing else is silenced: filters belong to all threads
+            warnings.filterwarnings("ignore", "lsoda: ", UserWarning)
             make: Callable[..., Any] = getattr(integrate, method)
             stepper = make(rhs, 0.0, y0, plan.horizon, rtol=plan.tolerance, atol=plan.tolerance)
             while stepper.status == "running" and outcome == "ok":
@@ -71,14 +72,14 @@ def solver(method: str) -> Solver:
                     steps += 1
                     now = int(np.searchsorted(plan.times, stepper.t, side="right"))
                     if now > seen:
-                        found[seen:now] = stepper.dense_output()(plan.times[seen:now]).T  # DOP853 evaluates f here too
+                        states[seen:now] = stepper.dense_output()(plan.times[seen:now]).T  # DOP853 evaluates f here too
                         seen = now
                 except (OverflowError, ZeroDivisionError, ValueError):  # sin of infinity, or no finite Jacobian
                     outcome = "not_finite"
                     break
                 outcome = _judge(stepper, rhs.calls, plan.most(EVALUATIONS))
         reached = plan.horizon if outcome == "ok" else float(stepper.t)
-        return as_run(top, plan.times, found, steps, rhs.calls, outcome, reached)
+        return as_run(top, plan.times, states, steps, rhs.calls, outcome, reached)
 
     return solve
 
@@ -114,7 +115,7 @@ def built_in() -> list[Integrator]:
     """SciPy's methods under the names of this registry."""
     return [
         _entry("RK45", "Dormand-Prince 5(4)", 5, "dormand-prince-1980", explicit=True),
-        _entry("DOP853", "Dormand-Prince 8(5,3)", 8, "hairer-norsett-wanner-1993", explicit=True),
-        _entry("LSODA", "Adams or BDF of variable order", None, "petzold-1983", explicit=False),
+        _entry("DOP853", "Dormand-Prince 8(5,3)", 8, "prince-dormand-1981 hairer-norsett-wanner-1993", explicit=True),
+        _entry("LSODA", "Adams or BDF of variable order", None, "petzold-1983 hindmarsh-1983", explicit=False),
         _entry("Radau", "implicit Radau IIA", 5, "hairer-wanner-1996", explicit=False),
     ]

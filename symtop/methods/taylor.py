@@ -18,12 +18,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.base.multiprecision import context
 from symtop.base.validate import SymtopError
 from symtop.methods.registry import Array, Integrator, Plan, Run, Solver
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import space_momenta
 
+START_DIGITS = 60  # of the multiprecision that a start is converted in
 EPSILON = float(np.finfo(np.float64).eps)
 MOST_STEPS = {"double": 30_000_000, "longdouble": 5_000_000, "quad": 100_000}  # of one run: about two minutes
 
@@ -68,7 +70,6 @@ def arithmetic(precision: str) -> Arithmetic:
     return Arithmetic(hy.real128, 2.0**-112, compact=True)
 
 
-@functools.lru_cache(maxsize=32)
 def stepper(chart: str, precision: str, tolerance: float) -> Any:
     """A compiled heyoka integrator; building one costs 0.1 s the first time, then milliseconds from its disk cache."""
     import heyoka as hy
@@ -79,25 +80,34 @@ def stepper(chart: str, precision: str, tolerance: float) -> Any:
     return hy.taylor_adaptive(system, zero, tol=bound, fp_type=fp_type, compact_mode=working.compact)
 
 
+@functools.lru_cache(maxsize=32)
+def _idle(chart: str, precision: str, tolerance: float) -> list[Any]:
+    """The steppers of one kind that no run is using. A stepper holds the state of its run, so no two runs share one."""
+    return []
+
+
+def _take(idle: list[Any], chart: str, precision: str, tolerance: float) -> Any:
+    try:
+        return idle.pop()  # in one instruction: another thread may be here, too
+    except IndexError:
+        return stepper(chart, precision, tolerance)
+
+
 @functools.lru_cache(maxsize=256)
 def start_numbers(chart: str, precision: str, top: SymmetricTop, at: Angles) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """State and parameters of a start, correctly rounded to the working precision from its exact doubles.
 
     Momenta that were rounded to double first would move theta(8) by 5e-15 in the first scene.
     """
-    from mpmath import mp, workdps
-
-    kind = arithmetic(precision).kind
-    with workdps(60):
-        theta, phi, psi, *rates = (mp.mpf(getattr(at, name)) for name in at.__slots__)
-        place = charts.axis_parts(mp, theta, phi) if chart == "axis" else charts.quaternion_parts(mp, theta, phi, psi)
-        state = [*place, *charts.momentum_parts(mp, top, theta, phi, *rates)]
-        spin = top.I3 * (rates[2] + rates[1] * mp.cos(theta))
-        twist = spin * (1 / mp.mpf(top.I3) - 1 / mp.mpf(top.I1))
-        parameters = [1 / mp.mpf(top.I1), mp.mpf(top.mgl), twist]
-        return tuple(kind(mp.nstr(value, 50)) for value in state), tuple(
-            kind(mp.nstr(value, 50)) for value in parameters
-        )
+    kind, mp = arithmetic(precision).kind, context(START_DIGITS)
+    theta, phi, psi, *rates = (mp.mpf(getattr(at, name)) for name in at.__slots__)
+    place = charts.axis_parts(mp, theta, phi) if chart == "axis" else charts.quaternion_parts(mp, theta, phi, psi)
+    state = [*place, *charts.momentum_parts(mp, top, theta, phi, *rates)]
+    spin = top.I3 * (rates[2] + rates[1] * mp.cos(theta))
+    twist = spin * (1 / mp.mpf(top.I3) - 1 / mp.mpf(top.I1))
+    parameters = [1 / mp.mpf(top.I1), mp.mpf(top.mgl), twist]
+    state_numbers, numbers = (tuple(kind(mp.nstr(value, 50)) for value in row) for row in (state, parameters))
+    return state_numbers, numbers
 
 
 class Flight(NamedTuple):
@@ -116,7 +126,8 @@ def propagate(
 
     After `most` steps (0: never) it stops, and the states end at the last time that was reached.
     """
-    integrator, kind = stepper(chart, precision, tolerance), arithmetic(precision).kind
+    idle, kind = _idle(chart, precision, tolerance), arithmetic(precision).kind
+    integrator = _take(idle, chart, precision, tolerance)
     state, parameters = start_numbers(chart, precision, top, start)
     integrator.time = kind("0")
     integrator.state[:] = state
@@ -124,7 +135,9 @@ def propagate(
     grid = times if times[0] == 0.0 else np.concatenate([[0.0], times])
     numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
     outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=most)
-    return Flight(states[grid.size - times.size :], int(steps), int(integrator.order), outcome.name)
+    order = int(integrator.order)
+    idle.append(integrator)  # not after an exception, which may leave it in any state
+    return Flight(states[grid.size - times.size :], int(steps), order, outcome.name)
 
 
 def solver(chart: str, precision: str) -> Solver:

@@ -25,6 +25,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from symtop.base import datasets
+from symtop.base.multiprecision import context
 from symtop.base.numbers import EPSILON, TINY
 from symtop.base.validate import SymtopError, SymtopWarning, one_of
 from symtop.methods import taylor
@@ -84,30 +85,27 @@ def check_times(scene: Scene, horizon: float) -> charts.Array:
 
 def _seen(scene: Scene, times: charts.Array, quaternions: Any, phis: Any, psis: Any) -> Checks:
     """Running maxima of the errors of given attitudes and angles, against the closed form in `DIGITS` digits."""
-    from mpmath import mp, workdps
-
     from symtop.model.precise_form import PreciseForm
 
-    precise = PreciseForm(scene.top, scene.start, DIGITS)
+    precise, mp = PreciseForm(scene.top, scene.start, DIGITS), context(DIGITS + 10)
     rows = []
-    with workdps(DIGITS + 10):
-        for t, *numbers, phi, psi in zip(times, *quaternions.T, phis, psis, strict=True):
-            true = w, x, y, z = precise.quaternion(float(t))
-            attitude = [_mpf(value) for value in numbers]
-            if sum(a * b for a, b in zip(attitude, true, strict=True)) < 0:
-                attitude = [-value for value in attitude]
-            turn = 2.0 * float(mp.norm([a - b for a, b in zip(attitude, true, strict=True)]))
-            tilt = float(mp.norm([a - b for a, b in zip(_axis(attitude), _axis(true), strict=True)]))
-            total, difference = mp.atan2(z, w), mp.atan2(y, x)
-            rows.append((turn, tilt, _turn(_mpf(phi), total + difference), _turn(_mpf(psi), total - difference)))
+    for t, *components, phi, psi in zip(times, *quaternions.T, phis, psis, strict=True):
+        true = w, x, y, z = tuple(map(mp.convert, precise.quaternion(float(t))))  # all digits, in this arithmetic
+        attitude = [_read(mp, value) for value in components]
+        if sum(a * b for a, b in zip(attitude, true, strict=True)) < 0:
+            attitude = [-value for value in attitude]
+        turn = 2.0 * float(mp.norm([a - b for a, b in zip(attitude, true, strict=True)]))
+        tilt = float(mp.norm([a - b for a, b in zip(_axis(attitude), _axis(true), strict=True)]))
+        total, difference = mp.atan2(z, w), mp.atan2(y, x)
+        phi_error = _turn(mp, _read(mp, phi), total + difference)
+        rows.append((turn, tilt, phi_error, _turn(mp, _read(mp, psi), total - difference)))
     table = np.maximum.accumulate(np.array(rows), axis=0)
     return Checks(times, *table.T)
 
 
-def _mpf(value: Any) -> Any:
-    from mpmath import mpf
-
-    return mpf(float(value)) if isinstance(value, float) else mpf(str(value))
+def _read(mp: Any, value: Any) -> Any:
+    """A number of any arithmetic in multiprecision."""
+    return mp.mpf(float(value)) if isinstance(value, float) else mp.mpf(str(value))
 
 
 def _axis(quaternion: Any) -> tuple[Any, Any, Any]:
@@ -115,10 +113,8 @@ def _axis(quaternion: Any) -> tuple[Any, Any, Any]:
     return 2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z
 
 
-def _turn(angle: Any, true: Any) -> float:
+def _turn(mp: Any, angle: Any, true: Any) -> float:
     """Distance of two angles modulo a full turn."""
-    from mpmath import mp
-
     gap = (angle - true) / (2 * mp.pi)
     return abs(float((gap - mp.nint(gap)) * 2 * mp.pi))
 

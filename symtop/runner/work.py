@@ -25,7 +25,7 @@ from symtop.runner import plugins, scripts, store
 from symtop.runner.study import Case, Study
 
 GRACE = 5.0  # seconds between asking a case to end and ending its process
-_alone = threading.Lock()  # mpmath's precision belongs to the process: one case at a time in it
+_loading = threading.Lock()  # a file that two threads load at once would be executed twice
 _expendable: list[bool] = []  # not empty in a process that may be ended for a case's sake
 
 
@@ -56,22 +56,22 @@ def compute(task: Task, study: Study | None = None, *, wait: bool = False) -> Re
 
     Another process is given no `study` and loads it by name. Raises SymtopError where the place is at fault.
     """
-    with _alone:
+    with _loading:
         for file in task.plugins:
             plugins.load(file)
         study = study or scripts.load(task.study)
-        path, case = Path(task.path), task.case
-        if study.digest(case) != store.digest_of(path):
-            raise SymtopError(
-                f"the sources or dependencies of {case.integrator} on {case.scene} are not those that the study was "
-                "started with; if a file was edited meanwhile, run the study again"
-            )
-        with store.claim(path, wait=wait) as ours:
-            if not ours:
-                return Result("busy")
-            if not task.fresh and store.load_case(path) is not None:
-                return Result("found")
-            return _compute(study, task, path)
+    path, case = Path(task.path), task.case
+    if study.digest(case) != store.digest_of(path):
+        raise SymtopError(
+            f"the sources or dependencies of {case.integrator} on {case.scene} are not those that the study was "
+            "started with; if a file was edited meanwhile, run the study again"
+        )
+    with store.claim(path, wait=wait) as ours:
+        if not ours:
+            return Result("busy")
+        if not task.fresh and store.load_case(path) is not None:
+            return Result("found")
+        return _compute(study, task, path)
 
 
 def _compute(study: Study, task: Task, path: Path) -> Result:

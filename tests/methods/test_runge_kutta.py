@@ -10,7 +10,7 @@ from symtop.measure.conservation import residuals, trend
 from symtop.measure.errors import errors_against
 from symtop.measure.growth import growth
 from symtop.methods import dormand_prince
-from symtop.methods.euler_lagrange import unreduced
+from symtop.methods.euler_lagrange import with_rates
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.registry import integrator
 from symtop.methods.runge_kutta import Tableau, march_angles, runge_kutta
@@ -56,7 +56,7 @@ def test_a_users_tableau_has_its_order(a, b, order):
 
 def test_one_step_is_the_definition():
     scene = symtop.scene("spheroid")
-    par, state = unreduced(scene.top, scene.start)
+    par, state = with_rates(scene.top, scene.start)
     h, y, f = 0.01, np.array(state), EulerLagrange(scene.top)
     k1 = np.array(f(0.0, y))
     k2 = np.array(f(0.0, y + h / 2 * k1))
@@ -83,7 +83,7 @@ def test_rk4_loses_energy_linearly():
 
 def test_rk4_is_not_reversible():
     scene = symtop.scene("spheroid")
-    par, state = unreduced(scene.top, scene.start)
+    par, state = with_rates(scene.top, scene.start)
     rule, one, h = Tableau((0.5, 0.0, 0.5, 0.0, 0.0, 1.0), KUTTA_B), np.array([1]), 0.02
     there = march_angles(par, rule, state, h, one).states[0]
     back = march_angles(par, rule, tuple(there), -h, one).states[0]
@@ -112,7 +112,7 @@ def test_bad_tableaux_are_refused(a, b, c, words):
 
 def _walk(scene, tolerance, horizon, pair=dormand_prince.DORMAND_PRINCE):
     plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon, 301)
-    return plan, dormand_prince.walk(scene.top, scene.start, plan, pair, record=100_000)
+    return plan, dormand_prince.adaptive_run(scene.top, scene.start, plan, pair, record=100_000)
 
 
 def _assert_same_steps(scene, tolerance, horizon, close, pair=dormand_prince.DORMAND_PRINCE):
@@ -120,14 +120,14 @@ def _assert_same_steps(scene, tolerance, horizon, close, pair=dormand_prince.DOR
     from scipy.integrate import solve_ivp
 
     plan, mine = _walk(scene, tolerance, horizon, pair)
-    _, start = unreduced(scene.top, scene.start)
+    _, start = with_rates(scene.top, scene.start)
     rhs, knobs = EulerLagrange(scene.top), {"rtol": tolerance, "atol": tolerance}
     theirs = solve_ivp(rhs, (0.0, horizon), start, **knobs)
     assert mine.steps == theirs.t.size - 1
     assert mine.evaluations == theirs.nfev
     np.testing.assert_allclose(np.diff(mine.ends, prepend=0.0), np.diff(theirs.t), rtol=close)
     sampled = solve_ivp(rhs, (0.0, horizon), start, t_eval=plan.times, **knobs)
-    np.testing.assert_allclose(mine.found, sampled.y.T, atol=1e-9)
+    np.testing.assert_allclose(mine.states, sampled.y.T, atol=1e-9)
 
 
 def test_the_tableau_is_scipys():
@@ -172,7 +172,7 @@ def test_adaptive_outcomes(monkeypatch):
     plan, run = _walk(scene, 1e-9, 8.0)
     assert run.outcome == "out_of_budget"
     assert 0.0 < run.reached < 8.0
-    assert np.array_equal(np.isfinite(run.found[:, 0]), plan.times <= run.reached)
+    assert np.array_equal(np.isfinite(run.states[:, 0]), plan.times <= run.reached)
 
 
 def test_blocks_do_not_show(monkeypatch):
@@ -180,7 +180,7 @@ def test_blocks_do_not_show(monkeypatch):
     whole = _walk(scene, 1e-7, 8.0)[1]
     monkeypatch.setattr(dormand_prince, "BLOCK", 100)
     parts = _walk(scene, 1e-7, 8.0)[1]
-    np.testing.assert_array_equal(parts.found, whole.found)
+    np.testing.assert_array_equal(parts.states, whole.states)
     np.testing.assert_array_equal(parts.ends, whole.ends)
     assert parts.evaluations == whole.evaluations
 
@@ -212,7 +212,7 @@ def test_scipys_solvers_are_solve_ivp(name):
     rhs = EulerLagrange(scene.top)
     method = integrator(name).summary.split()[1]
     done = solve_ivp(
-        rhs, (0.0, 2.0), unreduced(scene.top, scene.start)[1], method, run["time"].values, rtol=1e-6, atol=1e-6
+        rhs, (0.0, 2.0), with_rates(scene.top, scene.start)[1], method, run["time"].values, rtol=1e-6, atol=1e-6
     )
     np.testing.assert_array_equal(run["theta"], done.y[0])
     assert run.attrs["force_evaluations"] == rhs.calls  # more than nfev where a Jacobian is made of differences

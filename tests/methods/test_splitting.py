@@ -14,7 +14,6 @@ from symtop.measure.order import power_law
 from symtop.measure.step_map import one_step, symplectic_defect
 from symtop.methods import coefficients as tables
 from symtop.methods import splitting_space as space
-from symtop.methods.citations import ENTRIES
 from symtop.methods.coefficients import Table
 from symtop.methods.registry import Plan
 from symtop.methods.splitting import built_in, composition
@@ -390,6 +389,5 @@ def test_every_method_has_a_citation():
         assert entry.startswith("@")
         assert "year = {" in entry
     assert "Takahashi" in symtop.citation("takahashi-imada")
-    assert all(fields["author"] and 1900 < int(fields["year"]) < 2030 for _, fields in ENTRIES.values())
     with pytest.raises(symtop.SymtopError, match="names no source that is known here"):
         symtop.citation(composition("mine", (1.0,), (0.5, 0.5)))

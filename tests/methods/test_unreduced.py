@@ -10,7 +10,7 @@ from symtop.measure.step_map import one_step, return_miss, symplectic_defect
 from symtop.methods import unreduced as kernel
 from symtop.methods.discrete_lagrangian import RULES, Quadrature
 from symtop.methods.loop import driver
-from symtop.methods.unreduced import march, unreduced, whole
+from symtop.methods.unreduced import march, unreduced, with_momenta
 from tests.conftest import random_scenes
 from tests.methods.test_integrators import fitted
 
@@ -93,7 +93,7 @@ def test_a_lopsided_rule_misses_the_start():
 def momentum_walk(scene_name, loop, steps=1_000_000):
     """Largest relative change of p_phi and p_psi, and the larger of their trends, with the midpoint rule."""
     where = symtop.scene(scene_name)
-    par, state = whole(where.top, where.start)
+    par, state = with_momenta(where.top, where.start)
     marks = np.arange(0, steps + 1, 997)
     done = loop(par, Quadrature((0.5,), (1.0,)), state, 0.01, marks)
     scale = max(abs(state[4]), abs(state[5]))
@@ -132,7 +132,7 @@ def test_one_iteration_a_step_lets_the_momenta_go(scene_name):
 def test_newtons_jacobian_is_that_of_the_discrete_legendre_transform(rule):
     """A correction misses the root by the square of the distance to it; with one wrong entry, by the distance."""
     where, h = random_scenes(1, seed=13)[0], 0.05
-    par, state = whole(where.top, where.start)
+    par, state = with_momenta(where.top, where.start)
     table = Quadrature(*RULES[rule][:2])
     root = np.array(kernel._rates(par, state))
 

@@ -1,0 +1,101 @@
+"""The paragraph and the sources of every integrator: there, and right where a number can be compared."""
+
+import re
+
+import pytest
+from scipy import integrate
+
+import symtop
+from symtop.methods.about import paragraphs
+from symtop.methods.citations import entries
+from symtop.methods.fixed_step import inside
+
+NAMES = tuple(symtop.integrators())
+COUNTED = """zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen
+seventeen"""
+NUMBERS = {word: value for value, word in enumerate(COUNTED.split())} | {"thirty-five": 35}
+COST = re.compile(r"(\S+) force evaluations? (a step|an iteration|a sweep)")
+
+
+def cost_in_words(text):
+    """What a paragraph says of the force evaluations: number and unit, the first time that it says so."""
+    word, unit = COST.search(text).groups()
+    return NUMBERS[word], unit
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_integrator_has_a_paragraph(name):
+    about = symtop.integrator(name).about
+    assert about == paragraphs()[name]
+    assert 80 <= len(about.split()) <= 150
+    assert re.search(r"\buse\b", about, re.IGNORECASE)  # when, and when not
+    assert "Source: " in about
+
+
+def test_other_integrators_that_a_paragraph_names_exist():
+    for text in paragraphs().values():
+        for name in re.findall(r"`([a-z0-9-]+)`", text):
+            assert name in (*NAMES, "spheroid"), name
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_paragraph_names_another_order_or_another_property_than_the_record(name):
+    method, about = symtop.integrator(name), symtop.integrator(name).about
+    orders = {int(number) for number in re.findall(r"\bOrder (\d+)", about)}
+    assert orders == (set() if method.order is None else {method.order})
+    assert ("not symplectic" in about) == (not method.symplectic)
+    assert "symplectic" in about
+    assert ("not symmetric" in about) == (not method.symmetric)
+    assert "symmetric" in about
+    for quantity in method.conserves & {"p_phi", "p_psi", "energy"}:
+        assert quantity in about
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if symtop.integrator(name).knob == "step_size"])
+def test_no_paragraph_names_another_cost_than_the_one_that_is_counted(name):
+    method = symtop.integrator(name)
+    number, unit = cost_in_words(method.about)
+    run = symtop.simulate("spheroid", method, step_size=0.01, horizon=1.0)
+    forces, steps, iterations = (run.attrs[key] for key in ("force_evaluations", "steps", "newton_iterations"))
+    if method.explicit:
+        assert unit == "a step"
+        assert forces == number * steps
+    else:
+        assert unit in ("an iteration", "a sweep")
+        each_step = inside(next(iter(method.solvers.values()))).each_step
+        assert ("one more at the start of a step" in method.about) == (each_step == 1)
+        assert forces == number * iterations + each_step * steps
+
+
+def test_the_cost_of_the_adaptive_explicit_methods_is_that_of_their_tableaux():
+    for name, stages in (("rk45", integrate.RK45), ("rk45-compiled", integrate.RK45), ("dop853", integrate.DOP853)):
+        assert cost_in_words(symtop.integrator(name).about) == (stages.n_stages, "a step")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_integrator_names_sources_that_are_known_and_its_paragraph_their_years(name):
+    method = symtop.integrator(name)
+    keys = method.reference.split()
+    assert keys
+    assert set(keys) <= set(entries())
+    for key in keys:
+        year = re.search(r"^  year = \{(\d{4})\},$", entries()[key], re.MULTILINE)[1]
+        assert f"({year})" in method.about
+        assert symtop.citation(name).count(entries()[key]) == 1
+
+
+def test_entries_are_bibtex_with_balanced_braces_and_an_author():
+    for key, text in entries().items():
+        assert text.startswith("@")
+        assert text.count("{") == text.count("}")
+        assert re.search(r"^  author = \{.+\},$", text, re.MULTILINE), key
+        assert text.splitlines()[0].endswith(f"{{{key},")
+
+
+def test_no_entry_is_cited_by_nobody():
+    assert set(entries()) == {key for name in NAMES for key in symtop.integrator(name).reference.split()}
+
+
+def test_an_integrator_of_ones_own_says_what_its_author_says():
+    mine = symtop.runge_kutta("euler", ((),), (1.0,), order=1)
+    assert mine.about == ""

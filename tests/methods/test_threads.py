@@ -1,0 +1,106 @@
+"""Threads that work at the same time, each in a precision of its own, get the digits that they would get alone."""
+
+import threading
+
+import mpmath
+import numpy as np
+import pytest
+
+import symtop
+from symtop.base.multiprecision import context
+from symtop.methods import taylor
+from symtop.methods.gauss import gauss_rule
+
+pytest.importorskip("heyoka")
+SCENES = ("spheroid", "goldstein")
+
+
+def together(*tasks):
+    """What each task returns, each run in a thread of its own; they begin together."""
+    barrier, results = threading.Barrier(len(tasks)), [None] * len(tasks)
+
+    def work(i):
+        barrier.wait()
+        results[i] = tasks[i]()
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(len(tasks))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return results
+
+
+def digits(number, times):
+    """sqrt(2) in a context of this thread, many times over."""
+    return {str(context(number).sqrt(2)) for _ in range(times)}
+
+
+def coefficients():
+    """The Gauss method of 12th order from scratch, in 40 digits."""
+    return np.concatenate([np.ravel(part) for part in gauss_rule.__wrapped__(6)])
+
+
+def numbers(name):
+    """A start in quadruple precision, from scratch, in 60 digits."""
+    scene = symtop.scene(name)
+    return str(taylor.start_numbers.__wrapped__("attitude", "quad", scene.top, scene.start))
+
+
+def disturbed(times):
+    """What the process-wide context does meanwhile in somebody else's thread."""
+    for k in range(times):
+        with mpmath.workdps(3 + k % 5):
+            mpmath.sqrt(2)
+
+
+def test_contexts_of_two_threads_keep_their_own_digits():
+    few, many = together(lambda: digits(20, 2000), lambda: digits(50, 2000))
+    assert few == {str(context(20).sqrt(2))}
+    assert many == {str(context(50).sqrt(2))}
+    assert [len(few.pop()), len(many.pop())] == [21, 51]  # a point and the digits
+
+
+def test_coefficients_and_starts_are_those_computed_alone_while_others_change_the_precision():
+    alone = coefficients(), numbers("spheroid"), numbers("goldstein")
+    rule, first, second, _ = together(
+        lambda: [coefficients() for _ in range(5)],
+        lambda: [numbers("spheroid") for _ in range(20)],
+        lambda: [numbers("goldstein") for _ in range(20)],
+        lambda: disturbed(20_000),
+    )
+    assert all(np.array_equal(values, alone[0]) for values in rule)
+    assert set(first) == {alone[1]}
+    assert set(second) == {alone[2]}
+
+
+def test_the_precision_of_mpmath_itself_is_neither_used_nor_changed():
+    alone = coefficients(), numbers("spheroid")
+    with mpmath.workdps(5):
+        assert np.array_equal(coefficients(), alone[0])
+        assert numbers("spheroid") == alone[1]
+        assert mpmath.mp.dps == 5
+
+
+def test_references_of_two_scenes_made_at_once_are_those_made_alone(tmp_path, monkeypatch):
+    times = np.linspace(0.0, 5.0, 6)
+
+    def bounds(name, folder):
+        monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / folder))
+        return symtop.reference(name, times, precision="quad")
+
+    alone = [bounds(name, "alone") for name in SCENES]
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "together"))
+    made = together(*(lambda name=name: symtop.reference(name, times, precision="quad") for name in SCENES))
+    for one, other in zip(alone, made, strict=True):
+        for variable in one.data_vars:
+            np.testing.assert_array_equal(one[variable], other[variable])
+
+
+def test_taylor_runs_of_one_kind_at_once_do_not_share_a_stepper():
+    def runs(name):
+        return [symtop.simulate(name, "taylor", horizon=50.0, samples=200)["axis"].values for _ in range(20)]
+
+    alone = [runs(name)[0] for name in SCENES]
+    for expected, states in zip(alone, together(*(lambda name=name: runs(name) for name in SCENES)), strict=True):
+        assert all(np.array_equal(expected, one) for one in states)
