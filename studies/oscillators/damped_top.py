@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 from symtop.base.validate import SymtopError, finite, one_of
 from symtop.methods import unreduced
 from symtop.methods.compiled import register_jitable
-from symtop.methods.discrete_lagrangian import RULES, quadrature
 from symtop.methods.loop import March, Marks, driver
+from symtop.methods.quadrature import RULES, quadrature
 from symtop.methods.unreduced import unreduced_step, with_momenta
 from symtop.model.top import Angles, SymmetricTop
 
@@ -76,7 +76,7 @@ march = driver(begin, increment, observe)
 def damped_run(top: SymmetricTop, start: Angles, friction: Friction, rule: str, h: float, marks: Marks) -> March:
     """States (theta, phi, psi, p_theta, p_phi, p_psi) after the numbers of steps in `marks`, shape (samples, 6).
 
-    `rule` is a name of `discrete_lagrangian.RULES`. SymtopError for a pole, an unknown rule or a bad friction.
+    `rule` is a name of `quadrature.RULES`. SymtopError for a pole, an unknown rule or a bad friction.
     """
     numbers = quadrature(*RULES[one_of("rule", rule, RULES)][:2])[0]
     bare, state = with_momenta(top, start)

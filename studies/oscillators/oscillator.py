@@ -30,8 +30,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from symtop.base.validate import SymtopError, finite, positive, whole
 from symtop.methods.compiled import register_jitable
-from symtop.methods.discrete_lagrangian import RULES, Quadrature, quadrature
 from symtop.methods.loop import driver
+from symtop.methods.quadrature import RULES, Quadrature, quadrature
 
 Array = NDArray[np.float64]
 

@@ -24,8 +24,9 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.base.validate import SymtopError
-from symtop.methods.discrete_lagrangian import Quadrature, rule_of
+from symtop.methods.discrete_lagrangian import rule_of
 from symtop.methods.galerkin import is_galerkin
+from symtop.methods.quadrature import Quadrature
 from symtop.methods.registry import Integrator, Plan
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene

@@ -24,14 +24,12 @@ p_phi - p_psi C is formed as north sum w cos^2(theta/2) + south sum w sin^2(thet
 poles. Source: Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.base.validate import SymtopError, row
 from symtop.methods.angles import chart_outcome, reduced
 from symtop.methods.compiled import register_jitable
 from symtop.methods.fixed_step import fixed_step
@@ -39,22 +37,10 @@ from symtop.methods.fused import fused
 from symtop.methods.loop import driver
 from symtop.methods.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton
 from symtop.methods.outcomes import NOT_CONVERGED
+from symtop.methods.quadrature import RULES, Quadrature, quadrature
 from symtop.methods.registry import Array, Integrator, Plan, Run, Solver
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View
-
-
-class Quadrature(NamedTuple):
-    """Nodes and weights of a rule on [0, 1], and the stop rule of its Newton iteration.
-
-    The iteration stops after a correction below `tolerance` times the step's increment. Newton converges
-    quadratically and the last correction is applied to first order, so 1e-8 leaves only rounding.
-    """
-
-    nodes: tuple[float, ...]
-    weights: tuple[float, ...]
-    tolerance: float = 1e-8
-    iterations: int = 50
 
 
 class _Sums(NamedTuple):
@@ -257,22 +243,6 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 march = driver(begin, increment, observe)
 
 
-def quadrature(nodes: Sequence[float], weights: Sequence[float]) -> tuple[Quadrature, bool]:
-    """The checked rule with its nodes in order, and whether it reads the same from both ends."""
-    points, shares = tuple(row("nodes", nodes)), tuple(row("weights", weights))
-    if len(points) != len(shares) or not points:
-        raise SymtopError(f"nodes and weights must be equally many, at least one, not {len(points)} and {len(shares)}")
-    if not all(0.0 <= node <= 1.0 for node in points):
-        raise SymtopError(f"nodes must lie in [0, 1], not {points}")
-    if abs(math.fsum(shares) - 1.0) > 1e-14:
-        raise SymtopError(f"weights must sum to 1, not {math.fsum(shares)!r}")
-    pairs = sorted(zip(points, shares, strict=True))
-    mirror = sorted((1.0 - node, share) for node, share in pairs)
-    symmetric = all(abs(a - c) + abs(b - d) < 1e-15 for (a, b), (c, d) in zip(pairs, mirror, strict=True))
-    points, shares = (tuple(column) for column in zip(*pairs, strict=True))
-    return Quadrature(points, shares), symmetric
-
-
 @dataclass(frozen=True)
 class StraightLine:
     """A solver that remembers its rule, so that other ways to step the same rule can be set beside it."""
@@ -351,22 +321,14 @@ def discrete_lagrangian(
     return replace(entry, modified_energy=midpoint_energy) if is_midpoint(entry) else entry
 
 
-# name: nodes, weights, order
-RULES: dict[str, tuple[tuple[float, ...], tuple[float, ...], int]] = {
-    "midpoint": ((0.5,), (1.0,), 2),
-    "trapezoidal": ((0.0, 1.0), (0.5, 0.5), 2),
-    "simpson-linear": ((0.0, 0.5, 1.0), (1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0), 2),
-}
-
-
 def built_in() -> list[Integrator]:
     """The rules that ship with symtop."""
-    said = {
+    summaries = {
         "midpoint": "discrete Lagrangian, midpoint rule",
         "trapezoidal": "discrete Lagrangian, trapezoidal rule",
         "simpson-linear": "discrete Lagrangian, Simpson's rule on a straight line (order 2: the line limits it)",
     }
     return [
-        discrete_lagrangian(name, nodes, weights, order=order, summary=said[name])
+        discrete_lagrangian(name, nodes, weights, order=order, summary=summaries[name])
         for name, (nodes, weights, order) in RULES.items()
     ]

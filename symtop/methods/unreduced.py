@@ -25,11 +25,12 @@ import numpy as np
 
 from symtop.methods.angles import BareTop, chart_outcome, require_chart
 from symtop.methods.compiled import register_jitable
-from symtop.methods.discrete_lagrangian import RULES, quadrature, record
+from symtop.methods.discrete_lagrangian import record
 from symtop.methods.fixed_step import fixed_step
 from symtop.methods.loop import driver
 from symtop.methods.newton import Correction, newton
 from symtop.methods.outcomes import NOT_CONVERGED
+from symtop.methods.quadrature import RULES, quadrature
 from symtop.methods.registry import Array, Integrator
 from symtop.model.top import Angles, SymmetricTop
 

@@ -11,9 +11,10 @@ from symtop.measure.order import order
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
 from symtop.methods import discrete_lagrangian as family
 from symtop.methods.angles import reduced
-from symtop.methods.discrete_lagrangian import Quadrature, march
+from symtop.methods.discrete_lagrangian import march
 from symtop.methods.fixed_step import fixed_step
 from symtop.methods.loop import driver
+from symtop.methods.quadrature import Quadrature
 from symtop.methods.registry import Integrator
 from tests.conftest import random_scenes
 

@@ -18,7 +18,8 @@ from symtop_studies.reduction.tables import Column, commutation_table, unreduced
 import symtop
 from symtop.measure.order import power_law
 from symtop.methods import registry
-from symtop.methods.discrete_lagrangian import Quadrature, rule_of
+from symtop.methods.discrete_lagrangian import rule_of
+from symtop.methods.quadrature import Quadrature
 from tests.conftest import random_scenes
 
 SCENES = ("spheroid", "goldstein")

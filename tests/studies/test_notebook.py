@@ -29,8 +29,8 @@ import symtop
 from symtop.base.validate import SymtopError
 from symtop.measure.modified_energy import modified_energy
 from symtop.measure.order import power_law
-from symtop.methods.discrete_lagrangian import RULES
 from symtop.methods.euler_lagrange import accelerations, momenta
+from symtop.methods.quadrature import RULES
 from symtop.methods.registry import Plan
 from symtop.report import solid
 
