@@ -133,6 +133,7 @@ def recommend(
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(scene, accuracy, quantity, horizon, [], (), source)
     guesses, source = _candidates(scene, accuracy, quantity, horizon, data)
+    source += f" ({Path(results) / STORED_STUDY})" if results is not None else ""
     trials: list[_Trial] = []
     fails: dict[str, list[str]] = {}
     methods, patience = integrators(), math.inf

@@ -10,6 +10,7 @@ from benchmarks.peers import load
 from benchmarks.peers.measure import SCENES, measure
 from benchmarks.peers.summary import STUDY, lines
 from symtop.base import datasets
+from symtop.report import style
 from symtop.runner import run, store
 
 
@@ -29,7 +30,9 @@ def main() -> None:
     else:
         data = datasets.describe(measure(peers, options.scenes), STUDY.title, question=STUDY.question)
         datasets.write(data, file)
-    findings = run.findings_of(STUDY, data, options.results, failures=missing, cases=data["seconds"].count().item())
+    findings = run.findings_of(
+        STUDY, data, options.results, style.save, failures=missing, cases=data["seconds"].count().item()
+    )
     store.write_json(options.results / "peers.json", findings)
     print("\n".join(lines(data)))
 

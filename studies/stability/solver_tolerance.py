@@ -52,7 +52,7 @@ def _textbook_midpoint(par, theta, p, h, tolerance, iterations, marks, samples):
 
 @functools.cache
 def _compiled_textbook() -> Any:
-    return compile_kernel(_textbook_midpoint, _textbook_midpoint, model.effective_force)
+    return compile_kernel(_textbook_midpoint)
 
 
 class SolverError(NamedTuple):

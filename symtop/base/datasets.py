@@ -8,7 +8,6 @@ import contextlib
 import functools
 import glob
 import hashlib
-import importlib.metadata
 import json
 import os
 import platform
@@ -24,29 +23,30 @@ import numpy as np
 import xarray as xr
 
 from symtop import __version__
+from symtop.base.fingerprint import version
 from symtop.base.validate import SymtopError
 
 _one_thread = threading.RLock()  # two threads inside the netCDF library at once end the process (segmentation fault)
 
-# name: (long name, units)
-VARIABLES: dict[str, tuple[str, str]] = {
-    "time": ("elapsed time", "s"),
+# name: (long name, units in SI, where they differ: units of a problem without any)
+VARIABLES: dict[str, tuple[str, ...]] = {
+    "time": ("elapsed time", "s", "1"),
     "theta": ("nutation angle", "rad"),
     "phi": ("precession angle, unwrapped", "rad"),
     "psi": ("spin angle, unwrapped", "rad"),
     "axis": ("unit vector along the axis of the top, space frame", "1"),
     "quaternion": ("attitude, body to space, (w, x, y, z)", "1"),
-    "energy": ("total energy", "kg m2 s-2"),
-    "p_theta": ("momentum conjugate to theta", "kg m2 s-1"),
-    "p_phi": ("momentum conjugate to phi, recomputed from the trajectory", "kg m2 s-1"),
-    "p_psi": ("momentum conjugate to psi, recomputed from the trajectory", "kg m2 s-1"),
+    "energy": ("total energy", "kg m2 s-2", "1"),
+    "p_theta": ("momentum conjugate to theta", "kg m2 s-1", "1"),
+    "p_phi": ("momentum conjugate to phi, recomputed from the trajectory", "kg m2 s-1", "1"),
+    "p_psi": ("momentum conjugate to psi, recomputed from the trajectory", "kg m2 s-1", "1"),
 }
 
 Tree = TypeVar("Tree", bound=xr.Dataset | xr.DataTree)
 Row = TypeVar("Row", bound=NamedTuple)
 
 LITTLE = 1_000_000  # bytes of a disk that count as none
-_DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")
+_DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")  # told in every file
 
 
 def _git(*words: str) -> str:
@@ -78,12 +78,7 @@ def _processor() -> str:
 
 @functools.lru_cache(maxsize=1)
 def _provenance() -> tuple[tuple[str, str], ...]:
-    versions = {}
-    for package in _DEPENDENCIES:
-        try:
-            versions[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            versions[package] = "absent"
+    versions = {package: version(package) for package in _DEPENDENCIES}
     revision = _git("rev-parse", "--short=12", "HEAD") or "unknown"
     dirty = bool(_git("status", "--porcelain", "--", "symtop", "studies"))
     return (
@@ -108,12 +103,15 @@ def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
     return {node.path.strip("/"): node.to_dataset(inherit=False) for node in data.subtree}
 
 
-def describe(data: Tree, title: str, **attributes: Any) -> Tree:
-    """Give the variables their names and units and the dataset, or a tree's root, its provenance and attributes."""
+def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree:
+    """Give the variables their names and units and the dataset, or a tree's root, its provenance and attributes.
+
+    `units` is that of the scene: "SI", or empty for a problem without units, where all but angles have the unit "1".
+    """
     for group in groups(data).values():
         for name in VARIABLES.keys() & group.variables.keys():
-            long_name, units = VARIABLES[name]
-            group[name].attrs.update(long_name=long_name, units=units)
+            long_name, *choice = VARIABLES[name]
+            group[name].attrs.update(long_name=long_name, units=choice[0 if units == "SI" else -1])
     plain = {key: _plain(value) for key, value in attributes.items()}
     data.attrs.update({"Conventions": "CF-1.11", "title": title, "source": "symtop", **plain, **provenance()})
     return data
@@ -184,12 +182,12 @@ def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
 
 
 def _room(folder: Path) -> str:
-    """What to say if there is no room left in a folder; empty if there is."""
+    """A sentence if there is no room left in a folder; empty if there is."""
     free = shutil.disk_usage(folder).free
     return f"no room is left in {folder}" if free < LITTLE else ""
 
 
-def fingerprint(data: xr.Dataset) -> str:
+def content_hash(data: xr.Dataset) -> str:
     """Hash of all values and their dimensions, so that a damaged or foreign file cannot pass for a good one."""
     digest = hashlib.sha256()
     for name in sorted(str(name) for name in data.variables):
@@ -210,6 +208,15 @@ def read(path: str | os.PathLike[str]) -> xr.Dataset:
             return data.load()
     except (OSError, ValueError, RuntimeError) as error:
         raise SymtopError(f"cannot read {path} as netCDF: {error}") from error
+
+
+def attributes(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The attributes of a netCDF file; none if it cannot be read."""
+    try:
+        with _one_thread, xr.open_dataset(path, engine="netcdf4") as data:
+            return dict(data.attrs)
+    except (OSError, ValueError, RuntimeError):
+        return {}
 
 
 def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:

@@ -120,18 +120,17 @@ def _heyoka() -> list[Finding]:
 
 
 def _caches() -> list[Finding]:
-    from symtop.methods.compiled import cache_root, source_digest
+    from symtop.base.cache import DAY, by_last_use, cache_root, size_of
 
-    root = cache_root()
+    root, yesterday = cache_root(), time.time() - DAY
     findings = [_writable("cache", root, "set SYMTOP_CACHE to a folder that can be written")]
     for name, remedy in (("kernels", "compiled again"), ("reference", "computed again")):
         folder = root / name
-        files = [path for path in folder.rglob("*") if path.is_file()] if folder.is_dir() else []
-        size = sum(path.stat().st_size for path in files)
-        result = f"{len(files)} files, {_bytes(size)}"
-        if name == "kernels":
-            current = (folder / source_digest()).is_dir()
-            result += ", some compiled from these sources" if current else ", none compiled from these sources"
+        entries = by_last_use(folder)
+        size = sum(size_of(entry) for entry in entries)
+        recent = sum(entry.stat().st_mtime >= yesterday for entry in entries)
+        result = f"{len(entries)} {'kernels' if name == 'kernels' else 'files'}, {_bytes(size)}"
+        result += f", {recent} of them used or made within a day" if entries else ""
         advice = f"{folder} may be deleted at any time; what is needed is {remedy}"
         findings.append(Finding(f"{name} cache", result, size < LARGE_CACHE, advice))
     return findings

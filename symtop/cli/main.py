@@ -43,6 +43,7 @@ for command in (
 @click.option("--full", is_flag=True, help="The longest grid, for the studies that have one.")
 @click.option("--fresh", is_flag=True, help="Compute every case again; with --check, compare every case.")
 @click.option("--status", "only_status", is_flag=True, help="Print the state of every case; compute nothing.")
+@click.option("--why", is_flag=True, help="With --status: what has changed, one line for all cases with that reason.")
 @click.option(
     "--check", "only_check", is_flag=True, help="Compute some stored cases again, in another folder, and compare."
 )
@@ -57,8 +58,8 @@ for command in (
 @json_option
 @plugin_option
 def study(
-    names: tuple[str, ...], every: bool, quick: bool, full: bool, fresh: bool, only_status: bool, only_check: bool,
-    jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool,
+    names: tuple[str, ...], every: bool, quick: bool, full: bool, fresh: bool, only_status: bool, why: bool,
+    only_check: bool, jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool,
     plugin_files: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Run studies by NAME: datasets, figures and findings into the results folder.
@@ -72,19 +73,21 @@ def study(
     symtop study convergence drift
     symtop study --all --quick
     symtop study stability --plugin my_methods.py
-    symtop study --all --status
+    symtop study --all --status --why
     symtop study convergence --scheduler tcp://10.0.0.1:8786
     """
     from symtop.cli import study as command
 
     load_plugins(plugin_files)
+    if why and not only_status:
+        raise SymtopError("why must be given together with status")
     if quick and full:
         raise SymtopError("quick and full must not be given together")
     if limit is not None:
         positive("limit", limit)
     folder = Path(results) / "quick" if quick else Path(results)
     chosen = command.choose(names, every=every)
-    options = command.Options(folder, quick, full, fresh, jobs, scheduler, limit, as_json)
+    options = command.Options(folder, quick, full, fresh, jobs, scheduler, limit, as_json, why)
     if only_status:
         code = command.show_status(chosen, options)
     else:

@@ -1,22 +1,21 @@
-"""What ``symtop study`` does: run, show the status of, or check several studies, and end with a code."""
+"""The command ``symtop study``: run several studies, show their status, or check them; ends with an exit code."""
 
-import contextlib
 import json
-import signal
-import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Any, NamedTuple
 
 import click
 
+from symtop.base.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
 from symtop.base.validate import SymtopError
 from symtop.runner import check, run, scripts
+from symtop.runner import status as status_
 from symtop.runner.pools import Workers
 from symtop.runner.study import Study
 
-INTERRUPTED, TERMINATED = 130, 143  # 128 and the number of the signal, as shells have it
+MOST_NAMED = 8  # integrators and scenes in a line of the status
 
 
 class Options(NamedTuple):
@@ -30,6 +29,7 @@ class Options(NamedTuple):
     scheduler: str | None = None
     limit: float | None = None
     as_json: bool = False
+    why: bool = False
 
 
 def choose(names: Sequence[str], *, every: bool) -> list[Study]:
@@ -40,33 +40,12 @@ def choose(names: Sequence[str], *, every: bool) -> list[Study]:
     return [scripts.load(name) for name in chosen]
 
 
-class _TerminatedError(BaseException):
-    """Somebody has asked this process to end."""
-
-
-@contextlib.contextmanager
-def _heeding() -> Iterator[None]:
-    """Let a request to end be heard as an interrupt is, so that partial files and workers are cleared away."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
-        raise _TerminatedError
-
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
 def conduct(task: Callable[[list[Study], Options, Workers], int], studies: list[Study], options: Options) -> int:
     """Do a task with workers; returns the exit code."""
     try:
-        with _heeding(), Workers(options.jobs, options.scheduler) as workers:
+        with ending_on_sigterm(), Workers(options.jobs, options.scheduler) as workers:
             return task(studies, options, workers)
-    except (KeyboardInterrupt, _TerminatedError) as stop:
+    except (KeyboardInterrupt, TerminatedError) as stop:
         code = INTERRUPTED if isinstance(stop, KeyboardInterrupt) else TERMINATED
         word = "interrupted" if code == INTERRUPTED else "terminated"
         click.echo(f"symtop: {word}; what was computed is kept, and the same command goes on from there", err=True)
@@ -74,58 +53,86 @@ def conduct(task: Callable[[list[Study], Options, Workers], int], studies: list[
 
 
 def run_all(studies: list[Study], options: Options, workers: Workers) -> int:
-    """Bring studies up to date."""
-    said: list[dict[str, Any]] = []
+    """Bring studies up to date; 1 if cases failed."""
+    from symtop.report import style
+
+    summaries: list[dict[str, Any]] = []
     for study in studies:
-        found = run.run(
+        findings = run.run(
             study, options.results, quick=options.quick, full=options.full, fresh=options.fresh, workers=workers,
-            limit=options.limit,
+            limit=options.limit, save=style.save,
         )  # fmt: skip
-        said.append({key: found[key] for key in ("study", "cases", "computed", "failures", "verdict")})
-        said[-1].update(figures=len(found["pictures"]), seconds=round(found["seconds"], 3))
+        summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
+        summaries.append({**summary, "figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)})
         if not options.as_json:
             click.echo(
-                f"{study.name}: {found['computed']} of {found['cases']} cases computed, "
-                f"{len(found['pictures'])} figures"
+                f"{study.name}: {findings['computed']} of {findings['cases']} cases computed, "
+                f"{len(findings['pictures'])} figures"
             )
-        for failure in found["failures"]:
+        for failure in findings["failures"]:
             click.echo(f"  {failure}", err=True)
     if options.as_json:
-        click.echo(json.dumps(said, indent=1))
-    return 1 if any(entry["failures"] for entry in said) else 0
+        click.echo(json.dumps(summaries, indent=1))
+    return 1 if any(summary["failures"] for summary in summaries) else 0
 
 
 def show_status(studies: list[Study], options: Options) -> int:
-    """Say what is known of every case; 1 if some have failed."""
-    found = {
-        study.name: run.status(study, options.results, quick=options.quick, full=options.full) for study in studies
+    """Show the state of every case, and with `why` the reason; 1 if some have failed."""
+    states = {
+        study.name: status_.status(study, options.results, quick=options.quick, full=options.full, why=options.why)
+        for study in studies
     }
     if options.as_json:
-        click.echo(json.dumps(found, indent=1))
-    for name, rows in {} if options.as_json else found.items():
-        counts = {state: sum(row["state"] == state for row in rows) for state in run.STATES}
-        click.echo(f"{name}: " + ", ".join(f"{count} {state}" for state, count in counts.items() if count))
-        for row in rows:
-            if row["state"] != run.DONE:
-                said = f": {row['message']}" if row["message"] else ""
-                click.echo(f"  {row['state']:<8} {row['integrator']} on {row['scene']}{said}")
-    return 1 if any(row["state"] == run.FAILED for rows in found.values() for row in rows) else 0
+        click.echo(json.dumps(states, indent=1))
+    for name, rows in {} if options.as_json else states.items():
+        counts = Counter(row["state"] for row in rows)
+        click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in status_.STATES if counts[state]))
+        for line in _grouped(rows) if options.why else _one_by_one(rows):
+            click.echo(f"  {line}")
+    return 1 if any(row["state"] == status_.FAILED for rows in states.values() for row in rows) else 0
+
+
+def _one_by_one(rows: list[dict[str, Any]]) -> list[str]:
+    """A line for each case that is not done."""
+    return [
+        f"{row['state']:<8} {row['integrator']} on {row['scene']}" + (f": {row['message']}" if row["message"] else "")
+        for row in rows
+        if row["state"] != status_.DONE
+    ]
+
+
+def _grouped(rows: list[dict[str, Any]]) -> list[str]:
+    """A line for all cases that share a state and its reasons."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in rows:
+        if row["state"] != status_.DONE:
+            groups.setdefault((row["state"], row["message"] or ", ".join(row["why"])), []).append(row)
+    return [
+        f"{len(group)} {state}: {reason}: {_names(group, 'integrator')} on {_names(group, 'scene')}"
+        for (state, reason), group in groups.items()
+    ]
+
+
+def _names(rows: list[dict[str, Any]], key: str) -> str:
+    names = list(dict.fromkeys(row[key] for row in rows))
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more
 
 
 def check_all(studies: list[Study], options: Options, workers: Workers) -> int:
     """Compute stored cases again and compare; 1 if anything is different."""
-    found = [
+    checks = [
         check.check(study, options.results, workers, quick=options.quick, full=options.full, everything=options.fresh)
         for study in studies
     ]
-    if not any(entry.stored for entry in found):
+    if not any(entry.stored for entry in checks):
         raise SymtopError(
             f"no case of {', '.join(study.name for study in studies)} is up to date in {options.results}; run it first"
         )
     if options.as_json:
-        click.echo(json.dumps([entry._asdict() for entry in found], indent=1))
-    for entry in [] if options.as_json else found:
+        click.echo(json.dumps([entry._asdict() for entry in checks], indent=1))
+    for entry in [] if options.as_json else checks:
         click.echo(f"{entry.study}: {entry.compared} of {entry.stored} cases computed again, {entry.verdict()}")
         for difference in entry.differences:
             click.echo(f"  {difference}", err=True)
-    return 1 if any(entry.differences for entry in found) else 0
+    return 1 if any(entry.differences for entry in checks) else 0

@@ -72,21 +72,17 @@ def doctor(results: str, as_json: bool) -> None:
 @plugin_option
 def explore(port: int, no_browser: bool, plugin_files: tuple[str, ...]) -> None:
     """Show one run beside the exact motion in a browser, with sliders for the top, the start and the step."""
-    import signal
     import webbrowser
 
+    from symtop.base.signals import TerminatedError, ending_on_sigterm
     from symtop.explore.server import address, serve
 
-    def end(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, end)
     load_plugins(plugin_files)
-    with serve(port) as server:
+    with ending_on_sigterm(), serve(port) as server:
         click.echo(f"symtop explore: {address(server)} (Ctrl-C ends it)")
         if not no_browser:
             webbrowser.open(address(server))
         try:
             server.serve_forever()
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, TerminatedError):
             click.echo("")

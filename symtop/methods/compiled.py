@@ -1,131 +1,131 @@
 """Compilation of kernels with numba, with a disk cache that never serves stale numbers.
 
-numba stamps a cached kernel with the file of the function itself and does not see edits in the files it
-calls, so an old kernel can return old numbers in silence. The cache folder is therefore named after a hash of
-every source file of this package that a kernel may come from, and of the file that a plug-in kernel comes from.
-A kernel found on disk loads in a few milliseconds; a cold one compiles in about half a second.
+numba stamps a cached kernel with the file of the function itself and does not see edits in the files it calls, so that
+an old kernel can return old numbers in silence; and it compiles again what only moved down by a line. Here the folder
+of a kernel is named after a hash of everything it is compiled from (`symtop.base.code`): instructions, constants and
+values of its functions, wherever they stand, and the versions of Python and numba. A kernel found on disk loads in a
+few milliseconds; a cold one compiles in about half a second.
+
+Each kernel has a folder of its own, about 100 kilobytes. Every use of it is noted, once a day. The first time a process
+saves a kernel it removes those that nobody used for 30 days, and the oldest ones beyond `MOST_BYTES`.
 """
 
 import contextlib
-import functools
-import hashlib
-import inspect
-import os
-import shutil
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
-from numba import config, njit
+import numba
+from numba import njit, types
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.typing.templates import builtin_registry
 from numba.cpython.unsafe.tuple import tuple_setitem
 from numba.extending import register_jitable as _register
 
-__all__ = ["cache_root", "compile_kernel", "register_jitable", "set_item", "source_digest"]
+from symtop.base.cache import cache_root, prune, touch
+from symtop.base.code import CodeWalk
+from symtop.base.fingerprint import by_name, digest
+
+__all__ = ["code_of", "compile_kernel", "register_jitable", "set_item"]
 
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
 
-PACKAGE = Path(__file__).resolve().parent.parent
-MOST_NEIGHBOURS = 100
-WITHOUT_KERNELS = ("runner", "report", "cli")  # a new caption need not compile anything again
-KEPT = 6  # cache folders of older sources that are kept, a few megabytes each
+MOST_BYTES = 200_000_000  # of kernels that are kept, about 2000 of them
+OPTIONS = {"error_model": "numpy"}  # division by zero gives infinity, as in C
+INLINED = {"forceinline": True}
+
+_stands_for: dict[int, list[object]] = {}  # id of a function: what numba compiles in its place
+_known = [0]  # entries of numba's registry that `_stands_for` knows
+_pruned: list[Path] = []
 
 
-def cache_root() -> Path:
-    """The folder for everything symtop caches: ``$SYMTOP_CACHE`` or ``symtop`` in the user's cache folder."""
-    chosen = os.environ.get("SYMTOP_CACHE")
-    if chosen:
-        return Path(chosen)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symtop"
-
-
-@functools.lru_cache(maxsize=1)
-def source_digest() -> str:
-    """Hash of the package's sources, 16 hexadecimal digits."""
-    digest = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
-        place = path.relative_to(PACKAGE)
-        if place.parts[0] in WITHOUT_KERNELS:
-            continue
-        digest.update(str(place).encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _folder(sources: set[Path]) -> Path:
-    foreign = sorted(path for path in sources if PACKAGE not in path.parents)
-    name = source_digest()
-    if foreign:
-        digest = hashlib.sha256(name.encode())
-        for path in foreign:  # and what stands beside it, which it may import
-            for near in sorted(path.parent.glob("*.py"))[:MOST_NEIGHBOURS]:
-                digest.update(near.read_bytes())
-        name = digest.hexdigest()[:16]
-    return cache_root() / "kernels" / name
-
-
-def _prune(keep: Path) -> None:
-    """Remove the caches of long-gone sources; another process may be doing the same."""
-    try:
-        folders = sorted(keep.parent.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
-    except OSError:
-        return
-    for folder in folders[KEPT:]:
-        if folder != keep:
-            shutil.rmtree(folder, ignore_errors=True)
-
-
+@by_name
 def register_jitable(function: Callable[..., Any]) -> Any:
     """Let kernels call a plain function, inlined wherever they do.
 
     Left to itself LLVM keeps the larger ones, such as the drift of a splitting, as calls that pass their results
     through memory: 1.3 times the time of a step.
     """
-    return _register(forceinline=True)(function)
+    return _register(**INLINED)(function)
 
 
-def _forgiving(kernel: Any) -> Any:
-    """A kernel for which a cache on a full disk, or a damaged one, costs a compilation and not the run."""
-    cache = kernel._cache
-    load, save = cache.load_overload, cache.save_overload
+def _overloads(function: FunctionType) -> Iterator[object]:
+    """What numba compiles where a function is called: the functions that overload it, and their options."""
+    entries = builtin_registry.globals
+    for value, kind in entries[_known[0] :]:
+        if isinstance(value, FunctionType) and isinstance(kind, types.Function):
+            _stands_for.setdefault(id(value), []).extend(kind.templates)
+    _known[0] = len(entries)
+    for template in _stands_for.get(id(function), ()):
+        yield getattr(template, "_overload_func", None)
+        yield getattr(template, "_jit_options", None)
 
-    def attempt_load(*arguments: Any) -> Any:
+
+def code_of(thing: object) -> CodeWalk:
+    """What a kernel, or anything that holds kernels, is compiled from."""
+    walk = CodeWalk("kernel", also=_overloads)
+    walk.add((thing, OPTIONS, sys.version_info[:2], numba.__version__))
+    return walk
+
+
+class _Folder:
+    """Where a kernel is kept, as numba asks for it."""
+
+    def __init__(self, path: Path, function: Callable[..., Any]) -> None:
+        self.path, self._py_file = path, function.__code__.co_filename
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder; the first one of a process makes room for it."""
+        if not _pruned:
+            _pruned.append(self.path)
+            prune(self.path.parent, MOST_BYTES)
+        self.path.mkdir(parents=True, exist_ok=True)
+
+
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """numba's cache of one kernel, in a folder whose name says all there is to know of it.
+
+    A cache on a full disk, or a damaged one, costs a compilation and not the run.
+    """
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._name, self._py_func = repr(function), function
+        self._impl = CompileResultCacheImpl.__new__(CompileResultCacheImpl)
+        self._impl._locator = _Folder(folder, function)
+        self._impl._lineno = function.__code__.co_firstlineno
+        self._cache_path = str(folder)
+        self._cache_file = IndexDataCacheFile(self._cache_path, "kernel", "")
+        self.enable()
+
+    def _index_key(self, signature: Any, codegen: Any) -> Any:
+        return signature, codegen.magic_tuple()
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
         try:
-            return load(*arguments)
+            return super().load_overload(signature, target_context)
         except Exception:  # noqa: BLE001  (a truncated pickle raises nearly anything)
             with contextlib.suppress(Exception):
-                cache.flush()  # begin anew: what is damaged would stand in the way of saving, too
+                self.flush()  # begin anew: what is damaged would stand in the way of saving, too
             return None
 
-    def attempt_save(*arguments: Any) -> None:
+    def save_overload(self, signature: Any, data: Any) -> None:
         with contextlib.suppress(OSError):
-            save(*arguments)
-
-    cache.load_overload, cache.save_overload = attempt_load, attempt_save
-    return kernel
+            super().save_overload(signature, data)
 
 
-def compile_kernel(function: Callable[..., Any], *parts: Callable[..., Any]) -> Any:
-    """``njit`` with the disk cache; `parts` are the functions that `function` closes over.
+@by_name
+def compile_kernel(function: Callable[..., Any]) -> Any:
+    """``njit`` with the disk cache.
 
     Division by zero gives infinity, as in C: the kernel's outcome says what became of it.
-    Functions typed at a prompt have no source file to stamp: they compile without the cache.
+    A kernel with functions typed at a prompt, which have no source file, compiles without the cache.
     """
-    sources: set[Path] = set()
-    for part in parts:
-        try:
-            sources.add(Path(inspect.getfile(part)).resolve())
-        except (TypeError, OSError):
-            return njit(error_model="numpy")(function)
-    if not all(path.is_file() for path in sources):
-        return njit(error_model="numpy")(function)
-    folder = _folder(sources)
-    before = config.CACHE_DIR
-    if not folder.is_dir():
-        _prune(folder)
-    try:
-        config.CACHE_DIR = str(folder)  # numba reads it while it decorates, so nobody else's cache moves
-        return _forgiving(njit(cache=True, error_model="numpy")(function))
-    except RuntimeError:  # the cache folder cannot be written: slower, never wrong
-        return njit(error_model="numpy")(function)
-    finally:
-        config.CACHE_DIR = before
+    kernel = njit(**OPTIONS)(function)
+    walk = code_of(function)
+    if all(Path(part.__code__.co_filename).is_file() for part in walk.functions):
+        folder = cache_root() / "kernels" / digest(walk.values())
+        touch(folder)
+        kernel._cache = _Cache(function, folder)
+    return kernel

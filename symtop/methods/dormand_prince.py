@@ -145,7 +145,7 @@ def march(  # type: ignore[no-untyped-def]
     return state, t, step, steps, seen, evaluations, outcome
 
 
-march = compile_kernel(march, march)
+march = compile_kernel(march)
 
 
 def first_step(par: Any, state: tuple[float, ...], end: float, tolerance: float) -> float:

@@ -175,7 +175,7 @@ def driver(  # noqa: C901  (one loop, read in one piece)
 
     return Loop(
         begin,
-        compile_kernel(prepare, begin, enter),
-        compile_kernel(march, begin, increment, observe, enter, present),
+        compile_kernel(prepare),
+        compile_kernel(march),
         plain,
     )

@@ -18,6 +18,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symtop.base.fingerprint import by_name
 from symtop.base.validate import SymtopError, SymtopWarning, finite, label, one_of, positive, whole
 from symtop.methods.about import paragraphs
 from symtop.model.top import Angles, Momenta, SymmetricTop
@@ -112,7 +113,7 @@ class Integrator:
 
     name: str
     family: str
-    summary: str
+    summary: str = field(metadata={"words": True})
     solvers: Mapping[str, Solver] = field(repr=False)
     knob: str | None = "step_size"
     tier: str = "compiled"
@@ -123,7 +124,7 @@ class Integrator:
     conserves: frozenset[str] | None = None
     least_tolerance: float = 0.0
     default_tolerance: float | None = None
-    reference: str = ""
+    reference: str = field(default="", metadata={"words": True})
     energy_error: str | None = None  # "kept" or "bounded"; None says what follows from the other claims
     modified_energy: ModifiedEnergy | None = None  # what it conserves to O(h^4) less the energy, in closed form
     sleeps_from: Callable[[float], float] | None = None  # spin of the sleeping top (I1 = I3 = mgl = 1) at a step h
@@ -275,12 +276,14 @@ class _Integrators(dict[str, Integrator]):
         return html
 
 
+@by_name
 def integrators() -> dict[str, Integrator]:
     """All registered integrators, by name, in order of registration."""
     _load()
     return _Integrators(_registry)
 
 
+@by_name
 def integrator(name: "str | Integrator") -> Integrator:
     """The integrator of that name; an Integrator is returned as it is."""
     if isinstance(name, Integrator):

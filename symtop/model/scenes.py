@@ -6,9 +6,10 @@ follows from a formula, the formula stands beside it.
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from symtop.base.fingerprint import by_name
 from symtop.base.numbers import TINY
 from symtop.base.validate import SymtopError, finite, label, one_of, positive
 from symtop.model.top import Angles, SymmetricTop
@@ -17,21 +18,24 @@ if TYPE_CHECKING:
     from symtop.model.closed_form import ClosedForm
 
 OBSERVABLES = ("nutation", "axis", "attitude")
+UNITS = ("", "SI")
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
     """A top, its start and a horizon; `observes` names the smallest thing the scene is watched for.
 
-    ``nutation`` is theta alone, ``axis`` the direction of the axis, ``attitude`` the whole orientation.
+    ``nutation`` is theta alone, ``axis`` the direction of the axis, ``attitude`` the whole orientation. `units` is "SI"
+    if the parameters are in SI units, and decides the units in datasets.
     """
 
     name: str
     top: SymmetricTop
     start: Angles
     horizon: float
-    purpose: str = ""
+    purpose: str = field(default="", metadata={"words": True})
     observes: str = "attitude"
+    units: str = field(default="", metadata={"words": True})  # "SI", or empty: any consistent units
 
     def __post_init__(self) -> None:
         label("name", self.name)
@@ -41,6 +45,7 @@ class Scene:
             raise SymtopError(f"start must be Angles, not {self.start!r}")
         object.__setattr__(self, "horizon", positive("horizon", self.horizon))
         one_of("observes", self.observes, OBSERVABLES)
+        one_of("units", self.units, UNITS)
 
     @property
     def nutation_period(self) -> float:
@@ -172,7 +177,8 @@ def _kinon_betsch() -> Scene:
     theta, precession = math.radians(60.0), 10.0
     spin = (top.I1 * precession**2 * math.cos(theta) + top.mgl) / (top.I3 * precession)
     start = Angles(theta=theta, phi_dot=precession, psi_dot=spin - precession * math.cos(theta))
-    return Scene("kinon-betsch", top, start, 2.0, "steady precession of a small real gyroscope, a published benchmark")
+    purpose = "steady precession of a small real gyroscope, a published benchmark"
+    return Scene("kinon-betsch", top, start, 2.0, purpose, units="SI")
 
 
 @functools.lru_cache(maxsize=1)
@@ -186,6 +192,7 @@ def _catalogue() -> dict[str, Scene]:
             Angles(theta=0.4, phi=0.1, psi=0.1, theta_dot=0.1, phi_dot=10.0, psi_dot=0.1),
             8.0,
             "the notebook's first top: violent nutation from 23 to 99 degrees",
+            units="SI",
         ),
         _goldstein("goldstein", 0.0, "the notebook's second top, released at rest (alpha = 1.4981)"),
         _goldstein(
@@ -232,6 +239,7 @@ def _catalogue() -> dict[str, Scene]:
             Angles(theta=math.pi / 2, phi=math.pi, psi=math.pi / 2, phi_dot=-4.61538, psi_dot=150.0),
             2.0,
             "a published benchmark that grazes the lower pole at 0.00004 degrees: no place for angles",
+            units="SI",
         ),
         grazing(
             1e-3, name="grazing", purpose="passes the upper pole at 0.06 degrees: a step in angles may jump over it"
@@ -273,11 +281,13 @@ class _Scenes(dict[str, Scene]):
         return html
 
 
+@by_name
 def scenes() -> dict[str, Scene]:
     """All known scenes, by name."""
     return _Scenes({**_catalogue(), **_added})
 
 
+@by_name
 def scene(name: "str | Scene") -> Scene:
     """The scene of that name; a Scene is returned as it is."""
     if isinstance(name, Scene):

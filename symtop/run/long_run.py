@@ -11,14 +11,10 @@ windows end is fixed by the number of steps alone, so that a resumed run has the
 """
 
 import contextlib
-import hashlib
 import json
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -26,10 +22,12 @@ import xarray as xr
 from tqdm import tqdm
 
 from symtop.base import datasets
-from symtop.base.ingredients import Ingredients
+from symtop.base.cache import cache_root
+from symtop.base.fingerprint import digest, file_reasons, hashed
 from symtop.base.numbers import GOLDEN
+from symtop.base.signals import ending_on_sigterm
 from symtop.base.validate import SymtopError, positive, whole
-from symtop.methods.compiled import cache_root, source_digest
+from symtop.methods.compiled import code_of
 from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.loop import Loop, Position
 from symtop.methods.outcomes import OK, OUTCOMES, sentence
@@ -169,6 +167,7 @@ def long_run(
     return datasets.describe(
         xr.Dataset(variables),
         title=f"{method.name} on {chosen.name}, {count} steps",
+        units=chosen.units,
         integrator=method.name,
         scene=chosen.name,
         step_size=h,
@@ -190,14 +189,17 @@ def _summary(values: dict[str, Array]) -> list[float]:
 # ---- checkpoints -----------------------------------------------------------------------------------------------------
 
 
-def _identity(where: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
-    """A hash of all that decides the bits of a run; one name may stand for other coefficients or code next time."""
-    top, start = where.top, where.start
-    numbers = [[getattr(record, name) for name in record.__slots__] for record in (top, start)]
-    made = Ingredients()
-    made.add(method)
-    content = json.dumps([made.values, numbers, h, steps, compensated, source_digest()])
-    return hashlib.sha256(content.encode()).hexdigest()[:20]
+def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
+    """A hash of all that decides the bits of a run; one name may stand for other coefficients or code next time.
+
+    Code counts as it is compiled (`symtop.base.code`), so that a checkpoint outlives a comment.
+    """
+    numbers = [[getattr(record, name) for name in record.__slots__] for record in (scene.top, scene.start)]
+    made = code_of((method, watch, windows, scattered, _summary))
+    return digest({
+        **made.values(), **file_reasons(made.closure()),
+        "numbers": hashed(json.dumps([numbers, h, steps, compensated, FIRST, PER_DECADE, LONGEST, SAMPLES])),
+    })  # fmt: skip
 
 
 def leaves(carry: Any) -> list[float]:
@@ -261,8 +263,8 @@ class _Book:
 
     @contextlib.contextmanager
     def kept(self) -> Iterator[None]:
-        """Whatever ends the run early, an interrupt or a polite kill, leaves a checkpoint."""
-        with _ending_on_sigterm():
+        """A run that is ended early, by an interrupt, SIGTERM or an error, leaves a checkpoint."""
+        with ending_on_sigterm():
             try:
                 yield
             except BaseException:
@@ -273,20 +275,3 @@ class _Book:
         """The run is done."""
         if self.file is not None:
             self.file.unlink(missing_ok=True)
-
-
-@contextlib.contextmanager
-def _ending_on_sigterm() -> Iterator[None]:
-    """A polite kill ends a run as an interrupt does; only where nobody else listens."""
-
-    def stop(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
-        raise SystemExit(128 + number)
-
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
-        yield
-        return
-    signal.signal(signal.SIGTERM, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)

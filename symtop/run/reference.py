@@ -9,11 +9,13 @@ in double, which does not lose digits with time: its rounding is checked in the 
 against the long double integration. An integration that visibly differs from it has that distance as its bound.
 
 Values beyond double are stored as pairs, ``theta + theta_lo``. A result is cached on disk under a hash of the top, the
-start, the times, the precision and the sources; a damaged cache file is noticed, said and computed again.
+start, the times, the precision, the sources and the libraries; a damaged cache file is noticed, said and computed
+again. Files that nobody used for 30 days are removed, and those used longest ago beyond `MOST_BYTES`.
 """
 
 import functools
 import hashlib
+import itertools
 import math
 import warnings
 from collections.abc import Callable
@@ -24,7 +26,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from symtop.base import datasets
+from symtop.base import datasets, fingerprint, imports
+from symtop.base.cache import cache_root, prune, touch
 from symtop.base.multiprecision import context
 from symtop.base.numbers import EPSILON, TINY
 from symtop.base.validate import SymtopError, SymtopWarning, one_of
@@ -40,6 +43,9 @@ SAFETY = 8.0
 OVERLAP = 100.0  # time over which the closed form is compared with an integration each time it is used
 SUSPICIOUS = 1e-12  # a disagreement beyond this is an error of one of them, not rounding
 MOST_CACHED = 200_000  # times; larger results are not kept on disk
+MOST_BYTES = 500_000_000  # of results that are kept; one of 1000 times takes 200 kB
+OFTEN = 50  # files between two looks at the size of the cache
+_written = itertools.count()
 
 
 class Checks(NamedTuple):
@@ -298,7 +304,12 @@ def reference(scene: "str | Scene", times: ArrayLike, precision: str = "longdoub
     if wanted.size != distinct.size or not np.array_equal(wanted, distinct):
         data = data.isel(time=place)
     return datasets.describe(
-        data, f"reference motion of {chosen.name}", scene=chosen.name, precision=source, asked_for=precision
+        data,
+        f"reference motion of {chosen.name}",
+        chosen.units,
+        scene=chosen.name,
+        precision=source,
+        asked_for=precision,
     )
 
 
@@ -316,7 +327,8 @@ def _kept(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> x
     if path.is_file():
         try:
             found = datasets.read(path)
-            if found.attrs.pop("content", "") == datasets.fingerprint(found):
+            if found.attrs.pop("content", "") == datasets.content_hash(found):
+                touch(path)
                 return found
         except SymtopError:
             pass
@@ -325,37 +337,27 @@ def _kept(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> x
             warnings.warn(said, SymtopWarning, stacklevel=depth)
     data = compute()
     try:
-        datasets.write(data.assign_attrs(content=datasets.fingerprint(data)), path)
+        datasets.write(data.assign_attrs(content=datasets.content_hash(data)), path)
+        _make_room(path.parent)
     except SymtopError as error:
         if depth is not None:
             warnings.warn(f"the reference is not kept: {error}", SymtopWarning, stacklevel=depth)
     return data
 
 
-def _cache_path(scene: Scene, times: charts.Array, precision: str) -> Path:
-    from symtop.methods.compiled import cache_root
+def _make_room(folder: Path) -> None:
+    """Prune the cache after the first file that this process writes to it, and after every `OFTEN` more."""
+    if next(_written) % OFTEN == 0:
+        prune(folder, MOST_BYTES)
 
-    digest = hashlib.sha256(_sources().encode())
-    digest.update(f"{datasets.provenance()['dependencies']} {have_heyoka()}".encode())
-    digest.update(repr((scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY)).encode())
-    digest.update(times.tobytes())
-    return cache_root() / "reference" / f"{digest.hexdigest()[:32]}.nc"
+
+def _cache_path(scene: Scene, times: charts.Array, precision: str) -> Path:
+    key = [_sources(), have_heyoka(), scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY]
+    return cache_root() / "reference" / f"{hashlib.sha256(repr(key).encode() + times.tobytes()).hexdigest()[:32]}.nc"
 
 
 @functools.lru_cache(maxsize=1)
 def _sources() -> str:
-    """Hash of the sources that a reference depends on."""
-    here = Path(__file__).resolve().parents[1]
-    digest = hashlib.sha256()
-    for name in (
-        "run/reference.py",
-        "model/closed_form.py",
-        "model/precise_form.py",
-        "model/exact_numbers.py",
-        "model/double_double.py",
-        "model/charts.py",
-        "model/top.py",
-        "methods/taylor.py",
-    ):
-        digest.update((here / name).read_bytes())
-    return digest.hexdigest()
+    """Hash of the files that a reference is computed by, this one and all that it imports, and of the libraries."""
+    files = imports.closure(frozenset([Path(__file__).resolve()]))
+    return fingerprint.digest(fingerprint.file_reasons(files) | fingerprint.packages("numpy", "heyoka", "mpmath"))

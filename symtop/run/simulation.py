@@ -155,6 +155,7 @@ def simulate(
     return datasets.describe(
         as_dataset(chosen, chart, plan, run),
         title=f"{method.name} on {chosen.name}",
+        units=chosen.units,
         integrator=method.name,
         scene=chosen.name,
         chart=chart,

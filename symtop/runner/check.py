@@ -1,4 +1,4 @@
-"""Are stored results what this version computes? Cases are computed again in a folder of their own and compared.
+"""Compares stored results with what this version computes: cases are computed again in another folder.
 
 All but the measured times must agree to the last bit: nothing here is random and no file holds a date. `CLOCKED` names
 the variables that are times or made from them.
@@ -26,7 +26,7 @@ CLOCKED = ("seconds", "reliable", "spread", "first_call", "foreseen")
 
 
 class Checked(NamedTuple):
-    """What came of checking one study."""
+    """The outcome of checking one study."""
 
     study: str
     stored: int  # cases that are up to date on disk
@@ -34,7 +34,7 @@ class Checked(NamedTuple):
     differences: list[str]
 
     def verdict(self) -> str:
-        """In words."""
+        """The outcome in a phrase."""
         return f"{len(self.differences)} differences" if self.differences else "the same to the last bit, times aside"
 
 
@@ -55,16 +55,19 @@ def differences(stored: Combined, again: Combined) -> list[str]:
 
 def _differences(stored: xr.Dataset, again: xr.Dataset) -> list[str]:
     ours, theirs = set(map(str, stored.variables)), set(map(str, again.variables))
-    found = [f"{name} is in one of them only" for name in sorted(ours ^ theirs)]
+    differing = [f"{name} is in one of them only" for name in sorted(ours ^ theirs)]
     for name in sorted(ours & theirs):
         one, other = stored[name], again[name]
         if one.dims != other.dims or one.shape != other.shape:
-            found.append(f"{name} has another shape: {dict(one.sizes)} and {dict(other.sizes)}")
+            differing.append(f"{name} has another shape: {dict(one.sizes)} and {dict(other.sizes)}")
         elif not is_clocked(name) and not _same(one, other):
-            found.append(f"{name} differs{_how_much(one, other)}")
+            differing.append(f"{name} differs{_how_much(one, other)}")
     kept = sorted((set(stored.attrs) | set(again.attrs)) - set(datasets.provenance()) - {"content"})
     pairs = [(key, stored.attrs.get(key), again.attrs.get(key)) for key in kept]
-    return [*found, *(f"attribute {key} differs: {one!r} and {other!r}" for key, one, other in pairs if one != other)]
+    return [
+        *differing,
+        *(f"attribute {key} differs: {one!r} and {other!r}" for key, one, other in pairs if one != other),
+    ]
 
 
 def _bare(data: Combined) -> Combined:
@@ -84,31 +87,33 @@ def _how_much(one: xr.DataArray, other: xr.DataArray) -> str:
         return ""
     with np.errstate(all="ignore"):
         gap = np.abs(one.values - other.values)
-    return f" by up to {np.nanmax(gap):.3g}" if np.isfinite(gap).any() else " in what is known at all"
+    return f" by up to {np.nanmax(gap):.3g}" if np.isfinite(gap).any() else " in which values are NaN"
 
 
 def check(
     study: Study, results: Path, workers: Workers, *, quick: bool = False, full: bool = False, everything: bool = False
 ) -> Checked:
     """Compute `SAMPLE` stored cases again, or every one, and compare; likewise the dataset that they make together."""
-    known = Round(study, results.resolve())
-    if not known.add(study.grid(quick=quick, full=full), fresh=False) and study.follow_up is not None:
-        known.add(study.follow_up(known.combined()), fresh=False)
-    stored = dict(sorted(known.done.items(), key=lambda item: store.digest_of(item[0])))  # in no particular order
+    cases = Round(study, results.resolve())
+    if not cases.add(study.grid(quick=quick, full=full), fresh=False) and study.follow_up is not None:
+        cases.add(study.follow_up(cases.combined()), fresh=False)
+    stored = dict(
+        sorted(cases.done.items(), key=lambda item: store.digest_of(item[0]))
+    )  # by digest: a sample of all parts of the grid
     chosen = dict(list(stored.items())[: None if everything else SAMPLE])
     with tempfile.TemporaryDirectory(prefix="symtop-check-") as elsewhere:
         again = {Path(elsewhere) / path.name: (path, case) for path, (case, _) in chosen.items()}
-        found = _recompute(study, {path: case for path, (_, case) in again.items()}, workers)
+        differing = _recompute(study, {path: case for path, (_, case) in again.items()}, workers)
         for path, (original, case) in again.items():
             data = store.load_case(path)
             if data is not None:
-                where = f"{case.integrator} on {case.scene}"
-                found += [f"{where}: {said}" for said in differences(chosen[original][1], data)]
+                label = f"{case.integrator} on {case.scene}"
+                differing += [f"{label}: {text}" for text in differences(chosen[original][1], data)]
     whole = results / f"{study.name}.nc"
-    if whole.is_file() and len(stored) == len(known.paths):
-        kept, made = _bare(datasets.read_any(whole)), _bare(known.combined())
-        found += [f"{whole.name}: {said}" for said in differences(kept, made)]
-    return Checked(study.name, len(stored), len(chosen), found)
+    if whole.is_file() and len(stored) == len(cases.paths):
+        kept, made = _bare(datasets.read_any(whole)), _bare(cases.combined())
+        differing += [f"{whole.name}: {text}" for text in differences(kept, made)]
+    return Checked(study.name, len(stored), len(chosen), differing)
 
 
 def _recompute(study: Study, cases: dict[Path, Case], workers: Workers) -> list[str]:

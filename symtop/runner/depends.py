@@ -1,41 +1,38 @@
-"""What a case's numbers depend on, found without running it: source files and values.
+"""What a case's numbers depend on, found without running it: a mapping from labels to hashes (`base.fingerprint`).
 
-A case is measured by a function of its study, on a scene, with one integrator or several. Each of them is walked:
+A case is measured by a function of its study, on a scene, with one integrator or several. Each of them is walked. The
+registry finds the families of integrators by name and not by an import statement: it leads to none of them, and a case
+depends on the files of the integrators it runs and on no others. Editing `methods/gauss.py` makes the cases of the
+Gauss methods stale and no other. A file counts as a whole: two kernels in one file go stale together.
 
-    a function      its file; what it closes over; its defaults (a compiled one: the function that was compiled)
-    a table         a tuple of coefficients, a dataclass, an array: its values
-    a file          the files of this package that it imports, and theirs
-
-A function of a study's script counts by its own text and by the globals it names, so that a new caption measures
-nothing again. The registry finds the families of integrators by name and not by an import statement: it leads to none
-of them, and a case depends on the files of the integrators it runs and on no others. Editing `integrators/gauss.py`
-makes the cases of the Gauss methods stale and no other.
-
-A file counts as a whole: two kernels in one file go stale together. `PLUMBING` moves numbers and makes none.
+Which integrators a case runs is what its study declares (`Study.uses`), or the one it names and any that the code of
+its measure may look up: literal names in a file that asks for integrators or runs, and all of them where a file asks
+the registry by its own choice. `simulate` and the registry choose nothing: they look up what they are given, and what
+is reached only through them (the guard, which runs pieces of a method) makes a sentence and no number.
 """
 
 import ast
 import functools
-import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from symtop.base import datasets
-from symtop.base.ingredients import PACKAGE, Ingredients
-from symtop.methods.registry import integrators
+from symtop.base import datasets, fingerprint, imports
+from symtop.base.fingerprint import Reasons, Walk
+from symtop.methods import registry
+from symtop.methods.registry import Integrator, integrators
 from symtop.model.scenes import scenes
+from symtop.run import simulation
 from symtop.runner import plugins
+from symtop.runner.study import Case, Study
 
-if TYPE_CHECKING:
-    from symtop.runner.study import Case, Study
+EVERY = "*"  # in place of an integrator's or a scene's name: all of them
+ASKING = {"integrator", "integrators", "registry", "simulate"}  # names whose import means that a file may run a method
 
-PLUMBING = {PACKAGE / name for name in ("base/validate.py", "base/datasets.py")} | set(PACKAGE.rglob("__init__.py"))
-RESOLVERS = {
-    PACKAGE / name for name in ("run/simulation.py", "methods/registry.py")
-}  # they look up what they are given
-EVERY = "*"  # in place of an integrator's name: all of them
+
+# they look up what they are given
+RESOLVERS = frozenset(Path(str(module.__file__)).resolve() for module in (simulation, registry))
 
 
 @functools.cache
@@ -43,60 +40,20 @@ def _tree(file: Path) -> ast.Module:
     return ast.parse(file.read_bytes())
 
 
-def _module_file(name: str) -> Path | None:
-    """The file of a module of this package, by its dotted name."""
-    first, *rest = name.split(".")
-    if first != PACKAGE.name:
-        return None
-    place = PACKAGE.joinpath(*rest)
-    return next((path for path in (place.with_suffix(".py"), place / "__init__.py") if path.is_file()), None)
-
-
-def _imported(file: Path) -> Iterator[tuple[str, list[str]]]:
-    """(module, names) of every import statement of a file, wherever it stands."""
-    inner = PACKAGE in file.parents  # a script outside has no package that a relative import could mean
-    package = [PACKAGE.name, *file.relative_to(PACKAGE).parent.parts] if inner else []
-    for node in ast.walk(_tree(file)):
-        if isinstance(node, ast.Import):
-            yield from ((alias.name, []) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else []
-            yield ".".join([*base, *([node.module] if node.module else [])]), [alias.name for alias in node.names]
-
-
-@functools.cache
-def imports_of(file: Path) -> frozenset[Path]:
-    """The files of this package that a file, of it or a script, imports."""
-    found = set()
-    for module, names in _imported(file):
-        inner = [_module_file(f"{module}.{name}") for name in names]
-        found |= {path for path in [_module_file(module), *inner] if path is not None}
-    return frozenset(found - PLUMBING)
-
-
-@functools.cache
-def all_imports(files: frozenset[Path]) -> frozenset[Path]:
-    """Those files, the files they import, and so on."""
-    found: set[Path] = set()
-    ahead = set(files) - PLUMBING
-    while ahead:
-        found |= ahead
-        ahead = {path for file in ahead for path in imports_of(file)} - found
-    return frozenset(found)
-
-
-def _strings(tree: Iterable[ast.Module]) -> set[str]:
+def _strings(trees: Iterable[ast.Module]) -> set[str]:
     return {
         node.value
-        for part in tree
-        for node in ast.walk(part)
+        for tree in trees
+        for node in ast.walk(tree)
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     }
 
 
-def _asked(file: Path) -> set[str]:
-    """Names that a file imports from this package."""
-    return {name for module, names in _imported(file) if module.startswith(PACKAGE.name) for name in names}
+def _asks_for(file: Path) -> set[str]:
+    """Names by which a file imports integrators, the registry or runs from this package."""
+    return {
+        name for module, names in imports.imported(file) if module.partition(".")[0] in imports.roots for name in names
+    } & ASKING
 
 
 def _looks_up(file: Path) -> bool:
@@ -104,32 +61,34 @@ def _looks_up(file: Path) -> bool:
 
     What it is given as an argument is its caller's choice, and a name that it spells out is found by that name.
     """
-    if file in RESOLVERS:
-        return False
-    asked = _asked(file)
-    return bool(asked & {"integrators", "registry"}) or ("integrator" in asked and _chooses(_tree(file)))
+    names = _asks_for(file)
+    return bool(names & {"integrators", "registry"}) or ("integrator" in names and _chooses(_tree(file)))
 
 
 def _chooses(tree: ast.Module) -> bool:
     """Is `integrator` used otherwise than on a literal name or on an argument of the function around it?"""
-    fine: set[int] = set()
+    imported = [alias for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names]
+    aliases = {alias.asname or alias.name for alias in imported if alias.name == "integrator"}
+    harmless: set[int] = set()
     for function in ast.walk(tree):
         if isinstance(function, ast.FunctionDef):
             given = {argument.arg for argument in ast.walk(function.args) if isinstance(argument, ast.arg)}
-            for call in ast.walk(function):
-                if isinstance(call, ast.Call) and len(call.args) == 1:
-                    what = call.args[0]
+            for node in ast.walk(function):
+                if isinstance(node, ast.Name) and node.id in given:  # not what was imported under that name
+                    harmless.add(id(node))
+                if isinstance(node, ast.Call) and len(node.args) == 1:
+                    what = node.args[0]
                     if isinstance(what, ast.Constant) or (isinstance(what, ast.Name) and what.id in given):
-                        fine.add(id(call.func))
+                        harmless.add(id(node.func))
     return any(
-        isinstance(node, ast.Name) and node.id == "integrator" and id(node) not in fine for node in ast.walk(tree)
+        isinstance(node, ast.Name) and node.id in aliases and id(node) not in harmless for node in ast.walk(tree)
     )
 
 
 class Basis(NamedTuple):
-    """What measuring depends on besides the integrator: digest of values, files, and integrators it may run itself."""
+    """What measuring depends on besides the integrator: values, files, and integrators it may run itself."""
 
-    values: tuple[str, ...]
+    values: Reasons
     files: frozenset[Path]
     names: frozenset[str]  # integrators that it names
     every: bool  # it asks the registry, so that it may run any
@@ -138,72 +97,76 @@ class Basis(NamedTuple):
 @functools.cache
 def basis(measure: Callable[..., Any]) -> Basis:
     """The basis of a study's measure."""
-    found = Ingredients()
-    found.add(measure)
-    files = all_imports(frozenset(found.files))
-    ours = [
-        file
-        for file in files
-        if file.parent.name in {"measure", "judge", *(path.name for path in (PACKAGE.parent / "studies").glob("*"))}
-    ]
-    said = _strings(_tree(file) for file in ours if _asked(file) & {"integrator", "simulate"}) | found.constants
-    names = frozenset(said & set(integrators()))
-    return Basis(tuple(found.values), files, names, found.lists or any(_looks_up(file) for file in ours))
+    walk = Walk("measure")
+    walk.add(measure)
+    files = walk.closure()
+    asking = [file for file in imports.closure(frozenset(walk.files), RESOLVERS) - RESOLVERS if _asks_for(file)]
+    spelled = _strings(_tree(file) for file in asking) | walk.strings
+    every = integrators in walk.functions or any(_looks_up(file) for file in asking)
+    return Basis(walk.values(), files, frozenset(spelled & set(integrators())), every)
 
 
-@functools.cache
-def _of_integrator(name: str, made: int) -> tuple[tuple[str, ...], frozenset[Path]]:  # noqa: ARG001
-    found = Ingredients()
-    found.add(integrators()[name])
-    return tuple(found.values), all_imports(frozenset(found.files))
+_walked: dict[int, tuple[Integrator, Reasons, frozenset[Path]]] = {}
 
 
-def used(study: "Study", case: "Case") -> list[str]:
+def _of_integrator(entry: Integrator) -> tuple[Reasons, frozenset[Path]]:
+    """Values and files of an integrator; the entry is held, so that no other can take its id."""
+    if id(entry) not in _walked:
+        walk = Walk(f"integrator {entry.name}")
+        walk.add(entry)
+        _walked[id(entry)] = entry, walk.values(), walk.closure()
+    return _walked[id(entry)][1:]
+
+
+def used(study: Study, case: Case) -> list[str]:
     """Names of the integrators that a case runs: what the study declares, or everything that it might run."""
-    known = integrators()
+    methods = integrators()
     if study.uses is not None:
         names = set(study.uses(case))
     else:
         base = basis(study.measure)
         names = {case.integrator, *case.settings.get("integrators", ()), *base.names, *([EVERY] if base.every else [])}
-    return sorted(known) if EVERY in names else sorted(names & set(known))
+    return sorted(methods) if EVERY in names else sorted(names & set(methods))
 
 
-def files(study: "Study", case: "Case") -> frozenset[Path]:
-    """Source files of this package that a case's numbers depend on."""
-    known = integrators()
-    solvers = (_of_integrator(name, id(known[name]))[1] for name in used(study, case))
-    return basis(study.measure).files.union(*solvers)
+def settings_key(study: Study, case: Case) -> str:
+    """Hash of what a case was asked to do, which an edit of the code does not change."""
+    return fingerprint.hashed(
+        json.dumps([study.name, case.scene, case.integrator, case.group, dict(case.settings)], sort_keys=True)
+    )
 
 
-def digest(study: "Study", case: "Case") -> str:
-    """Hash of everything that a case's numbers depend on: settings, scene, integrators, sources and versions."""
-    known, where = integrators(), scenes()
-    names = used(study, case)
-    scene = Ingredients()
-    scene.add(where.get(case.scene) if case.scene != EVERY else where)
-    content = [
-        json.dumps([study.name, case.scene, case.integrator, case.group, dict(case.settings)], sort_keys=True),
-        *basis(study.measure).values,
-        *scene.values,
-        *(value for name in names for value in (name, *_of_integrator(name, id(known[name]))[0])),
-        *(f"{path.relative_to(PACKAGE)} {file_hash(path)}" for path in sorted(files(study, case))),
-        *(plugins.digest_of(name) for name in (case.scene, *names)),
-        datasets.provenance()["dependencies"],
-        datasets.provenance()["processor"] if study.is_timed(case) else "",
-    ]
-    return hashlib.sha256("\n".join(content).encode()).hexdigest()[:20]
+def reasons(study: Study, case: Case) -> Reasons:
+    """Everything that a case's numbers depend on: settings, scene, integrators, sources, versions."""
+    methods, catalogue, names = integrators(), scenes(), used(study, case)
+    base = basis(study.measure)
+    walked = [_of_integrator(methods[name]) for name in names]
+    walk = Walk("scene")
+    for name in [case.scene] if case.scene != EVERY else sorted(catalogue):
+        walk.add(catalogue.get(name), f"scene {name}")
+    return {
+        "settings": settings_key(study, case),
+        **fingerprint.merged([base.values, walk.values(), *(values for values, _ in walked)]),
+        **_hashes(base.files.union(*(files for _, files in walked))),
+        **plugins.reasons([case.scene, *names]),
+        **fingerprint.packages(),
+        **({"processor": datasets.provenance()["processor"]} if study.is_timed(case) else {}),
+    }
 
 
-def script_digest(script: Path) -> str:
-    """Hash of what a study's pictures, tables and verdict are made by: its script and all that it imports from here."""
-    drawn = all_imports(imports_of(script)).union((PACKAGE / "report").glob("*.py"), [PACKAGE / "runner" / "store.py"])
-    lines = [script.read_text(encoding="utf-8")]
-    lines += [f"{path.relative_to(PACKAGE)} {file_hash(path)}" for path in sorted(drawn)]
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+@functools.lru_cache(maxsize=1024)
+def _hashes(files: frozenset[Path]) -> Reasons:
+    return fingerprint.file_reasons(files)
 
 
-@functools.cache
-def file_hash(path: Path) -> str:
-    """Hash of a file as it was when it was first asked for."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def digest(study: Study, case: Case) -> str:
+    """Hash of everything that a case's numbers depend on."""
+    return fingerprint.digest(reasons(study, case))
+
+
+def script_digest(script: Path, *drawing: object) -> str:
+    """Hash of what makes a study's pictures, tables and verdict: its script, all that it imports, and `drawing`."""
+    walk = Walk("drawing", files=set(imports.imports_of(script)))
+    walk.add(drawing)
+    script_itself = {"script": fingerprint.file_hash(script), **fingerprint.packages("matplotlib")}
+    return fingerprint.digest(script_itself | walk.values() | _hashes(walk.closure()))

@@ -1,9 +1,9 @@
-"""Gets a study's missing cases computed, whatever happens to those who compute them.
+"""Runs the missing cases of a study in worker processes; a case whose worker dies is retried alone.
 
 The first case of every integrator goes first and the integrator's others follow it, so that its kernels are compiled by
 one worker and found on disk by the rest. A case that another run is computing is left to it, and looked for again at
-the end. If a worker is killed, what it and its neighbours had begun is computed again, each by itself, so that a case
-that kills its process can be told from one that was standing by.
+the end. If a worker is killed, all cases that were begun are computed again, each by itself, so that a case that kills
+its process can be told from the others.
 """
 
 from collections import deque
@@ -36,12 +36,12 @@ def execute(study: Study, tasks: Iterable[Task], workers: Workers, heard: Heard)
 
 
 def size_for(tasks: list[Task], workers: Workers, *, timed: bool) -> int:
-    """How many processes: none for few cases and for what only this process knows.
+    """How many processes: none for few cases and for integrators and scenes that only this process knows.
 
     Many timed cases are handed over one at a time, to workers that have their kernels already if there are any.
     """
-    ours = {name for task in tasks for name in (task.case.scene, task.case.integrator)}
-    if any(plugins.is_local(name) for name in ours):
+    local = {name for task in tasks for name in (task.case.scene, task.case.integrator)}
+    if any(plugins.is_local(name) for name in local):
         return HERE
     if workers.scheduler and not timed:
         return CLUSTER
@@ -77,12 +77,12 @@ def _see_through(study: Study, tasks: list[Task], workers: Workers, size: int, h
 
 
 def _judge(task: Task, note: Heard, doubted: list[Task], *, alone: bool) -> None:
-    """What became of a case whose process has ended: it hung, it ended its process, or it has to be tried alone."""
+    """Settle a case whose process has ended: it hung, it ended its process, or it is put down to be tried alone."""
     trace = work.trace_path(Path(task.path))
-    said = trace.read_text() if trace.is_file() else ""
+    traceback = trace.read_text() if trace.is_file() else ""
     trace.unlink(missing_ok=True)
-    if said:
-        _fail(task, f"it was not done after {task.limit:g} s and did not answer", said, note)
+    if traceback:
+        _fail(task, f"it was not done after {task.limit:g} s and did not answer", traceback, note)
     elif alone:
         _fail(task, "its process was ended, by the system (memory) or by the method itself", "", note)
     else:
@@ -98,7 +98,7 @@ def _fail(task: Task, reason: str, trace: str, note: Heard) -> None:
 def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, note: Heard, *, timed: bool) -> None:
     """Hand over all tasks, the first of each integrator before its others."""
     pool, width = workers.pool(size), 1 if timed else workers.width(size)
-    known = study if size == HERE else None  # other processes load it by name
+    given = study if size == HERE else None  # other processes load it by name
     followers: dict[str, list[Task]] = {}
     for task in tasks:
         followers.setdefault(task.case.integrator, []).append(task)
@@ -111,7 +111,7 @@ def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, note: H
             ready, elsewhere, patient = deque(elsewhere), [], True
         while ready and len(futures) < width:
             task = ready.popleft()
-            futures[pool.submit(work.compute, task, known, wait=patient)] = task
+            futures[pool.submit(work.compute, task, given, wait=patient)] = task
         for future in wait(futures, return_when=FIRST_COMPLETED).done:
             task = futures.pop(future)
             result = _result(future, task, workers, note)
@@ -123,7 +123,7 @@ def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, note: H
 
 
 def _result(future: "Future[Result]", task: Task, workers: Workers, note: Heard) -> Result | None:
-    """What a worker says; None if it said nothing and the case has failed."""
+    """The result that a worker returned; None if the cluster gave the case up, which is recorded as a failure."""
     try:
         return future.result()
     except (SymtopError, BrokenExecutor):

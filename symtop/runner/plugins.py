@@ -1,17 +1,19 @@
 """Plug-ins: a user's Python file that registers integrators and scenes of its own."""
 
-import hashlib
 import importlib.util
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
+from symtop.base import fingerprint
+from symtop.base.signals import TerminatedError
 from symtop.base.validate import SymtopError
 from symtop.methods.registry import integrators, is_built_in
 from symtop.model.scenes import added_scenes, scenes
 
-MOST_NEIGHBOURS = 100
-_loaded: dict[Path, str] = {}
-_owners: dict[str, str] = {}
+MOST_NEIGHBOURS = 100  # files beside a plug-in that count, because it may import them
+_loaded: dict[Path, str] = {}  # files of plug-ins in use, and their hashes
+_owners: dict[str, tuple[str, str]] = {}  # of an integrator or a scene: the label and hash of its plug-in
 
 
 def load(path: str | Path) -> None:
@@ -19,12 +21,12 @@ def load(path: str | Path) -> None:
     file = Path(path).absolute()
     try:
         file = file.resolve()
-        there = file.is_file()
+        exists = file.is_file()
     except (OSError, ValueError):  # a name that is too long, or holds a null character
-        there = False
+        exists = False
     if file in _loaded:
         return
-    if not there:
+    if not exists:
         raise SymtopError(f"plugin must be a Python file, not {str(path)!r}")
     before = set(integrators()) | set(scenes())
     name = f"symtop_plugin_{file.stem}"
@@ -35,16 +37,14 @@ def load(path: str | Path) -> None:
     sys.modules[name] = module  # kernels are cached under the name of their module
     try:
         spec.loader.exec_module(module)
-    except SymtopError:
+    except (SymtopError, TerminatedError):
         raise
     except (Exception, SystemExit) as error:
         raise SymtopError(f"plugin {file.name} failed: {type(error).__name__}: {error}") from error
-    digest = hashlib.sha256(file.read_bytes())
-    for near in sorted(file.parent.glob("*.py"))[:MOST_NEIGHBOURS]:  # it may import what stands beside it
-        digest.update(near.read_bytes())
-    _loaded[file] = digest.hexdigest()
-    for name in (set(integrators()) | set(scenes())) - before:
-        _owners[name] = digest.hexdigest()
+    beside = [file, *sorted(file.parent.glob("*.py"))[:MOST_NEIGHBOURS]]
+    _loaded[file] = fingerprint.hashed(*(fingerprint.file_hash(path) for path in beside))
+    made_of = f"plug-in {file.name}", _loaded[file]
+    _owners.update(dict.fromkeys((set(integrators()) | set(scenes())) - before, made_of))
 
 
 def loaded() -> list[str]:
@@ -52,9 +52,9 @@ def loaded() -> list[str]:
     return [str(path) for path in _loaded]
 
 
-def digest_of(name: str) -> str:
-    """Hash of the plug-in that registered an integrator or a scene; empty for everything else."""
-    return _owners.get(name, "")
+def reasons(names: Iterable[str]) -> fingerprint.Reasons:
+    """Hashes of the plug-ins that registered some integrators and scenes."""
+    return fingerprint.merged(dict([_owners[name]]) for name in names if name in _owners)
 
 
 def is_local(name: str) -> bool:

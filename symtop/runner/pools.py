@@ -1,4 +1,4 @@
-"""Where cases are computed: here, in spawned processes, or on a dask cluster, each a `concurrent.futures` executor.
+"""Places where cases are computed: this process, spawned ones or a dask cluster, each a `concurrent.futures` executor.
 
 Pools are opened when they are first needed and kept for the next study, since starting a worker costs two seconds. A
 cluster's workers need this version of symtop, the scripts of the studies, and the results folder under the same path.

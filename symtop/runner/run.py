@@ -1,18 +1,19 @@
-"""The runner: measures the cases that are missing, combines them, draws, and writes down what it found.
+"""The runner: computes the cases that are missing, combines them, draws, and writes the findings.
 
 A case is computed only if no file holds its digest, so that an interrupted study resumes and an unchanged one
 ends in seconds. Untimed cases share all cores; timed ones run alone. A study may have a second round of cases, made
-from what the first one found. Two runs may share one folder: each case is computed by one of them.
+from what the first one found. Two runs may share one folder: each case is computed by one of them. How a picture is
+written to a file is the caller's choice (`Save`): this room knows no style.
 """
 
 import contextlib
 import hashlib
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 from tqdm import tqdm
@@ -26,14 +27,17 @@ from symtop.runner.scripts import file_of, folder, load, names
 from symtop.runner.study import Case, Combined, Picture, Study
 from symtop.runner.work import Result, Task
 
-__all__ = ["folder", "load", "names", "run", "status"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-DONE, FAILED, STALE, MISSING = STATES = ("done", "failed", "stale", "missing")
+__all__ = ["Round", "Save", "findings_of", "folder", "load", "names", "run"]
+
+Save = Callable[["Figure", Path], object]  # writes a picture's figure to a file
 
 
 @dataclass
 class Round:
-    """Cases of a study, what is known of them, and what computing them has brought."""
+    """Cases of a study with their files and datasets, the failures, and how many were computed."""
 
     study: Study
     results: Path
@@ -51,8 +55,8 @@ class Round:
         return {path: case for path, case in new.items() if path not in self.done}
 
     def _look(self, paths: dict[Path, Case]) -> None:
-        found = {path: data for path in paths if (data := store.load_case(path)) is not None}
-        self.done |= {path: (paths[path], data) for path, data in found.items()}
+        loaded = {path: data for path in paths if (data := store.load_case(path)) is not None}
+        self.done |= {path: (paths[path], data) for path, data in loaded.items()}
 
     def compute(self, missing: dict[Path, Case], workers: Workers, limit: float, *, fresh: bool, quiet: bool) -> None:
         """Have cases computed, with a progress bar where somebody is watching."""
@@ -87,17 +91,17 @@ def _bar(name: str, total: int, *, quiet: bool) -> Any:
     return tqdm(total=total, desc=name, unit="case", disable=unseen, leave=False)
 
 
-def _stamp(study: Study, digests: Iterable[str]) -> str:
-    """Hash of what the findings depend on: the cases, the script and the code that it draws and judges with."""
+def _stamp(study: Study, digests: Iterable[str], save: Save | None) -> str:
+    """Hash of what the findings depend on: the cases, the script and the code that combines, draws and judges."""
     digest = hashlib.sha256("".join(digests).encode())
     if study.follow_up is not None:  # its cases are timed
         digest.update(datasets.provenance()["processor"].encode())
-    digest.update(depends.script_digest(file_of(study.name)).encode())
+    digest.update(depends.script_digest(file_of(study.name), store, save).encode())
     return digest.hexdigest()[:20]
 
 
 def _drawn(study: Study, results: Path, stamp: str) -> dict[str, Any] | None:
-    """The findings of an earlier run, if they and all their pictures are still good."""
+    """The findings of an earlier run, if they and all their pictures are up to date."""
     before = store.read_json(results / f"{study.name}.json")
     if not isinstance(before, dict) or before.get("stamp") != stamp:
         return None
@@ -110,7 +114,7 @@ def _drawn(study: Study, results: Path, stamp: str) -> dict[str, Any] | None:
 
 @contextlib.contextmanager
 def _hired(workers: Workers | None, jobs: int | None, results: Path, study: Study) -> Iterator[Workers]:
-    """Those workers, or some of our own for as long as it takes; an early end leaves nothing lying about."""
+    """Those workers, or new ones that are closed at the end; after an early end no partial file is left."""
     hired = workers or Workers(jobs)
     try:
         yield hired
@@ -124,50 +128,55 @@ def _hired(workers: Workers | None, jobs: int | None, results: Path, study: Stud
 
 def run(study: Study, results: Path, *, quick: bool = False, full: bool = False, fresh: bool = False,
         jobs: int | None = None, quiet: bool = False, workers: Workers | None = None,
-        limit: float | None = None) -> dict[str, Any]:  # fmt: skip
+        limit: float | None = None, save: Save | None = None) -> dict[str, Any]:  # fmt: skip
     """Bring a study's dataset, figures and findings up to date; returns the findings.
 
     `quick` is the coarse grid, `full` the longest one of a study that has it; `limit` is the time a case may take, in
-    seconds (the study's own by default). Cases that fail are named in ``failures``, recorded beside the others with
-    their traceback, and tried again the next time.
+    seconds (the study's own by default); `save` writes figures to files, and without it none are drawn. Cases that fail
+    are named in ``failures``, recorded beside the others with their traceback, and tried again the next time.
     Raises SymtopError if the results cannot be written or nothing could be measured.
     """
     began = time.monotonic()
     results = results.resolve()
     seconds = study.limit if limit is None else positive("limit", limit)
     store.prepare(results, study)
-    known = Round(study, results)
-    missing = known.add(study.grid(quick=quick, full=full), fresh=fresh)
-    stamp = _stamp(study, sorted(path.name for path in known.paths))
+    cases = Round(study, results)
+    missing = cases.add(study.grid(quick=quick, full=full), fresh=fresh)
+    stamp = _stamp(study, sorted(path.name for path in cases.paths), save)
     before = _drawn(study, results, stamp)
     if before is not None and not missing:
         return {**before, "computed": 0, "seconds": time.monotonic() - began}
     with _hired(workers, jobs, results, study) as hired:
-        known.compute(missing, hired, seconds, fresh=fresh, quiet=quiet)
+        cases.compute(missing, hired, seconds, fresh=fresh, quiet=quiet)
         if study.follow_up is not None:
-            later = known.add(study.follow_up(known.combined()), fresh=fresh)
-            known.compute(later, hired, seconds, fresh=fresh, quiet=quiet)
+            later = cases.add(study.follow_up(cases.combined()), fresh=fresh)
+            cases.compute(later, hired, seconds, fresh=fresh, quiet=quiet)
     with store.claim(results / f"{study.name}.nc", wait=True):
-        findings = _conclude(known, stamp, quick=quick)
-    return {**findings, "computed": known.computed, "seconds": time.monotonic() - began}
+        findings = _conclude(cases, stamp, save, quick=quick)
+    return {**findings, "computed": cases.computed, "seconds": time.monotonic() - began}
 
 
-def _conclude(known: Round, stamp: str, *, quick: bool) -> dict[str, Any]:
+def _conclude(cases: Round, stamp: str, save: Save | None, *, quick: bool) -> dict[str, Any]:
     """Combine, draw, judge and write."""
-    study, results = known.study, known.results
+    study, results = cases.study, cases.results
     for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
         datasets.sweep(file)
-    combined = datasets.describe(known.combined(), study.title, question=study.question)
+    combined = cases.combined()
+    units = store.units_of(case.scene for case in cases.paths.values())
+    combined = datasets.describe(combined, study.title, units=units, question=study.question)
     datasets.write(combined, results / f"{study.name}.nc")
-    store.forget(results, study, known.paths)
-    findings = findings_of(study, combined, results, failures=known.failures, cases=len(known.paths))
-    findings |= {"quick": quick, "stamp": stamp if not known.failures else ""}
+    store.forget(results, study, cases.paths)
+    findings = findings_of(study, combined, results, save, failures=cases.failures, cases=len(cases.paths))
+    findings |= {"quick": quick, "stamp": stamp if not cases.failures else ""}
     store.write_json(results / f"{study.name}.json", findings)
     return findings
 
 
-def findings_of(study: Study, data: Combined, results: Path, *, failures: list[str], cases: int) -> dict[str, Any]:
+def findings_of(
+    study: Study, data: Combined, results: Path, save: Save | None, *, failures: list[str], cases: int
+) -> dict[str, Any]:
     """Draw a dataset and say what it shows, as the report wants it."""
+    pictures = [] if save is None else [_save(results, study, picture, save) for picture in study.pictures(data)]
     opening = None if study.opening is None else study.opening(data)
     return {
         "study": study.name,
@@ -178,7 +187,7 @@ def findings_of(study: Study, data: Combined, results: Path, *, failures: list[s
         "tables": [table._asdict() for table in study.tables(data)],
         "charts": [chart._asdict() for chart in study.charts(data)],
         "opening": None if opening is None else {**opening._asdict(), "table": opening.table._asdict()},
-        "pictures": [_save(results, study, picture) for picture in study.pictures(data)],
+        "pictures": pictures,
         "failures": failures,
         "cases": cases,
         "quick": False,
@@ -186,32 +195,8 @@ def findings_of(study: Study, data: Combined, results: Path, *, failures: list[s
     }
 
 
-def status(study: Study, results: Path, *, quick: bool = False, full: bool = False) -> list[dict[str, str]]:
-    """What is known of every case: ``done``, ``failed``, ``stale`` (its sources have changed) or ``missing``.
-
-    The second round of a study is known only when its first is done.
-    """
-    known = Round(study, results.resolve())
-    missing = known.add(study.grid(quick=quick, full=full), fresh=False)
-    if study.follow_up is not None and not missing:
-        known.add(study.follow_up(known.combined()), fresh=False)
-    older = {store.label_of(path) for path in store.superseded(known.results, study, known.paths)}
-    rows = []
-    for path, case in known.paths.items():
-        record = store.read_json(store.failure_path(path))
-        state, message = STALE if store.label_of(path) in older else MISSING, ""
-        if path in known.done:
-            state = DONE
-        elif isinstance(record, dict):
-            state, message = FAILED, str(record.get("message", ""))
-        rows.append({"scene": case.scene, "integrator": case.integrator, "state": state, "message": message})
-    return rows
-
-
-def _save(results: Path, study: Study, picture: Picture) -> dict[str, str]:
-    from symtop.report import style
-
+def _save(results: Path, study: Study, picture: Picture, save: Save) -> dict[str, str]:
     suffix = getattr(picture.figure, "suffix", "png")  # a film is a GIF
     file = f"{study.name}-{picture.name}.{suffix}"
-    style.save(picture.figure, results / "figures" / file)
+    save(picture.figure, results / "figures" / file)
     return {"name": picture.name, "file": file, "caption": picture.caption, "alt": picture.alt}

@@ -12,6 +12,8 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+from symtop.base import fingerprint
+from symtop.base.signals import TerminatedError
 from symtop.base.validate import SymtopError, one_of
 from symtop.runner.study import Study
 
@@ -32,12 +34,12 @@ def folder() -> Path:
 def _package(name: str, place: Path) -> ModuleType:
     """The package of that name in that folder; imported once."""
     file = place / "__init__.py"
-    known = sys.modules.get(name)
-    if known is None or getattr(known, "__file__", None) != str(file):
-        for module in [module for module in sys.modules if module.startswith(f"{name}.")]:
-            del sys.modules[module]  # of another folder with the same name
-        known = _executed(name, file, [str(place)])
-    return known
+    module = sys.modules.get(name)
+    if module is None or getattr(module, "__file__", None) != str(file):
+        for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
+            del sys.modules[stale]  # of another folder with the same name
+        module = _executed(name, file, [str(place)])
+    return module
 
 
 def _executed(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
@@ -55,7 +57,11 @@ def _executed(name: str, file: Path, places: list[str] | None = None) -> ModuleT
 
 
 def install() -> ModuleType:
-    """Make ``import symtop_studies`` work, wherever the studies lie."""
+    """Make ``import symtop_studies`` work, wherever the studies lie.
+
+    Their files count as wholes in a fingerprint, but for the scripts: a new caption measures nothing again.
+    """
+    fingerprint.add_root(STUDIES, folder(), by_text=["study.py"])
     return _package(STUDIES, folder())
 
 
@@ -89,8 +95,8 @@ def _module(file: Path) -> ModuleType:
         package = _package(f"symtop_study_{file.parent.name}", file.parent)
         return importlib.import_module(f"{package.__name__}.{file.stem}")
     name = f"symtop_study_{file.stem}"
-    known = sys.modules.get(name)
-    return known if known is not None and known.__file__ == str(file) else _executed(name, file)
+    module = sys.modules.get(name)
+    return module if module is not None and module.__file__ == str(file) else _executed(name, file)
 
 
 def load(name: str) -> Study:
@@ -98,7 +104,7 @@ def load(name: str) -> Study:
     file = file_of(name)
     try:
         module = _module(file)
-    except SymtopError:
+    except (SymtopError, TerminatedError):
         raise
     except (Exception, SystemExit) as error:
         raise SymtopError(f"study {file.name} failed: {type(error).__name__}: {error}") from error

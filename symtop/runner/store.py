@@ -1,14 +1,17 @@
 """Where a study's results live: one file a case, one dataset a study, written whole or not at all.
 
-results/cases/STUDY/SCENE--INTEGRATOR--DIGEST.nc             what one case measured
-results/cases/STUDY/SCENE--INTEGRATOR--DIGEST.failed.json    or how it failed, with its traceback
-results/cases/STUDY/.SCENE--INTEGRATOR--DIGEST.lock          while it is being computed
+results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.nc             what one case measured
+results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.failed.json    or how it failed, with its traceback
+results/cases/STUDY/.SCENE--INTEGRATOR--SETTINGS--DIGEST.lock          while it is being computed
 results/STUDY.nc                                             all of them, with labelled dimensions
 results/STUDY.json                                           verdict, tables and captions for the report
 results/figures/STUDY-NAME.png
 
-A case's file holds the digest of what it was made from and a hash of its values: a truncated, damaged or foreign file
-counts as none. The lock is the operating system's, so that it ends with the process that holds it, however that ends.
+SETTINGS is a hash of what the case was asked to do, DIGEST one of everything that its numbers depend on. Its file holds
+the settings and the reasons that make up the digest, and a hash of its values: a truncated, damaged or foreign file
+counts as none. A file is removed only when a case with the same SETTINGS and another DIGEST takes its place; what was
+computed for another grid stays. The lock is the operating system's, so that it ends with the process that holds it,
+however that ends.
 """
 
 import contextlib
@@ -25,7 +28,10 @@ import numpy as np
 import xarray as xr
 
 from symtop.base import datasets
+from symtop.base.fingerprint import LENGTH, Reasons
 from symtop.base.validate import SymtopError
+from symtop.model.scenes import scenes
+from symtop.runner import depends
 from symtop.runner.study import Case, Combined, Study
 
 try:
@@ -38,17 +44,28 @@ SEED = 0  # of the order in which batches are timed; nothing else here is random
 
 def case_path(results: Path, study: Study, case: Case) -> Path:
     """The file of a case; its name holds the digest of everything the numbers depend on."""
-    return results / "cases" / study.name / f"{case.label}--{study.digest(case)}.nc"
+    key = depends.settings_key(study, case)[:8]
+    return results / "cases" / study.name / f"{case.label}--{key}--{depends.digest(study, case)}.nc"
 
 
 def digest_of(path: Path) -> str:
     """The digest in the name of a case's file."""
-    return path.name.partition(".nc")[0].rpartition("--")[2]
+    return path.name.rpartition("--")[2].partition(".")[0]
 
 
-def label_of(path: Path) -> str:
-    """The scene and integrator in the name of a case's file."""
+def identity_of(path: Path) -> str:
+    """The scene, integrator and settings in the name of a case's file: what was asked, whatever it was made of."""
     return path.name.rpartition("--")[0]
+
+
+def is_labelled(path: Path, case: Case) -> bool:
+    """Is a file of the scene and integrator of a case?"""
+    return identity_of(path).rpartition("--")[0] == case.label
+
+
+def short(reasons: Reasons) -> Reasons:
+    """Reasons as they are stored: 12 digits of each hash; versions and the name of the processor as they are."""
+    return {label: value[:12] if len(value) == LENGTH else value for label, value in reasons.items()}
 
 
 def prepare(results: Path, study: Study) -> None:
@@ -70,14 +87,22 @@ def save_case(data: xr.Dataset, path: Path, study: Study, case: Case) -> None:
     described = datasets.describe(
         data,
         f"{study.name}: {case.integrator} on {case.scene}",
+        units=units_of([case.scene]),
         study=study.name,
         settings=dict(case.settings),
         sources=digest_of(path),
+        made_of=short(depends.reasons(study, case)),
         seed=SEED,
-        content=datasets.fingerprint(data),
+        content=datasets.content_hash(data),
     )
     datasets.write(described, path)
     failure_path(path).unlink(missing_ok=True)
+
+
+def units_of(names: Iterable[str]) -> str:
+    """The units that some scenes have in common: "SI", or empty."""
+    catalogue = scenes()
+    return "SI" if all(name in catalogue and catalogue[name].units == "SI" for name in names) else ""
 
 
 def load_case(path: Path) -> xr.Dataset | None:
@@ -88,7 +113,7 @@ def load_case(path: Path) -> xr.Dataset | None:
         data = datasets.read(path)
     except SymtopError:
         return None
-    whole = data.attrs.get("sources") == digest_of(path) and data.attrs.get("content") == datasets.fingerprint(data)
+    whole = data.attrs.get("sources") == digest_of(path) and data.attrs.get("content") == datasets.content_hash(data)
     return data if whole else None
 
 
@@ -254,26 +279,23 @@ def read_json(path: Path) -> Any:
         return None
 
 
-def superseded(results: Path, study: Study, keep: Iterable[Path]) -> list[Path]:
-    """Files of the same scene and integrator with another digest; cases that were not asked for are none of them."""
-    wanted = {path.name for path in keep}
-    labels = {label_of(path) for path in keep}
-    found = sorted((results / "cases" / study.name).glob("[!.]*.nc"))
-    return [path for path in found if path.name not in wanted and label_of(path) in labels]
+def stored(results: Path, study: Study) -> list[Path]:
+    """The files of all cases of a study that were ever computed and not replaced."""
+    return sorted((results / "cases" / study.name).glob("[!.]*.nc"))
+
+
+def superseded(paths: Iterable[Path], keep: Iterable[Path]) -> list[Path]:
+    """Those files that were asked for what one to keep was asked for, with another digest: an edit made them stale."""
+    wanted = {digest_of(path) for path in keep}
+    identities = {identity_of(path) for path in keep}
+    return [path for path in paths if digest_of(path) not in wanted and identity_of(path) in identities]
 
 
 def forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
     """Remove what newer files replace, and what killed writers left."""
-    keep = list(keep)
-    for path in superseded(results, study, keep):
+    failures = (results / "cases" / study.name).glob("[!.]*.failed.json")
+    for path in superseded([*stored(results, study), *failures], list(keep)):
         path.unlink(missing_ok=True)
-        failure_path(path).unlink(missing_ok=True)
-    wanted = {failure_path(path).name for path in keep}
-    labels = {label_of(path) for path in keep}
-    cases = results / "cases" / study.name
-    for path in cases.glob("[!.]*.failed.json"):
-        if path.name not in wanted and label_of(path) in labels:
-            path.unlink(missing_ok=True)
     tidy(results, study)
 
 

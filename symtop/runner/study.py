@@ -1,4 +1,4 @@
-"""What a study declares. The runner does the rest.
+"""The declaration of a study; the runner does the rest.
 
 A study is a question, a grid of cases, a function that measures one case, and functions that turn the combined
 dataset into figures, tables and sentences. It holds no numerics of its own.
@@ -111,12 +111,6 @@ class Study:
     def grid(self, *, quick: bool = False, full: bool = False) -> list[Case]:
         """The cases of the first round: the coarse grid, the ordinary one, or the longest there is."""
         return self.full() if full and self.full is not None else self.cases(quick)
-
-    def digest(self, case: Case) -> str:
-        """Hash of everything the case's numbers depend on: settings, the way of measuring, sources, versions."""
-        from symtop.runner import depends
-
-        return depends.digest(self, case)
 
     def is_timed(self, case: Case) -> bool:
         """Must the case run alone, on a machine that does nothing else?"""

@@ -1,7 +1,7 @@
-"""One case, computed where it is computed: in this process, in a worker of a pool, or on a cluster.
+"""Computes one case: in this process, in a worker of a pool, or on a cluster.
 
-What fails because of the case (its method, its measure, its time) is recorded and returned: the others go on. What
-fails because of the place (a full disk, other sources than the command's) is raised: nothing else would do better.
+A failure that the case causes (its method, its measure, its time) is recorded and returned, and the others go on. A
+failure that the machine causes (a full disk, other sources than the command's) is raised: it would stop the others too.
 """
 
 import contextlib
@@ -21,12 +21,12 @@ from tqdm import tqdm
 
 from symtop.base import datasets
 from symtop.base.validate import SymtopError
-from symtop.runner import plugins, scripts, store
+from symtop.runner import depends, plugins, scripts, store
 from symtop.runner.study import Case, Study
 
 GRACE = 5.0  # seconds between asking a case to end and ending its process
 _loading = threading.Lock()  # a file that two threads load at once would be executed twice
-_expendable: list[bool] = []  # not empty in a process that may be ended for a case's sake
+_expendable: list[bool] = []  # not empty in a process that may be ended when a case hangs
 
 
 class Task(NamedTuple):
@@ -41,27 +41,27 @@ class Task(NamedTuple):
 
 
 class Result(NamedTuple):
-    """What became of it: computed, found, failed, or busy (another run is computing it)."""
+    """How a task ended: computed, found, failed, or busy (another run is computing it)."""
 
     state: str
     message: str = ""
 
 
 class OverdueError(TimeoutError):
-    """A case has used up its time."""
+    """A case took longer than its limit."""
 
 
 def compute(task: Task, study: Study | None = None, *, wait: bool = False) -> Result:
     """Compute a case and store it, or record how it failed.
 
-    Another process is given no `study` and loads it by name. Raises SymtopError where the place is at fault.
+    Another process is given no `study` and loads it by name. Raises SymtopError where the machine is the cause.
     """
     with _loading:
         for file in task.plugins:
             plugins.load(file)
         study = study or scripts.load(task.study)
     path, case = Path(task.path), task.case
-    if study.digest(case) != store.digest_of(path):
+    if depends.digest(study, case) != store.digest_of(path):
         raise SymtopError(
             f"the sources or dependencies of {case.integrator} on {case.scene} are not those that the study was "
             "started with; if a file was edited meanwhile, run the study again"

@@ -220,10 +220,10 @@ def test_noise_is_not_called_a_win():
 
 
 def test_the_report_shows_the_peers(tmp_path):
-    from symtop.report import page
+    from symtop.report import page, style
 
     data = _stored({"symtop": 1e-4, "scipy": 2e-2})
-    findings = run.findings_of(summary.STUDY, data, tmp_path, failures=["drake was skipped."], cases=2)
+    findings = run.findings_of(summary.STUDY, data, tmp_path, style.save, failures=["drake was skipped."], cases=2)
     store.write_json(tmp_path / "peers.json", findings)
     text = page.write(tmp_path).read_text()
     assert summary.STUDY.title in text

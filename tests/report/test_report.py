@@ -8,7 +8,7 @@ import re
 import pytest
 import xarray as xr
 
-from symtop.report import page
+from symtop.report import page, style
 from symtop.runner import run as runner
 from symtop.runner.study import Case
 from tests.browser import Browser
@@ -28,7 +28,7 @@ def results(tmp_path_factory):
     def cases(_):
         return [Case("spheroid", name, {"periods": [10.0, 40.0], "budget": 3e4}) for name in FEW]
 
-    findings = runner.run(dataclasses.replace(study, cases=cases), folder, jobs=1, quiet=True)
+    findings = runner.run(dataclasses.replace(study, cases=cases), folder, jobs=1, quiet=True, save=style.save)
     assert findings["failures"] == []
     page.write(folder)
     return folder

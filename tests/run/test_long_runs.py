@@ -105,13 +105,14 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
     assert 10_000 <= reached < 12_000_000
     steps = 12_000_000
     seen = []
-    advance = drive.Loop.advance
+    resume = longrun._Book.resumed
 
-    def counting(self, par, rule, at, h, marks):
+    def noting(self, start):
+        at, rows = resume(self, start)
         seen.append(at.k)
-        return advance(self, par, rule, at, h, marks)
+        return at, rows
 
-    monkeypatch.setattr(drive.Loop, "advance", counting)
+    monkeypatch.setattr(longrun._Book, "resumed", noting)  # the loop itself is part of what a checkpoint is told by
     resumed = long_run(WHERE, "midpoint", steps=steps, step_size=H, checkpoint=file, quiet=True)
     assert reached in seen  # it did go on from there
     assert not file.exists()
@@ -141,15 +142,15 @@ def _root() -> str:
 
 def test_an_interrupt_keeps_every_finished_window(tmp_path, monkeypatch):
     file, calls = tmp_path / "run.nc", []
-    summary = longrun._summary
+    note = longrun._Book.note
 
-    def tired(values):
+    def tired(self, at, rows):
         calls.append(1)
         if len(calls) == 5:
             raise KeyboardInterrupt
-        return summary(values)
+        note(self, at, rows)
 
-    monkeypatch.setattr(longrun, "_summary", tired)
+    monkeypatch.setattr(longrun._Book, "note", tired)
     with pytest.raises(KeyboardInterrupt):
         long_run(WHERE, "rk4", steps=50_000, step_size=H, checkpoint=file, quiet=True)
     resumed = long_run(WHERE, "rk4", steps=50_000, step_size=H, checkpoint=file, quiet=True)

@@ -104,7 +104,7 @@ def kernel(tmp_path, monkeypatch):
     (tmp_path / "twice.py").write_text(TWICE)
     space = {"__name__": "twice", "__file__": str(tmp_path / "twice.py")}
     exec(compile(TWICE, str(tmp_path / "twice.py"), "exec"), space)
-    return lambda: compiled.compile_kernel(space["twice"], space["twice"])
+    return lambda: compiled.compile_kernel(space["twice"])
 
 
 def test_a_full_disk_under_the_cache_of_kernels_costs_time_and_no_run(kernel, tmp_path, monkeypatch):

@@ -28,8 +28,8 @@ from symtop.measure.work import TARGETS, Walk, spans, work_table
 from symtop.model import charts
 from symtop.model.scenes import closed_form
 from symtop.run.reference import reference
+from symtop.runner import depends, store
 from symtop.runner import run as runner
-from symtop.runner import store
 from symtop.runner.study import Case, Study
 
 
@@ -447,4 +447,4 @@ def test_a_study_may_have_a_second_round_made_from_the_first(tmp_path, monkeypat
     assert runner.run(study, tmp_path, quiet=True)["computed"] == 1
     assert runner.run(study, tmp_path, quiet=True)["computed"] == 0
     alone = Case("spheroid", "midpoint", timed=True)
-    assert study.digest(alone) == study.digest(dataclasses.replace(alone))
+    assert depends.digest(study, alone) == depends.digest(study, dataclasses.replace(alone))

@@ -1,0 +1,57 @@
+"""The folder of what can be made again: compiled kernels, references, checkpoints of long runs.
+
+Every use of an entry sets its time of modification, at most once a day. An entry that nobody used for `UNUSED` days is
+removed, and then the entries used longest ago until the folder is small enough. Another process may be doing the same.
+"""
+
+import contextlib
+import os
+import shutil
+import time
+from pathlib import Path
+
+DAY = 86_400.0  # seconds
+UNUSED = 30  # days
+
+
+def cache_root() -> Path:
+    """The folder for everything symtop caches: ``$SYMTOP_CACHE`` or ``symtop`` in the user's cache folder."""
+    chosen = os.environ.get("SYMTOP_CACHE")
+    if chosen:
+        return Path(chosen)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symtop"
+
+
+def touch(entry: Path) -> None:
+    """Note that an entry is used now; nothing happens if it is not there or was used today."""
+    with contextlib.suppress(OSError):
+        if entry.stat().st_mtime < time.time() - DAY:
+            os.utime(entry)
+
+
+def size_of(entry: Path) -> int:
+    """Bytes of a file, or of all files in a folder."""
+    if not entry.is_dir():
+        return entry.stat().st_size
+    return sum(path.stat().st_size for path in entry.rglob("*") if path.is_file())
+
+
+def prune(folder: Path, most_bytes: int) -> None:
+    """Remove the entries of a folder that nobody used for `UNUSED` days, and the oldest beyond `most_bytes`."""
+    oldest, total = time.time() - UNUSED * DAY, 0
+    for entry in by_last_use(folder):
+        with contextlib.suppress(OSError):
+            total += size_of(entry)
+            if total > most_bytes or entry.stat().st_mtime < oldest:
+                shutil.rmtree(entry, ignore_errors=True) if entry.is_dir() else entry.unlink(missing_ok=True)
+
+
+def by_last_use(folder: Path) -> list[Path]:
+    """The entries of a folder, the one used last first; partial files, whose names begin with a dot, are none."""
+    times = {}
+    with contextlib.suppress(OSError):
+        for entry in folder.iterdir():
+            with contextlib.suppress(OSError):
+                if not entry.name.startswith("."):
+                    times[entry] = entry.stat().st_mtime
+    return sorted(times, key=lambda entry: -times[entry])

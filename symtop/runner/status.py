@@ -1,0 +1,79 @@
+"""What is known of every case of a study, and why a case has to be computed.
+
+    done       a file holds what this version computes
+    failed     it failed, and is tried again by the next run
+    stale      it was computed, and something that its numbers depend on has changed since
+    missing    it was never computed with these settings
+
+The reasons that are stored in a case's file are compared with the present ones, label by label.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from symtop.base import datasets, fingerprint
+from symtop.runner import depends, store
+from symtop.runner.run import Round
+from symtop.runner.study import Case, Study
+
+DONE, FAILED, STALE, MISSING = STATES = ("done", "failed", "stale", "missing")
+
+
+def status(
+    study: Study, results: Path, *, quick: bool = False, full: bool = False, why: bool = False
+) -> list[dict[str, Any]]:
+    """Scene, integrator, state and message of every case; with `why` also what has changed since it was computed.
+
+    The second round of a study is known only when its first is done.
+    """
+    cases = Round(study, results.resolve())
+    missing = cases.add(study.grid(quick=quick, full=full), fresh=False)
+    if study.follow_up is not None and not missing:
+        cases.add(study.follow_up(cases.combined()), fresh=False)
+    stored = store.stored(cases.results, study)
+    older = store.superseded(stored, cases.paths)
+    rows = []
+    for path, case in cases.paths.items():
+        record = store.read_json(store.failure_path(path))
+        earlier = [old for old in older if store.identity_of(old) == store.identity_of(path)]
+        message, causes = "", list[str]()
+        if path in cases.done:
+            state = DONE
+        elif isinstance(record, dict):
+            state, message = FAILED, str(record.get("message", ""))
+        elif earlier:
+            state = STALE
+            causes = changed(study, case, max(earlier, key=lambda old: old.stat().st_mtime)) if why else []
+        else:
+            state, causes = MISSING, other_settings(case, stored) if why else []
+        row = {"scene": case.scene, "integrator": case.integrator, "state": state, "message": message}
+        rows.append(row | ({"why": causes} if why else {}))
+    return rows
+
+
+def changed(study: Study, case: Case, path: Path) -> list[str]:
+    """What a case depends on that is not what it was when a file was computed: labels of a fingerprint."""
+    before = _json(datasets.attributes(path).get("made_of"))
+    if not before:
+        return ["its file does not say what it was made of"]
+    return fingerprint.changes(before, store.short(depends.reasons(study, case)))
+
+
+def other_settings(case: Case, stored: list[Path]) -> list[str]:
+    """How the settings of a case differ from the nearest that were computed on its scene with its integrator."""
+    settings = [_json(datasets.attributes(path).get("settings")) for path in stored if store.is_labelled(path, case)]
+    wanted = json.loads(json.dumps(dict(case.settings)))
+    differing = [
+        sorted(name for name in {*old, *wanted} if old.get(name, "") != wanted.get(name, "")) for old in settings
+    ]
+    return [f"setting {name}" for name in min(differing, key=len, default=[])] if settings else ["never computed"]
+
+
+def _json(text: object) -> Mapping[str, Any]:
+    try:
+        content = json.loads(str(text))
+    except ValueError:
+        return {}
+    return content if isinstance(content, dict) else {}
