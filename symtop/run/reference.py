@@ -10,15 +10,13 @@ against the long double integration. An integration that visibly differs from it
 
 Values beyond double are stored as pairs, ``theta + theta_lo``. A result is cached on disk under a hash of the top, the
 start, the times, the precision, the sources and the libraries; a damaged cache file is noticed, said and computed
-again. Files that nobody used for 30 days are removed, and those used longest ago beyond `MOST_BYTES`.
+again. Files that nobody used for 30 days are removed, and those used longest ago beyond a limit (see `kept`).
 """
 
 import functools
 import hashlib
-import itertools
 import math
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,7 +25,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from symtop.base import datasets, fingerprint, imports
-from symtop.base.cache import cache_root, prune, touch
+from symtop.base.cache import cache_root
 from symtop.base.multiprecision import context
 from symtop.base.numbers import EPSILON, TINY
 from symtop.base.validate import SymtopError, SymtopWarning, one_of
@@ -35,6 +33,7 @@ from symtop.methods import taylor
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form, scenes
 from symtop.model.scenes import scene as find_scene
+from symtop.run.kept import kept
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
 CHECKS = 16
@@ -43,9 +42,6 @@ SAFETY = 8.0
 OVERLAP = 100.0  # time over which the closed form is compared with an integration each time it is used
 SUSPICIOUS = 1e-12  # a disagreement beyond this is an error of one of them, not rounding
 MOST_CACHED = 200_000  # times; larger results are not kept on disk
-MOST_BYTES = 500_000_000  # of results that are kept; one of 1000 times takes 200 kB
-OFTEN = 50  # files between two looks at the size of the cache
-_written = itertools.count()
 
 
 class Checks(NamedTuple):
@@ -175,7 +171,7 @@ def _closed_checks(scene: Scene, horizon: float) -> tuple[Checks, float]:
         columns = {name: ("check", values) for name, values in zip(Checks._fields, checks, strict=True)}
         return xr.Dataset({**columns, "overlap": ((), overlap)})
 
-    data = _kept(_cache_path(scene, np.array([horizon]), "checks"), computed, None)
+    data = kept(_cache_path(scene, np.array([horizon]), "checks"), computed, None)
     return Checks(*(data[name].values for name in Checks._fields)), float(data["overlap"])
 
 
@@ -316,39 +312,7 @@ def reference(scene: "str | Scene", times: ArrayLike, precision: str = "longdoub
 def _cached(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
     if times.size > MOST_CACHED or precision == "closed-form":  # a microsecond a time, not worth a file
         return _compute(scene, times, precision)
-    return _kept(_cache_path(scene, times, precision), lambda: _compute(scene, times, precision), 4)
-
-
-def _kept(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> xr.Dataset:
-    """What is in a file of the cache, or what is computed and put there.
-
-    Warnings point so many calls up; with None there are none, because nobody asked for a file.
-    """
-    if path.is_file():
-        try:
-            found = datasets.read(path)
-            if found.attrs.pop("content", "") == datasets.content_hash(found):
-                touch(path)
-                return found
-        except SymtopError:
-            pass
-        if depth is not None:
-            said = f"the cached reference {path.name} is damaged and is computed again"
-            warnings.warn(said, SymtopWarning, stacklevel=depth)
-    data = compute()
-    try:
-        datasets.write(data.assign_attrs(content=datasets.content_hash(data)), path)
-        _make_room(path.parent)
-    except SymtopError as error:
-        if depth is not None:
-            warnings.warn(f"the reference is not kept: {error}", SymtopWarning, stacklevel=depth)
-    return data
-
-
-def _make_room(folder: Path) -> None:
-    """Prune the cache after the first file that this process writes to it, and after every `OFTEN` more."""
-    if next(_written) % OFTEN == 0:
-        prune(folder, MOST_BYTES)
+    return kept(_cache_path(scene, times, precision), lambda: _compute(scene, times, precision), 4)
 
 
 def _cache_path(scene: Scene, times: charts.Array, precision: str) -> Path:

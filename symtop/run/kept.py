@@ -1,0 +1,47 @@
+"""A dataset that is in a file of the cache, or is computed and put there.
+
+A file holds a hash of its values, so that a damaged one is noticed, said and computed again. Files that nobody used for
+30 days are removed, and those used longest ago beyond `MOST_BYTES` of a folder.
+"""
+
+import itertools
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import xarray as xr
+
+from symtop.base import datasets
+from symtop.base.cache import prune, touch
+from symtop.base.validate import SymtopError, SymtopWarning
+
+MOST_BYTES = 500_000_000  # of a folder; a reference at 1000 times takes 200 kB
+OFTEN = 50  # files that a process writes between two looks at the size of the folder
+_written = itertools.count()
+
+
+def kept(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> xr.Dataset:
+    """The dataset in a file, or the one that `compute` returns, which is then written to it.
+
+    Warnings point `depth` calls up, 1 being this function; with None there are none, because nobody asked for a file.
+    """
+    if path.is_file():
+        try:
+            data = datasets.read(path)
+            if data.attrs.pop("content", "") == datasets.content_hash(data):
+                touch(path)
+                return data
+        except SymtopError:
+            pass
+        if depth is not None:
+            sentence = f"the cached reference {path.name} is damaged and is computed again"
+            warnings.warn(sentence, SymtopWarning, stacklevel=depth)
+    data = compute()
+    try:
+        datasets.write(data.assign_attrs(content=datasets.content_hash(data)), path)
+        if next(_written) % OFTEN == 0:
+            prune(path.parent, MOST_BYTES)
+    except SymtopError as error:
+        if depth is not None:
+            warnings.warn(f"the reference is not kept: {error}", SymtopWarning, stacklevel=depth)
+    return data
