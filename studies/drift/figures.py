@@ -8,7 +8,6 @@ import xarray as xr
 from matplotlib.ticker import NullFormatter
 
 from symtop.measure.conservation import CONSTANTS
-from symtop.report.figures import dots, envelope, residual_history
 from symtop.report.style import BLACK, GREY, legend_below, look, panels, slope_guide
 from symtop.runner.study import Picture
 
@@ -27,6 +26,7 @@ LABELS = {
 BANDS = ("energy", "modified_energy", "p_phi", "p_psi")
 EXPONENTS = (*CONSTANTS, "phase")
 LAWS = (0.0, 0.5, 1.0, 2.0)  # exponents that are drawn as lines
+SMALLEST = 1e-17  # what is smaller is drawn here
 
 
 def pictures(data: xr.DataTree) -> list[Picture]:
@@ -170,5 +170,76 @@ def lost_phases(losses: dict[str, PhaseLoss]) -> Any:
     right.axvline(0.0, color=GREY, lw=0.8)
     right.set(yticks=range(len(losses)), yticklabels=list(losses), ylim=(len(losses) - 0.5, -0.5))
     right.set_xlabel("predicted less measured time (%)")
+    legend_below(figure, axes)
+    return figure
+
+
+def residual_history(data: xr.Dataset, scenes: Sequence[str], rows: Sequence[tuple[str, str]]) -> Any:
+    """|residual| against time, one row a conserved quantity, one column a scene: envelopes over faint samples."""
+    figure, axes = panels(len(rows), len(scenes), height=2.7, sharex="col", sharey="row")
+    for (quantity, label), line in zip(rows, axes, strict=True):
+        for axis, scene in zip(line, scenes, strict=True):
+            for name in data["integrator"].values:
+                cell = data.sel(scene=scene, integrator=name)
+                t, r = cell["sample_time"].values, np.abs(cell[f"{quantity}_residual"].values)
+                good = np.isfinite(r) & np.isfinite(t) & (t > 0.0)
+                if not good.any():
+                    continue
+                t, r = t[good], np.maximum(r[good], SMALLEST)
+                style = look(str(name))
+                axis.plot(t, r, ",", color=style.color, alpha=0.5, zorder=2)
+                axis.plot(
+                    *envelope(t, r), style.marker + "-", color=style.color, ms=0.8 * style.size, label=str(name),
+                    zorder=3,
+                )  # fmt: skip
+            axis.set(xscale="log", yscale="log")
+            if quantity == rows[0][0]:
+                axis.set_title(scene)
+        line[0].set_ylabel(label)
+    for axis in axes[0]:
+        first, last = axis.get_xlim()
+        axis.autoscale(enable=False)
+        slope_guide(axis, 1.0, (first * 2.0, last / 2.0), 1e-8, "$t$")
+    for axis in axes[-1]:
+        axis.set_xlabel("time (s)")
+    legend_below(figure, axes)
+    return figure
+
+
+def envelope(t: Any, r: Any, windows: int = 18) -> tuple[Any, Any]:
+    """Largest value in logarithmic windows of time."""
+    edges = np.geomspace(t[0] * 0.999, t[-1], windows + 1)
+    place = np.clip(np.searchsorted(edges, t, side="left") - 1, 0, windows - 1)
+    kept = np.unique(place)
+    return np.sqrt(edges[kept] * edges[kept + 1]), np.array([r[place == k].max() for k in kept])
+
+
+def dots(data: xr.Dataset, scenes: Sequence[str], columns: Sequence[tuple[str, str]], *, log: bool) -> Any:
+    """One row an integrator, one column a variable, one dot a scene: large tables at a glance.
+
+    On a logarithmic axis zeros are drawn at `SMALLEST`. Each column is ``(variable, label)``; a variable ``NAME`` with
+    a companion ``NAME_interval`` gets a bar.
+    """
+    names = [str(name) for name in data["integrator"].values]
+    figure, axes = panels(1, len(columns), height=0.9 + 0.2 * len(names), sharey=True)
+    shift = np.linspace(-0.22, 0.22, len(scenes)) if len(scenes) > 1 else np.zeros(1)
+    for axis, (variable, label) in zip(axes[0], columns, strict=True):
+        for scene, offset, face in zip(scenes, shift, ("full", "none", "left", "right") * 3, strict=False):
+            for row, name in enumerate(names):
+                cell = data.sel(scene=scene, integrator=name)
+                value, style = float(cell[variable]), look(name)
+                if not np.isfinite(value):
+                    continue
+                value = max(value, SMALLEST) if log else value
+                bar = float(cell[f"{variable}_interval"]) if f"{variable}_interval" in cell else 0.0
+                axis.errorbar(
+                    value, row + offset, xerr=bar, fmt=style.marker, fillstyle=face, color=style.color, ms=5,
+                    elinewidth=0.8,
+                )  # fmt: skip
+        for face, scene in zip(("full", "none", "left", "right") * 3, scenes, strict=False):
+            axis.plot([], [], "o", fillstyle=face, color=GREY, label=scene)
+        axis.set(xlabel=label, yticks=range(len(names)), yticklabels=names, ylim=(len(names) - 0.5, -0.5))
+        if log:
+            axis.set_xscale("log")
     legend_below(figure, axes)
     return figure
