@@ -11,7 +11,7 @@ Reference: Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231.
 """
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -24,35 +24,6 @@ from symtop.run.long_run import long_run
 
 SPACING = 0.01  # rad, between the starts of an ensemble
 PLAIN_MEMBERS = 8  # members that run with plain sums as well, for comparison
-
-
-class Rounding(NamedTuple):
-    """Columns of the group ``rounding``: drift of the modified energy with compensated and with plain sums."""
-
-    elapsed: np.ndarray  # (window,), steps: see `elapsed_steps`
-    drift: np.ndarray  # (member, window), relative
-    rms: np.ndarray  # (window,), root mean square over the members
-    exponent: float  # of the growth of `rms` from as many steps on as the first window has
-    exponent_interval: float  # half-width, 95 %
-    end: float  # the last value of `rms`
-    plain_drift: np.ndarray  # (plain_member, window)
-    plain_rms: np.ndarray  # (window,)
-    plain_exponent: float
-    plain_exponent_interval: float
-    plain_end: float
-    p_phi: float  # largest relative change of a momentum, with compensated sums
-    p_psi: float
-    gain: float  # plain over compensated root mean square of the members that ran with both, in the last decade of
-    # steps: over a decade, because at one moment a walk may be anywhere
-
-
-ROUNDING_DIMS = {
-    "elapsed": ("window",),
-    "drift": ("member", "window"),
-    "rms": ("window",),
-    "plain_drift": ("plain_member", "window"),
-    "plain_rms": ("window",),
-}
 
 
 def windows(scene: Scene, method: Integrator, steps: int, per_nutation: float) -> xr.Dataset:
@@ -78,33 +49,30 @@ def elapsed_steps(ends: np.ndarray) -> np.ndarray:
 def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, count: int) -> xr.Dataset:
     """Drift of the modified energy of `count` starts over `steps` steps, and of `PLAIN_MEMBERS` with plain sums.
 
-    Returns a dataset with the columns of `Rounding`.
+    Dimension ``window``: ``elapsed`` (see `elapsed_steps`), ``drift`` (member, window), its root mean square ``rms``
+    over the members; ``end``, the last rms, and the ``exponent`` of its growth, fitted from as many steps on as the
+    first window has, with ``exponent_interval``; each of these again as ``plain_drift``, ... with plain sums. ``p_phi``
+    and ``p_psi`` are the largest relative changes with compensated sums. ``gain`` is the plain over the compensated rms
+    of the members that ran with both, over the last decade of steps, because at one moment a walk may be anywhere.
     """
     columns: dict[str, Any] = {}
     for prefix, compensated, many in (("", True, count), ("plain_", False, min(PLAIN_MEMBERS, count))):
         runs = [
-            long_run(
-                member,
-                method,
-                steps=steps,
-                step_size=member.nutation_period / per_nutation,
-                compensated=compensated,
-                quiet=True,
-            )
+            long_run(member, method, steps=steps, step_size=member.nutation_period / per_nutation,
+                     compensated=compensated, quiet=True)
             for member in members(scene, many)
-        ]
+        ]  # fmt: skip
         ends = runs[0]["steps"].values
-        drifts = np.stack([run["modified_energy_mean"].values for run in runs])
-        grown = ensemble_growth(elapsed_steps(ends), drifts, ends[0])
-        columns["elapsed"] = elapsed_steps(ends)
-        columns |= {f"{prefix}drift": drifts, f"{prefix}rms": grown.rms, f"{prefix}end": float(grown.rms[-1])}
-        columns |= {f"{prefix}exponent": grown.fit.slope, f"{prefix}exponent_interval": grown.fit.interval}
-        if compensated:
-            for momentum in ("p_phi", "p_psi"):
-                changes = [np.abs(run[f"{momentum}_{part}"].values) for run in runs for part in ("least", "largest")]
-                columns[momentum] = float(np.max(changes))
-    late = columns["elapsed"] > 0.1 * columns["elapsed"][-1]
-    squares = [np.mean(columns[name][:PLAIN_MEMBERS, late] ** 2) for name in ("plain_drift", "drift")]
-    columns["gain"] = float(np.sqrt(squares[0] / squares[1]))
-    made = Rounding(**columns)._asdict()
-    return xr.Dataset({name: (ROUNDING_DIMS.get(name, ()), values) for name, values in made.items()})
+        elapsed, drifts = elapsed_steps(ends), np.stack([run["modified_energy_mean"].values for run in runs])
+        grown = ensemble_growth(elapsed, drifts, ends[0])
+        columns["elapsed"] = ("window", elapsed)
+        columns[f"{prefix}drift"] = ((f"{prefix}member", "window"), drifts)
+        columns[f"{prefix}rms"] = ("window", grown.rms)
+        columns[f"{prefix}end"] = float(grown.rms[-1])
+        columns[f"{prefix}exponent"], columns[f"{prefix}exponent_interval"] = grown.fit.slope, grown.fit.interval
+        for momentum in ("p_phi", "p_psi") if compensated else ():
+            changes = [np.abs(run[f"{momentum}_{part}"].values) for run in runs for part in ("least", "largest")]
+            columns[momentum] = float(np.max(changes))
+    late = elapsed > 0.1 * elapsed[-1]
+    plain, best = (np.mean(columns[name][1][:PLAIN_MEMBERS, late] ** 2) for name in ("plain_drift", "drift"))
+    return xr.Dataset({**columns, "gain": float(np.sqrt(plain / best))})

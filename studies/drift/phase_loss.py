@@ -6,7 +6,6 @@ predicts when the phase error reaches `LOST` (see `growth.horizon`), and a run a
 """
 
 import math
-from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -26,20 +25,6 @@ TRIAL = 40.0  # nutations
 FEWEST, MOST = 4.37, 8000.37  # steps a nutation
 FIRST = {2: 1500.37, 4: 80.37, 6: 25.37}  # steps a nutation that are tried first, by order
 SAMPLES = 2001
-
-
-class PhaseLoss(NamedTuple):
-    """Columns of the group ``horizons``; those with a default are absent if nothing could be predicted."""
-
-    steps: float  # a nutation
-    predicted: float  # nutations until the phase error reaches `LOST`
-    short: float  # nutations of the run that predicts
-    measured: float = math.nan  # nutations until the phase error reached `LOST`
-    ratio: float = math.nan  # predicted over measured
-    nutations: np.ndarray = np.array([])  # (sample,), of the run that measures
-    phase: np.ndarray = np.array([])  # (sample,), rad, its phase error
-    exponent: float = math.nan  # of the growth of the phase error in the last decade of that run
-    exponent_interval: float = math.nan  # half-width, 95 %
 
 
 def phase_run(scene: Scene, method: Integrator, clock: Clock, per_nutation: float, nutations: float) -> xr.Dataset:
@@ -71,7 +56,10 @@ def steps_for(scene: Scene, method: Integrator, clock: Clock, target: float) -> 
 def phase_loss(scene: Scene, method: Integrator, short: float = SHORT, target: float = TARGET) -> xr.Dataset:
     """When the phase error of a fixed-step method reaches `LOST`: predicted from `short` nutations, and measured.
 
-    Returns a dataset with the columns of `PhaseLoss`.
+    ``steps`` a nutation; in nutations, ``predicted``, the length ``short`` of the run that predicts, and ``measured``;
+    ``ratio``, predicted over measured. Dimension ``sample``: ``nutations`` and ``phase`` (rad) of the run that
+    measures; ``exponent`` of the growth of its phase error in the last decade, with ``exponent_interval`` (half-width,
+    95 %). If nothing can be predicted there are the first three alone.
     """
     clock, period = Clock(scene), scene.nutation_period
     steps = steps_for(scene, method, clock, target)
@@ -86,8 +74,10 @@ def phase_loss(scene: Scene, method: Integrator, short: float = SHORT, target: f
     long = phase_run(scene, method, clock, steps, min(1.1 * predicted, MOST_STEPS / steps))
     fit = growth(long["time"], long["phase"], 1.0)
     measured = lost_at(long["time"], long["phase"], LOST) / period
-    nutations, phase = long["time"].values / period, long["phase"].values
-    made: dict[str, Any] = PhaseLoss(
-        steps, predicted, short, measured, predicted / measured, nutations, phase, fit.slope, fit.interval
-    )._asdict()
-    return xr.Dataset({name: ("sample" if np.ndim(values) else (), values) for name, values in made.items()})
+    return xr.Dataset(
+        {
+            "steps": steps, "predicted": predicted, "short": short, "measured": measured, "ratio": predicted / measured,
+            "nutations": ("sample", long["time"].values / period), "phase": ("sample", long["phase"].values),
+            "exponent": fit.slope, "exponent_interval": fit.interval,
+        }
+    )  # fmt: skip

@@ -1,77 +1,35 @@
-"""What the study reads out of its dataset: columns of the histories, behaviour of the constants, lengths of the runs.
+"""What the study reads out of its dataset: behaviour of the constants, lengths of the runs, predicted losses of phase.
 
-The dataset is a tree of four groups, each over ``scene`` and ``integrator``:
+The dataset is a tree of four groups, each over ``scene`` and ``integrator``; these say what their variables are:
 
-    histories   a million steps of every method          `symtop.measure.conservation.history`, read as `Quantity`
-    windows     10^8 steps of four methods               `long_runs.windows`, read as `Band`
-    rounding    ensembles of runs of the same four       `long_runs.rounding`, read as `Rounding`
-    horizons    loss of phase of the fixed-step methods  `phase_loss.phase_loss`, read as `PhaseLoss`
+    histories   a million steps of every method          `symtop.measure.conservation.history`
+    windows     10^8 steps of four methods               `symtop.run.long_run.long_run`
+    rounding    ensembles of runs of the same four       `long_runs.rounding`
+    horizons    loss of phase of the fixed-step methods  `phase_loss.phase_loss`
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from symtop.base.datasets import row
-from symtop.measure.conservation import Trend
 from symtop.measure.growth import behaviour
-
-from .long_runs import Rounding
-from .phase_loss import PhaseLoss
 
 HISTORIES, WINDOWS, ROUNDINGS, HORIZONS = "histories", "windows", "rounding", "horizons"  # groups
 ROUNDED = 3e-13  # relative: the largest change that a million steps of rounding explain
 FAILED = "failed"
 BEHAVIOURS = ("kept", "bounded", "random walk", "growing", "drift")  # each is worse than those before it
 FULL_LENGTH = 0.99  # of the longest run of a scene: a shorter run is named
-CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
 
 
-class Growth(NamedTuple):
-    """Columns of a history that energy, p_phi, p_psi and phase have, each under its name: ``energy_largest``, ..."""
-
-    largest: float  # relative; rad for the phase
-    exponent: float  # of the growth with time
-    exponent_interval: float  # half-width, 95 %
-    law: str  # that the exponent agrees with
-    change: float  # time at which another law gives way to it; NaN if none does
-    before: float  # exponents before and after
-    after: float
+def by_integrator(data: xr.Dataset) -> dict[str, xr.Dataset]:
+    """The parts of a group that ran on one scene."""
+    return {str(name): data.isel(scene=0).sel(integrator=name) for name in data["integrator"].values}
 
 
-class Quantity(NamedTuple):
-    """What became of one quantity in one run."""
-
-    growth: Growth
-    trend: Trend  # all NaN for the phase
-    length: float  # of the run, time
-
-    @property
-    def doubt(self) -> float:
-        """Half-width of the 95 % interval of the linear trend over the whole run."""
-        return self.trend.interval * self.length
-
-
-class Band(NamedTuple):
-    """Relative change of one quantity in each window (window,) of a long run."""
-
-    least: np.ndarray
-    mean: np.ndarray
-    largest: np.ndarray
-
-
-def cells(data: xr.Dataset) -> list[tuple[str, str, xr.Dataset]]:
-    """(scene, integrator, its part of the dataset) of every cell."""
-    names = [(str(scene), str(name)) for scene in data["scene"].values for name in data["integrator"].values]
-    return [(scene, name, data.sel(scene=scene, integrator=name)) for scene, name in names]
-
-
-def quantity(cell: xr.Dataset, name: str) -> Quantity:
-    """What became of energy, p_phi, p_psi or phase in one run of the histories."""
-    trend = row(Trend, cell, f"{name}_") if f"{name}_slope" in cell else Trend(math.nan, math.nan, math.nan)
-    return Quantity(row(Growth, cell, f"{name}_"), trend, float(np.nanmax(cell["sample_time"])))
+def losses(horizons: xr.Dataset) -> dict[str, xr.Dataset]:
+    """The losses of phase by integrator, without those that could not be predicted."""
+    return {name: cell for name, cell in by_integrator(horizons).items() if math.isfinite(cell["predicted"])}
 
 
 def worst_behaviour(histories: xr.Dataset, name: str) -> str:
@@ -90,11 +48,6 @@ def shortened(histories: xr.Dataset) -> dict[str, float]:
     return {name: share for name, share in values.items() if share < FULL_LENGTH}
 
 
-def band(cell: xr.Dataset, name: str) -> Band:
-    """Relative change of energy, modified_energy, p_phi or p_psi in the windows of one long run."""
-    return row(Band, cell, f"{name}_")
-
-
 def moved(windows: xr.Dataset) -> tuple[float, float]:
     """How far the mean of a window moved from the first to the last, at most over the integrators.
 
@@ -107,31 +60,3 @@ def moved(windows: xr.Dataset) -> tuple[float, float]:
     )
     width = (full["energy_largest"] - full["energy_least"]).isel(window=0)
     return float((energy / width).max()), float(modified.max())
-
-
-def roundings(data: xr.Dataset) -> dict[str, Rounding]:
-    """The ensembles of the group ``rounding``, by integrator."""
-    return {name: row(Rounding, cell) for _, name, cell in cells(data)}
-
-
-def phase_losses(data: xr.Dataset) -> dict[str, PhaseLoss]:
-    """The losses of phase of the group ``horizons``, by integrator; without those that could not be predicted."""
-    losses = {name: row(PhaseLoss, cell) for _, name, cell in cells(data)}
-    return {name: loss for name, loss in losses.items() if math.isfinite(loss.predicted)}
-
-
-class Missed(NamedTuple):
-    """How well the losses of phase were predicted."""
-
-    hits: dict[str, float]  # relative errors of the predictions that are off by `CLOSE` at most
-    misses: dict[str, float]  # of the others; NaN where the loss was not reached
-    median: float  # of the measured times, in lengths of the run that predicts
-
-
-def predictions(losses: dict[str, PhaseLoss]) -> Missed:
-    """Who was predicted to `CLOSE` when it loses its phase, and who was not."""
-    off = {name: abs(loss.ratio - 1.0) for name, loss in losses.items()}
-    hits = {name: error for name, error in off.items() if error <= CLOSE}
-    times = [loss.measured / loss.short for loss in losses.values() if math.isfinite(loss.measured)]
-    misses = {name: error for name, error in off.items() if name not in hits}
-    return Missed(hits, misses, float(np.median(times)) if times else math.nan)

@@ -1,250 +1,189 @@
 """Captions, tables and sentences of the study."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
+from itertools import product
 
 import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS
-from symtop.run.long_run import PER_NUTATION
 from symtop.runner.study import Table
 
-from .long_runs import Rounding
-from .phase_loss import LOST, SHORT, TARGET, PhaseLoss
+from .phase_loss import LOST, SHORT, TARGET
 from .tables import (
-    CLOSE,
     FAILED,
     HISTORIES,
     HORIZONS,
     ROUNDED,
     ROUNDINGS,
     WINDOWS,
-    Quantity,
-    band,
-    cells,
+    by_integrator,
+    losses,
     moved,
-    phase_losses,
-    predictions,
-    quantity,
-    roundings,
     shortened,
     worst_behaviour,
 )
 
 QUOTED = ("stormer-verlet", "rk4", "rk45-compiled")  # whose exponents the caption quotes
-
-
-def number(value: float) -> str:
-    """Three figures; empty for no number."""
-    return f"{value:.2e}" if np.isfinite(value) else ""
-
-
-def law(of: Quantity, *, above_rounding: bool) -> str:
-    """The growth exponent with its interval, the law it agrees with, and where another one gave way to it.
-
-    A change of law is told only above rounding: a single walk of rounding bends anywhere.
-    """
-    growth = of.growth
-    if not np.isfinite(growth.exponent):
-        return ""
-    changes = np.isfinite(growth.change) and above_rounding
-    change = f"; t^{growth.before:.2f} to t^{growth.after:.2f} at t = {growth.change:.3g}" if changes else ""
-    return f"{growth.exponent:.2f} +- {growth.exponent_interval:.2f}, {growth.law}{change}"
-
-
-# ---- tables: a header and the text of its cell for each column -------------------------------------------------------
-
-RESIDUAL_COLUMNS: dict[str, Callable[[Quantity], str]] = {
-    "largest {} residual": lambda of: number(of.growth.largest),
-    "trend of {} over the run": lambda of: f"{number(of.trend.rise)} +- {number(of.doubt)}",
-    "exponent, law of {}": lambda of: law(of, above_rounding=of.growth.largest > ROUNDED),
+CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
+ROUNDING_COLUMNS = {  # header: variable
+    "exponent": "exponent",
+    "+- (95 %)": "exponent_interval",
+    "drift at the end": "end",
+    "exponent, plain sums": "plain_exponent",
+    "drift at the end, plain sums": "plain_end",
+    "plain / compensated drift, same starts": "gain",
+    "largest change of p_phi": "p_phi",
+    "largest change of p_psi": "p_psi",
 }
-ROUNDING_COLUMNS: dict[str, Callable[[Rounding], float]] = {
-    "exponent": lambda of: of.exponent,
-    "+- (95 %)": lambda of: of.exponent_interval,
-    "drift at the end": lambda of: of.end,
-    "exponent, plain sums": lambda of: of.plain_exponent,
-    "drift at the end, plain sums": lambda of: of.plain_end,
-    "plain / compensated drift, same starts": lambda of: of.gain,
-    "largest change of p_phi": lambda of: of.p_phi,
-    "largest change of p_psi": lambda of: of.p_psi,
-}
-HORIZON_COLUMNS: dict[str, Callable[[PhaseLoss], float]] = {
-    "steps a nutation": lambda of: of.steps,
-    "predicted": lambda of: of.predicted,
-    "measured": lambda of: of.measured,
-    "predicted / measured": lambda of: of.ratio,
-}
+HORIZON_COLUMNS = {
+    "steps a nutation": "steps", "predicted": "predicted", "measured": "measured", "predicted / measured": "ratio",
+}  # fmt: skip
+
+
+# ---- tables ----------------------------------------------------------------------------------------------------------
 
 
 def tables(data: xr.DataTree) -> list[Table]:
     """Largest residuals, trends and growth exponents; drift by rounding; losses of phase."""
-    made = {HISTORIES: _residual_table, ROUNDINGS: _rounding_table, HORIZONS: _horizon_table}
-    return [table(data[group].to_dataset()) for group, table in made.items() if group in data]
+    groups = {name: group.to_dataset() for name, group in data.children.items()}
+    made = [_residual_table(groups[HISTORIES])] if HISTORIES in groups else []
+    if ROUNDINGS in groups:
+        title = "Rounding: drift of the modified energy of an ensemble"
+        made.append(_number_table(title, by_integrator(groups[ROUNDINGS]), ROUNDING_COLUMNS, ".2g"))
+    if HORIZONS in groups:
+        title = f"Nutations until the phase error reaches {LOST:g} rad"
+        made.append(_number_table(title, losses(groups[HORIZONS]), HORIZON_COLUMNS, ".6g"))
+    return made
 
 
-def _residual_table(data: xr.Dataset) -> Table:
-    columns = [(name, header, text) for name in CONSTANTS for header, text in RESIDUAL_COLUMNS.items()]
-    rows = []
-    for scene, name, cell in cells(data):
-        moves = quantity(cell, "energy").growth.largest > ROUNDED  # the energy's drift is what bends the phase
-        rows.append([
-            scene,
-            name,
-            str(cell["outcome"].item()),
-            *(text(quantity(cell, constant)) for constant, _, text in columns),
-            law(quantity(cell, "phase"), above_rounding=moves),
-        ])  # fmt: skip
-    headers = [header.format(name) for name, header, _ in columns]
-    return Table(
-        "Relative residuals, linear trends with 95 % intervals, growth ~ t^exponent, its law and where it changes",
-        ["scene", "integrator", "outcome", *headers, "exponent, law of phase"],
-        rows,
-    )
+def _residual_table(histories: xr.Dataset) -> Table:
+    header, rows = ["scene", "integrator", "outcome"], []
+    for name in CONSTANTS:
+        header += [f"largest {name} residual", f"trend of {name} over the run", f"exponent, law of {name}"]
+    for scene, integrator in product(histories["scene"].values, histories["integrator"].values):
+        cell = histories.sel(scene=scene, integrator=integrator)
+        row = [str(scene), str(integrator), str(cell["outcome"].item())]
+        for name in CONSTANTS:
+            doubt = cell[f"{name}_interval"] * cell["sample_time"].max()  # 95 %, of the rise over the whole run
+            trend = f"{_number(cell[f'{name}_rise'])} +- {_number(doubt)}"
+            row += [_number(cell[f"{name}_largest"]), trend, law(cell, name)]
+        rows.append([*row, law(cell, "phase")])
+    title = "Relative residuals, linear trends with 95 % intervals, growth ~ t^exponent, its law and where it changes"
+    return Table(title, [*header, "exponent, law of phase"], rows)
 
 
-def _rounding_table(data: xr.Dataset) -> Table:
-    rows = [[name, *(f"{of(one):.2g}" for of in ROUNDING_COLUMNS.values())] for name, one in roundings(data).items()]
-    return Table("Rounding: drift of the modified energy of an ensemble", ["integrator", *ROUNDING_COLUMNS], rows)
+def _number_table(title: str, runs: Mapping[str, xr.Dataset], columns: Mapping[str, str], form: str) -> Table:
+    rows = [[name, *(format(cell[column], form) for column in columns.values())] for name, cell in runs.items()]
+    return Table(title, ["integrator", *columns], rows)
 
 
-def _horizon_table(data: xr.Dataset) -> Table:
-    rows = [[name, *(f"{of(one):.6g}" for of in HORIZON_COLUMNS.values())] for name, one in phase_losses(data).items()]
-    return Table(f"Nutations until the phase error reaches {LOST:g} rad", ["integrator", *HORIZON_COLUMNS], rows)
+def _number(value: xr.DataArray) -> str:
+    return f"{value:.2e}" if np.isfinite(value) else ""
 
 
-# ---- captions --------------------------------------------------------------------------------------------------------
+def _exponent(cell: xr.Dataset, name: str) -> str:
+    return f"{cell[f'{name}_exponent']:.2f} +- {cell[f'{name}_exponent_interval']:.2f}"
 
 
-def residuals(data: xr.Dataset) -> str:
-    """Caption of the residuals of some integrators over time."""
-    behaviours = {str(name): worst_behaviour(data.sel(integrator=name), "energy") for name in data["integrator"].values}
-    holding = [name for name, word in behaviours.items() if word in ("kept", "bounded")]
-    return (
-        "Relative change of energy and of both momenta since the start: samples as dots, the largest of each time "
-        "window as a line with markers, at 1e-17 if smaller; the dashed line rises as t. On every scene the energy "
-        "error is at rounding or bounded (growth exponent nearest to 0, 95 % interval below 1/2) for "
-        f"{', '.join(holding) or 'none'}. The momenta are recomputed from the increments of the trajectory. "
-        f"{_shortened_words(data)}"
-    ).rstrip()
+def law(cell: xr.Dataset, name: str) -> str:
+    """The growth exponent with its interval, the law it agrees with, and where another one gave way to it.
+
+    A change of law is told only above rounding: a single walk of rounding bends anywhere. A drift of the energy is what
+    bends the phase.
+    """
+    if not np.isfinite(cell[f"{name}_exponent"]):
+        return ""
+    above_rounding = cell[f"{'energy' if name == 'phase' else name}_largest"] > ROUNDED
+    time, before, after = (cell[f"{name}_{part}"] for part in ("change", "before", "after"))
+    changes = np.isfinite(time) and above_rounding
+    change = f"; t^{before:.2f} to t^{after:.2f} at t = {time:.3g}" if changes else ""
+    return f"{_exponent(cell, name)}, {cell[f'{name}_law'].item()}{change}"
 
 
-def sizes(data: xr.Dataset) -> str:
-    """Caption of the largest residuals."""
-    return (
-        "Largest relative residual of every method over the whole run; an exact zero is drawn at 1e-17. A million "
-        f"steps of rounding explain changes up to {ROUNDED:.0e}: what a method conserves lies below. What it does not "
-        "conserve shows the truncation error of a step, or, farthest to the right, a drift. "
-        f"{_shortened_words(data)}"
-    ).rstrip()
+# ---- sentences of captions and of the verdict ------------------------------------------------------------------------
 
 
-def exponents(data: xr.Dataset) -> str:
-    """Caption of the growth exponents."""
-    first = data["scene"].values[0]
-    quoted = []
-    for name in QUOTED:
-        if name in data["integrator"].values:
-            cell = data.sel(integrator=name, scene=first)
-            growths = {of: quantity(cell, of).growth for of in ("energy", "phase")}
-            parts = [f"{of} {one.exponent:.2f} +- {one.exponent_interval:.2f}" for of, one in growths.items()]
-            quoted.append(f"{name}: {' and '.join(parts)}.")
-    return (
-        "Growth exponents of the largest residual of energy and momenta, over the last two decades of time, and of the "
-        "phase error of the nutation, over the last one, with 95 % intervals. 0 is a bounded error, 1/2 the random "
-        "walk of rounding, 1 a steady drift, 2 the phase error under a drifting energy. "
-        f"{f'On {first}, ' + ' '.join(quoted) if quoted else ''} {_shortened_words(data)}"
-    ).rstrip()
+def holding(histories: xr.Dataset) -> str:
+    """Integrators whose energy error is at rounding or bounded on every scene."""
+    names = [str(name) for name in histories["integrator"].values]
+    behaviours = {name: worst_behaviour(histories.sel(integrator=name), "energy") for name in names}
+    return ", ".join(name for name, word in behaviours.items() if word in ("kept", "bounded")) or "none"
 
 
-def windows(data: xr.Dataset) -> str:
-    """Caption of the windows of the long runs."""
-    runs = cells(data)
-    changes = [band(cell, name) for _, _, cell in runs for name in ("p_phi", "p_psi")]
-    worst = max(float(np.nanmax(np.abs([one.least, one.largest]))) for one in changes)
-    energy, modified = moved(data)
-    return (
-        f"{float(data['steps'].max()):.0e} steps on {', '.join(dict.fromkeys(scene for scene, _, _ in runs))}, "
-        f"{PER_NUTATION:.0f} a nutation: the band reaches from the least to the largest relative change in each "
-        "window, the line is its mean. The modified energy is the energy with the h^2 term of the discrete motion, "
-        "less the oscillation of order h^4 that remains. From the first window to the last the mean energy moves by at "
-        f"most {energy:.0e} of the width of its band, and the mean modified energy by at most {modified:.0e} of the "
-        f"energy's scale. The momenta, recomputed inside the step, stay within {worst:.0e}."
-    )
+def quoted(histories: xr.Dataset) -> str:
+    """The exponents of a few integrators on the first scene."""
+    runs = by_integrator(histories)
+    parts = [f"{name}: energy {_exponent(runs[name], 'energy')} and phase {_exponent(runs[name], 'phase')}."
+             for name in QUOTED if name in runs]  # fmt: skip
+    return " ".join([f"On {histories['scene'].values[0]},", *parts]) if parts else ""
 
 
-def rounding(data: xr.Dataset) -> str:
-    """Caption of the drift by rounding."""
-    return (
-        "Drift of the modified energy by rounding: each start as a thin line, their root mean square with markers, and "
-        "dashed that of the same kernels with plain sums. "
-        f"{' '.join(walk_words(name, ensemble) for name, ensemble in roundings(data).items())}"
-    )
-
-
-def horizons(data: xr.Dataset) -> str:
-    """Caption of the losses of phase."""
-    return (
-        "Phase error of the nutation of every fixed-step method, each with a step of its own. The time at which it "
-        f"reaches {LOST:g} rad (line) is predicted from the grey part and then measured. "
-        f"{prediction_words(phase_losses(data))}"
-    )
-
-
-# ---- sentences -------------------------------------------------------------------------------------------------------
-
-
-def walk_words(name: str, ensemble: Rounding) -> str:
-    """How the drift by rounding of one method grows, and what compensated sums gain."""
-    slope, doubt = ensemble.exponent, ensemble.exponent_interval
-    walk = "agrees" if abs(slope - 0.5) <= doubt else "does not agree"
-    return (
-        f"{name} drifts as n^{slope:.2f} +- {doubt:.2f} ({walk} with the 1/2 of a random walk), to {ensemble.end:.1e}, "
-        f"{ensemble.gain:.0f} times less than with plain sums."
-    )
-
-
-def prediction_words(losses: dict[str, PhaseLoss]) -> str:
-    """Who was predicted when it loses its phase, and who was not."""
-    seen = predictions(losses)
-    sentence = (
-        f"The steps are chosen so that it comes at about {TARGET / SHORT:g} times the run that predicts it (median "
-        f"{seen.median:.2g})."
-    )
-    if seen.hits:
-        worst = 100.0 * max(seen.hits.values())
-        sentence += f" The prediction is right to {worst:.2g} % for {len(seen.hits)} of {len(losses)} methods."
-    words = {name: f"{off:.0%} off" if math.isfinite(off) else "not reached" for name, off in seen.misses.items()}
-    missed = ", ".join(f"{name} ({word})" for name, word in words.items())
-    return sentence + (f" Off by more than {CLOSE:.0%}: {missed}." if missed else "")
-
-
-def _shortened_words(data: xr.Dataset) -> str:
-    shares = sorted(shortened(data).items(), key=lambda item: -item[1])
+def shortened_words(histories: xr.Dataset) -> str:
+    """Which integrators ran over a part of the horizon; empty if none did."""
+    shares = sorted(shortened(histories).items(), key=lambda item: -item[1])
     listed = ", ".join(f"{name} {100.0 * share:.2g} %" for name, share in shares)
     return f"To save time, some ran over a part of the horizon only and are judged on it: {listed}." if listed else ""
 
+
+def moved_words(data: xr.Dataset) -> str:
+    """How far the energies moved in the long runs."""
+    energy, modified = moved(data)
+    return (
+        f"the mean energy moves by at most {energy:.0e} of the width of its oscillation, and the mean modified energy "
+        f"by at most {modified:.0e} of the energy's scale."
+    )
+
+
+def walk_words(name: str, cell: xr.Dataset) -> str:
+    """How the drift by rounding of one method grows, and what compensated sums gain."""
+    agrees = abs(cell["exponent"] - 0.5) <= cell["exponent_interval"]
+    return (
+        f"{name} drifts as n^{cell['exponent']:.2f} +- {cell['exponent_interval']:.2f} "
+        f"({'agrees' if agrees else 'does not agree'} with the 1/2 of a random walk), to {cell['end']:.1e}, "
+        f"{cell['gain']:.0f} times less than with plain sums."
+    )
+
+
+def prediction_words(runs: Mapping[str, xr.Dataset]) -> str:
+    """Which losses of phase were predicted, and which were not."""
+    off = {name: abs(float(cell["ratio"]) - 1.0) for name, cell in runs.items()}  # NaN: not reached
+    times = [float(cell["measured"] / cell["short"]) for cell in runs.values()]
+    median = float(np.median([time for time in times if math.isfinite(time)] or [math.nan]))
+    times_short = f"{TARGET / SHORT:g} times the run that predicts it (median {median:.2g})."
+    sentences = [f"The steps are chosen so that it comes at about {times_short}"]
+    hits = [error for error in off.values() if error <= CLOSE]
+    if hits:
+        sentences.append(f"The prediction is right to {100.0 * max(hits):.2g} % for {len(hits)} of {len(off)} methods.")
+    missed = [f"{name} ({f'{error:.0%} off' if math.isfinite(error) else 'not reached'})"
+              for name, error in off.items() if not error <= CLOSE]  # fmt: skip
+    if missed:
+        sentences.append(f"Off by more than {CLOSE:.0%}: {', '.join(missed)}.")
+    return " ".join(sentences)
+
+
+# ---- verdict ---------------------------------------------------------------------------------------------------------
 
 LOSING = {"drift": "drifts", "growing": "grows by no single law", "random walk": "walks randomly"}
 
 
 def verdict(data: xr.DataTree) -> list[str]:
     """Which methods conserve what, and at what rate the others lose it."""
+    groups = {name: group.to_dataset() for name, group in data.children.items()}
     sentences: list[str] = []
-    if HISTORIES in data:
-        histories = data[HISTORIES].to_dataset()
-        for name in CONSTANTS:
-            sentences += _constant_sentences(histories, name)
-    if WINDOWS in data:
-        sentences.append(_window_sentence(data[WINDOWS].to_dataset()))
-    if ROUNDINGS in data:
-        walks = roundings(data[ROUNDINGS].to_dataset())
-        sentences += [f"Rounding: {walk_words(name, ensemble)}" for name, ensemble in walks.items()]
-    if HORIZONS in data:
-        losses = phase_losses(data[HORIZONS].to_dataset())
-        sentences.append(f"Time until the phase error reaches {LOST:g} rad: {prediction_words(losses)}")
-    part = _shortened_words(data[HISTORIES].to_dataset()) if HISTORIES in data else ""
+    if HISTORIES in groups:
+        sentences += [sentence for name in CONSTANTS for sentence in _constant_sentences(groups[HISTORIES], name)]
+    if WINDOWS in groups:
+        steps, names = float(groups[WINDOWS]["steps"].max()), groups[WINDOWS]["integrator"].values
+        sentences.append(f"Over {steps:.0e} steps of {', '.join(names)} {moved_words(groups[WINDOWS])}")
+    if ROUNDINGS in groups:
+        walks = by_integrator(groups[ROUNDINGS])
+        sentences += [f"Rounding: {walk_words(name, cell)}" for name, cell in walks.items()]
+    if HORIZONS in groups:
+        predicted = prediction_words(losses(groups[HORIZONS]))
+        sentences.append(f"Time until the phase error reaches {LOST:g} rad: {predicted}")
+    part = shortened_words(groups[HISTORIES]) if HISTORIES in groups else ""
     return [*sentences, part] if part else sentences
 
 
@@ -268,12 +207,3 @@ def _constant_sentences(histories: xr.Dataset, name: str) -> list[str]:
     if failed := groups.get(FAILED):
         sentences.append(f"Runs of {', '.join(one for _, one, _ in failed)} ended early.")
     return sentences
-
-
-def _window_sentence(data: xr.Dataset) -> str:
-    energy, modified = moved(data)
-    return (
-        f"Over {float(data['steps'].max()):.0e} steps of {', '.join(data['integrator'].values)} the mean energy moves "
-        f"by at most {energy:.0e} of the width of its oscillation, and the mean modified energy by at most "
-        f"{modified:.0e} of the energy's scale."
-    )
