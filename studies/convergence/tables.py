@@ -33,7 +33,7 @@ def by_order(data: xr.Dataset) -> dict[int, list[str]]:
 
 
 def fits(data: xr.Dataset, quantity: str, *, at_end: bool = False) -> Fits:
-    """The fitted order of every integrator on every scene, from the largest errors of the runs or those at their end."""
+    """The fitted order of every integrator on every scene, from the largest errors or those at the end."""
     fitted = {}
     for name, method in product(map(str, data["scene"].values), map(str, data["integrator"].values)):
         cell, omega = data.sel(scene=name, integrator=method), 2.0 * np.pi / scene(name).nutation_period

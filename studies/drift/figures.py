@@ -19,12 +19,9 @@ from .tables import HISTORIES, HORIZONS, ROUNDED, ROUNDINGS, WINDOWS, by_integra
 
 SHOWN = ("midpoint", "trapezoidal", "stormer-verlet", "strang", "gauss-4", "rk4", "rk45", "taylor")
 LABELS = {
-    "energy": "energy",
-    "modified_energy": "modified energy",
-    "p_phi": r"$p_\varphi$",
-    "p_psi": r"$p_\psi$",
+    "energy": "energy", "modified_energy": "modified energy", "p_phi": r"$p_\varphi$", "p_psi": r"$p_\psi$",
     "phase": "phase",
-}
+}  # fmt: skip
 BANDS = ("energy", "modified_energy", "p_phi", "p_psi")
 LAWS = (0.0, 0.5, 1.0, 2.0)  # exponents that are drawn as lines
 FACES = ("full", "none", "left", "right")  # of a marker, by scene
@@ -73,7 +70,7 @@ def _residuals(histories: xr.Dataset) -> Picture:
         "window as a line with markers, at 1e-17 if smaller; the dashed line rises as t. On every scene the energy "
         "error is at rounding or bounded (growth exponent nearest to 0, 95 % interval below 1/2) for "
         f"{words.holding(data)}. The momenta are recomputed from the increments of the trajectory. "
-        f"{words.shortened_words(data)}"
+        f"{words.shortened(data)}"
     )
     alt = "Log-log plots of residuals over time: level for the discrete methods, rising for adaptive Runge-Kutta."
     return Picture("residuals", figure, caption.rstrip(), alt)
@@ -109,7 +106,7 @@ def _sizes(histories: xr.Dataset) -> Picture:
         "Largest relative residual of every method over the whole run; an exact zero is drawn at 1e-17. A million "
         f"steps of rounding explain changes up to {ROUNDED:.0e}: what a method conserves lies below. What it does not "
         "conserve shows the truncation error of a step, or, farthest to the right, a drift. "
-        f"{words.shortened_words(histories)}"
+        f"{words.shortened(histories)}"
     )
     alt = "Dot plot of the largest residuals of energy and momenta for every integrator."
     return Picture("sizes", figure, caption.rstrip(), alt)
@@ -126,7 +123,7 @@ def _exponents(histories: xr.Dataset) -> Picture:
         "Growth exponents of the largest residual of energy and momenta, over the last two decades of time, and of the "
         "phase error of the nutation, over the last one, with 95 % intervals. 0 is a bounded error, 1/2 the random "
         "walk of rounding, 1 a steady drift, 2 the phase error under a drifting energy. "
-        f"{words.quoted(histories)} {words.shortened_words(histories)}"
+        f"{words.quoted(histories)} {words.shortened(histories)}"
     )
     alt = "Dot plots of the growth exponents of energy, momenta and phase for every integrator."
     return Picture("exponents", figure, caption.rstrip(), alt)
@@ -152,7 +149,7 @@ def _windows(data: xr.Dataset) -> Picture:
         f"{float(data['steps'].max()):.0e} steps on {data['scene'].values[0]}, {PER_NUTATION:.0f} a nutation: the band "
         "reaches from the least to the largest relative change in each window, the line is its mean. The modified "
         "energy is the energy with the h^2 term of the discrete motion, less the oscillation of order h^4 that "
-        f"remains. From the first window to the last {words.moved_words(data)} The momenta, recomputed inside the "
+        f"remains. From the first window to the last {words.moved(data)} The momenta, recomputed inside the "
         f"step, stay within {max(map(float, momenta)):.0e}."
     )
     alt = "Bands of energy, modified energy and momenta over the logarithm of the steps, a column for each method."
@@ -180,7 +177,7 @@ def _rounding(data: xr.Dataset) -> Picture:
     caption = (
         "Drift of the modified energy by rounding: each start as a thin line, their root mean square with markers, and "
         "dashed that of the same kernels with plain sums. "
-        f"{' '.join(words.walk_words(name, ensemble) for name, ensemble in ensembles.items())}"
+        f"{' '.join(words.walk(name, ensemble) for name, ensemble in ensembles.items())}"
     )
     alt = "Log-log plots of the drift by rounding against steps for each method, with compensated and plain sums."
     return Picture("rounding", figure, caption, alt)
@@ -209,7 +206,7 @@ def _horizons(data: xr.Dataset) -> Picture:
     legend_below(figure, axes)
     caption = (
         "Phase error of the nutation of every fixed-step method, each with a step of its own. The time at which it "
-        f"reaches {LOST:g} rad (line) is predicted from the grey part and then measured. {words.prediction_words(lost)}"
+        f"reaches {LOST:g} rad (line) is predicted from the grey part and then measured. {words.predictions(lost)}"
     )
     alt = (
         "Left, phase errors that rise to a tolerance, with the predicted and the measured time of reaching it; right, "

@@ -5,7 +5,6 @@ import math
 import xarray as xr
 
 from symtop.measure.conservation import history
-from symtop.measure.modified_energy import KNOWN
 from symtop.methods.registry import Integrator, integrator, integrators
 from symtop.model.scenes import Scene, scene
 from symtop.run.long_run import PER_NUTATION
@@ -47,26 +46,24 @@ def grid(steps: int, members: int, walk: int, longest: int, share: float) -> lis
     long_run = {"steps": longest, "per_nutation": PER_NUTATION}
     ensemble = {"steps": walk, "per_nutation": PER_NUTATION, "count": members}
     loss = {"short": share * SHORT, "target": share * TARGET}
-    slowest_first = sorted(KNOWN, key=lambda name: name != "midpoint")
-    scenes = [scene(name) for name in grid_scenes(LEFT_OUT, lambda one: math.isfinite(one.nutation_period))]
+    methods = integrators().values()
     return [
-        *(history_case(one, method, steps) for one in scenes for method in integrators().values()),
-        *(Case(LONG, name, settings, group=group) for name in slowest_first
+        *(Case(name, method.name, history_settings(scene(name), method, steps), group=HISTORIES)
+          for name in grid_scenes(LEFT_OUT, lambda one: math.isfinite(one.nutation_period)) for method in methods),
+        *(Case(LONG, method.name, settings, group=group) for method in methods if method.modified_energy
           for group, settings in ((WINDOWS, long_run), (ROUNDINGS, ensemble))),
-        *(Case(LONG, method.name, loss, group=HORIZONS) for method in integrators().values()
-          if method.knob == "step_size"),
+        *(Case(LONG, method.name, loss, group=HORIZONS) for method in methods if method.knob == "step_size"),
     ]  # fmt: skip
 
 
-def history_case(on: Scene, method: Integrator, steps: int) -> Case:
+def history_settings(on: Scene, method: Integrator, steps: int) -> dict[str, float]:
     """So many steps of a fixed-step method, or the same horizon at a tolerance."""
     horizon = steps * on.nutation_period / STEPS_A_NUTATION
     settings = {"samples": 4001 if steps > 100_000 else 601, "horizon": horizon * SHORTENED.get(method.name, 1.0)}
     if method.knob == "step_size":
-        settings["step_size"] = horizon / steps
-    elif method.knob == "tolerance" and method.default_tolerance is None:
-        settings["tolerance"] = TOLERANCES.get(method.name, 1e-6)
-    return Case(on.name, method.name, settings, group=HISTORIES)
+        return settings | {"step_size": horizon / steps}
+    chooses = method.knob == "tolerance" and method.default_tolerance is None
+    return settings | ({"tolerance": TOLERANCES.get(method.name, 1e-6)} if chooses else {})
 
 
 def measure(case: Case) -> xr.Dataset:

@@ -10,7 +10,6 @@ The dataset is a tree of four groups, each over ``scene`` and ``integrator``; th
 
 import math
 
-import numpy as np
 import xarray as xr
 
 from symtop.measure.growth import behaviour
@@ -19,7 +18,6 @@ HISTORIES, WINDOWS, ROUNDINGS, HORIZONS = "histories", "windows", "rounding", "h
 ROUNDED = 3e-13  # relative: the largest change that a million steps of rounding explain
 FAILED = "failed"
 BEHAVIOURS = ("kept", "bounded", "random walk", "growing", "drift")  # each is worse than those before it
-FULL_LENGTH = 0.99  # of the longest run of a scene: a shorter run is named
 
 
 def by_integrator(data: xr.Dataset) -> dict[str, xr.Dataset]:
@@ -38,25 +36,3 @@ def worst_behaviour(histories: xr.Dataset, name: str) -> str:
         return FAILED
     columns = (histories[f"{name}_{part}"].values for part in ("largest", "exponent", "exponent_interval"))
     return max((behaviour(*map(float, one), ROUNDED) for one in zip(*columns, strict=True)), key=BEHAVIOURS.index)
-
-
-def shortened(histories: xr.Dataset) -> dict[str, float]:
-    """Integrators whose runs are shorter than the others', with the share of the horizon that they were given."""
-    ends = histories["sample_time"].max("sample")
-    shares = (ends / ends.max("integrator")).min("scene")
-    values = {str(name): float(shares.sel(integrator=name)) for name in histories["integrator"].values}
-    return {name: share for name, share in values.items() if share < FULL_LENGTH}
-
-
-def moved(windows: xr.Dataset) -> tuple[float, float]:
-    """How far the mean of a window moved from the first to the last, at most over the integrators.
-
-    The energy in widths of its band in the first window, the modified energy relative to the energy's scale.
-    """
-    full = windows.dropna("window", how="all", subset=["energy_mean"])
-    energy, modified = (
-        np.abs(full[f"{name}_mean"].isel(window=-1) - full[f"{name}_mean"].isel(window=0))
-        for name in ("energy", "modified_energy")
-    )
-    width = (full["energy_largest"] - full["energy_least"]).isel(window=0)
-    return float((energy / width).max()), float(modified.max())

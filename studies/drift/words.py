@@ -11,21 +11,10 @@ from symtop.measure.conservation import CONSTANTS
 from symtop.runner.study import Table
 
 from .phase_loss import LOST, SHORT, TARGET
-from .tables import (
-    FAILED,
-    HISTORIES,
-    HORIZONS,
-    ROUNDED,
-    ROUNDINGS,
-    WINDOWS,
-    by_integrator,
-    losses,
-    moved,
-    shortened,
-    worst_behaviour,
-)
+from .tables import FAILED, HISTORIES, HORIZONS, ROUNDED, ROUNDINGS, WINDOWS, by_integrator, losses, worst_behaviour
 
 QUOTED = ("stormer-verlet", "rk4", "rk45-compiled")  # whose exponents the caption quotes
+FULL_LENGTH = 0.99  # of the longest run of a scene: a shorter run is named
 CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
 ROUNDING_COLUMNS = {  # header: variable
     "exponent": "exponent",
@@ -120,23 +109,28 @@ def quoted(histories: xr.Dataset) -> str:
     return " ".join([f"On {histories['scene'].values[0]},", *parts]) if parts else ""
 
 
-def shortened_words(histories: xr.Dataset) -> str:
-    """Which integrators ran over a part of the horizon; empty if none did."""
-    shares = sorted(shortened(histories).items(), key=lambda item: -item[1])
-    listed = ", ".join(f"{name} {100.0 * share:.2g} %" for name, share in shares)
+def shortened(histories: xr.Dataset) -> str:
+    """Which integrators ran over a part of the horizon only, with its share of the longest run; empty if none did."""
+    ends = histories["sample_time"].max("sample")
+    shares = (ends / ends.max("integrator")).min("scene").to_series()
+    shares = shares[shares < FULL_LENGTH].sort_values(ascending=False, kind="stable")
+    listed = ", ".join(f"{name} {100.0 * share:.2g} %" for name, share in shares.items())
     return f"To save time, some ran over a part of the horizon only and are judged on it: {listed}." if listed else ""
 
 
-def moved_words(data: xr.Dataset) -> str:
-    """How far the energies moved in the long runs."""
-    energy, modified = moved(data)
+def moved(windows: xr.Dataset) -> str:
+    """How far the means of the energies in a window move from the first to the last, at most over the integrators."""
+    full = windows.dropna("window", how="all", subset=["energy_mean"])
+    first, last = full.isel(window=0), full.isel(window=-1)
+    energy, modified = (np.abs(last[f"{name}_mean"] - first[f"{name}_mean"]) for name in ("energy", "modified_energy"))
+    share = energy / (first["energy_largest"] - first["energy_least"])
     return (
-        f"the mean energy moves by at most {energy:.0e} of the width of its oscillation, and the mean modified energy "
-        f"by at most {modified:.0e} of the energy's scale."
+        f"the mean energy moves by at most {float(share.max()):.0e} of the width of its oscillation, and the mean "
+        f"modified energy by at most {float(modified.max()):.0e} of the energy's scale."
     )
 
 
-def walk_words(name: str, cell: xr.Dataset) -> str:
+def walk(name: str, cell: xr.Dataset) -> str:
     """How the drift by rounding of one method grows, and what compensated sums gain."""
     agrees = abs(cell["exponent"] - 0.5) <= cell["exponent_interval"]
     return (
@@ -146,21 +140,20 @@ def walk_words(name: str, cell: xr.Dataset) -> str:
     )
 
 
-def prediction_words(runs: Mapping[str, xr.Dataset]) -> str:
+def predictions(runs: Mapping[str, xr.Dataset]) -> str:
     """Which losses of phase were predicted, and which were not."""
     off = {name: abs(float(cell["ratio"]) - 1.0) for name, cell in runs.items()}  # NaN: not reached
-    times = [float(cell["measured"] / cell["short"]) for cell in runs.values()]
-    median = float(np.median([time for time in times if math.isfinite(time)] or [math.nan]))
-    times_short = f"{TARGET / SHORT:g} times the run that predicts it (median {median:.2g})."
-    sentences = [f"The steps are chosen so that it comes at about {times_short}"]
-    hits = [error for error in off.values() if error <= CLOSE]
-    if hits:
-        sentences.append(f"The prediction is right to {100.0 * max(hits):.2g} % for {len(hits)} of {len(off)} methods.")
+    times = [float(cell["measured"] / cell["short"]) for name, cell in runs.items() if math.isfinite(off[name])]
+    hits = [100.0 * error for error in off.values() if error <= CLOSE]
     missed = [f"{name} ({f'{error:.0%} off' if math.isfinite(error) else 'not reached'})"
               for name, error in off.items() if not error <= CLOSE]  # fmt: skip
-    if missed:
-        sentences.append(f"Off by more than {CLOSE:.0%}: {', '.join(missed)}.")
-    return " ".join(sentences)
+    text = (
+        f"The steps are chosen so that it comes at about {TARGET / SHORT:g} times the run that predicts it (median "
+        f"{np.median(times or math.nan):.2g})."
+    )
+    if hits:
+        text += f" The prediction is right to {max(hits):.2g} % for {len(hits)} of {len(off)} methods."
+    return text + (f" Off by more than {CLOSE:.0%}: {', '.join(missed)}." if missed else "")
 
 
 # ---- verdict ---------------------------------------------------------------------------------------------------------
@@ -171,26 +164,24 @@ LOSING = {"drift": "drifts", "growing": "grows by no single law", "random walk":
 def verdict(data: xr.DataTree) -> list[str]:
     """Which methods conserve what, and at what rate the others lose it."""
     groups = {name: group.to_dataset() for name, group in data.children.items()}
-    sentences: list[str] = []
+    sentences, part = [], ""
     if HISTORIES in groups:
-        sentences += [sentence for name in CONSTANTS for sentence in _constant_sentences(groups[HISTORIES], name)]
+        sentences = [sentence for name in CONSTANTS for sentence in _constant_sentences(groups[HISTORIES], name)]
+        part = shortened(groups[HISTORIES])
     if WINDOWS in groups:
         steps, names = float(groups[WINDOWS]["steps"].max()), groups[WINDOWS]["integrator"].values
-        sentences.append(f"Over {steps:.0e} steps of {', '.join(names)} {moved_words(groups[WINDOWS])}")
+        sentences.append(f"Over {steps:.0e} steps of {', '.join(names)} {moved(groups[WINDOWS])}")
     if ROUNDINGS in groups:
-        walks = by_integrator(groups[ROUNDINGS])
-        sentences += [f"Rounding: {walk_words(name, cell)}" for name, cell in walks.items()]
+        sentences += [f"Rounding: {walk(name, cell)}" for name, cell in by_integrator(groups[ROUNDINGS]).items()]
     if HORIZONS in groups:
-        predicted = prediction_words(losses(groups[HORIZONS]))
+        predicted = predictions(losses(groups[HORIZONS]))
         sentences.append(f"Time until the phase error reaches {LOST:g} rad: {predicted}")
-    part = shortened_words(groups[HISTORIES]) if HISTORIES in groups else ""
     return [*sentences, part] if part else sentences
 
 
 def _constant_sentences(histories: xr.Dataset, name: str) -> list[str]:
     groups: dict[str, list[tuple[float, str, float]]] = {}  # (largest residual, integrator, exponent) by behaviour
-    for integrator in histories["integrator"].values:
-        cell = histories.sel(integrator=integrator)
+    for integrator, cell in ((name, histories.sel(integrator=name)) for name in histories["integrator"].values):
         worst, rate = (float(cell[f"{name}_{part}"].max()) for part in ("largest", "exponent"))
         groups.setdefault(worst_behaviour(cell, name), []).append((worst, str(integrator), rate))
     sentences = []

@@ -6,8 +6,7 @@ import xarray as xr
 from symtop.report import style
 from symtop.runner.study import Picture
 
-from .sources import SOURCES
-from .tables import Column, bound_ratios
+from .tables import BOUND, ERROR, SOURCES, bound_ratios
 
 COLORS = (style.ORANGE, style.VERMILLION, style.GREEN, style.BLUE, style.PURPLE, style.BLACK)
 LOOKS = dict(zip(SOURCES, zip(COLORS, "v<^>D*", strict=True), strict=True))
@@ -16,28 +15,20 @@ NEAREST = 1e-36  # rad: where an error of exactly zero is drawn
 
 def pictures(data: xr.Dataset) -> list[Picture]:
     """Error of each source against the horizon, and the bound it claims."""
-    names = [str(name) for name in data["scene"].values]
-    figure, axes = style.panels(-(-len(names) // 2), 2)
-    for axis, name in zip(axes.flat, names, strict=False):
-        for source in data["integrator"].values:
-            cell = data.sel(scene=name, integrator=source)
-            horizon, bound = cell["horizon"].values, cell[Column.BOUND].values
-            error = np.maximum(cell[Column.ERROR].values, NEAREST)
-            color, marker = LOOKS[str(source)]
-            measured = np.isfinite(error)
-            axis.plot(horizon[measured], error[measured], marker + "-", color=color, label=str(source))
-            claimed = measured & np.isfinite(bound)
-            axis.fill_between(horizon[claimed], error[claimed], bound[claimed], color=color, alpha=0.15, lw=0)
-        axis.set(xscale="log", yscale="log", title=name)
-    for axis in axes.flat[len(names) :]:
-        axis.set_visible(False)
-    for axis in axes[-1]:
-        axis.set_xlabel("horizon (s)")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("axis error (rad)")
+    figure, axes = style.grid(data.sizes["scene"], 2, ("horizon (s)", "axis error (rad)"))
+    for axis, scene in zip(axes, data["scene"].values, strict=True):
+        for source in map(str, data["integrator"].values):
+            cell, (color, marker) = (
+                data.sel(scene=scene, integrator=source).dropna("horizon", subset=[ERROR]),
+                LOOKS[source],
+            )
+            error = np.maximum(cell[ERROR].values, NEAREST)
+            axis.plot(cell["horizon"], error, marker + "-", color=color, label=source)
+            axis.fill_between(cell["horizon"], error, cell[BOUND], color=color, alpha=0.15, lw=0)
+        axis.set(xscale="log", yscale="log", title=scene)
     style.legend_below(figure, axes)
     _, broken, ratio = bound_ratios(data)
-    flat = float(data[Column.ERROR].sel(integrator="closed form").max())
+    flat = float(data[ERROR].sel(integrator="closed form").max())
     caption = (
         "True error of each source, measured against the closed form in 45 digits; the shade above it reaches up to "
         f"the bound that the reference claims. Errors above their bound: {broken}. The median bound is {ratio:.0f} "

@@ -1,55 +1,69 @@
-"""What is computed and stored of one source of truth on one scene, and the published values it is held against."""
+"""The sources of truth, what is measured and stored of each on one scene, and how close their bounds are."""
 
 import time
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from symtop.base.multiprecision import context
+from symtop.model import charts
 from symtop.model.precise_form import PreciseForm
-from symtop.model.scenes import Scene
-from symtop.run.reference import reference
+from symtop.model.scenes import Scene, closed_form
+from symtop.run.reference import integrate, reference
 
-from .sources import SOURCES, axes, distance, probe_times
-
+# name: precision, chart
+SOURCES = {
+    "double, axis": ("double", "axis"),
+    "double, attitude": ("double", "attitude"),
+    "long double, axis": ("longdouble", "axis"),
+    "long double, attitude": ("longdouble", "attitude"),
+    "quadruple, attitude": ("quad", "attitude"),
+    "closed form": ("closed-form", "attitude"),
+}
+PROBES = 7  # times within the last nutation before a horizon
 DIGITS = 45  # of the closed form that every source is compared with
 
-
-class Column:
-    """Variables of the dataset; dimension horizon (s). Sources are the values of the dimension integrator."""
-
-    ERROR = "axis"  # rad, largest distance of the axis from the closed form in 45 digits over the last nutation
-    BOUND = "axis_bound"  # rad, what the reference claims; NaN for a source without a bound of its own
-    SECONDS = "seconds"
+# Variables of the dataset; dimension horizon (s). Sources are the values of the dimension integrator.
+ERROR = "axis"  # rad, largest distance of the axis from the closed form in 45 digits over the last nutation
+BOUND = "axis_bound"  # rad, what the reference claims; NaN for a source without a bound of its own
+SECONDS = "seconds"
 
 
 def source_errors(scene: Scene, source: str, horizons: list[float]) -> xr.Dataset:
-    """Axis error, claimed bound and seconds of one source at each horizon (dimension ``horizon``).
-
-    The error is the distance to the closed form in 45 digits, the largest over the last nutation.
-    """
+    """`ERROR`, `BOUND` and `SECONDS` of one source at each horizon (dimension ``horizon``)."""
     precision, chart = SOURCES[source]
     precise = PreciseForm(scene.top, scene.start, digits=DIGITS)
-    rows = []
+    columns: dict[str, list[float]] = {ERROR: [], BOUND: [], SECONDS: []}
     for horizon in horizons:
-        times = probe_times(scene, horizon)
+        times = horizon - min(scene.nutation_period, 0.9 * horizon) * np.linspace(0.0, 0.93, PROBES)[::-1]
         start = time.perf_counter()
-        paths = axes(scene, times, precision, chart)
-        seconds = time.perf_counter() - start
-        worst = max(distance(axis, precise.axis(float(t))) for axis, t in zip(paths, times, strict=True))
-        bound = np.nan
-        if chart == "attitude":
-            bound = float(reference(scene, times, precision)["axis_error_bound"].values.max())
-        rows.append((worst, bound, seconds))
-    errors, bounds, costs = zip(*rows, strict=True)
-    data = xr.Dataset(coords={"horizon": horizons})
-    for name, values in ((Column.ERROR, errors), (Column.BOUND, bounds), (Column.SECONDS, costs)):
-        data[name] = ("horizon", list(values))
-    return data
+        path = axes(scene, times, precision, chart)
+        columns[SECONDS].append(time.perf_counter() - start)
+        distances = (distance(axis, precise.axis(float(t))) for axis, t in zip(path, times, strict=True))
+        columns[ERROR].append(max(distances))
+        claims = reference(scene, times, precision)["axis_error_bound"] if chart == "attitude" else np.array(np.nan)
+        columns[BOUND].append(float(claims.max()))
+    return xr.Dataset({name: ("horizon", values) for name, values in columns.items()}, coords={"horizon": horizons})
+
+
+def axes(scene: Scene, times: charts.Array, precision: str, chart: str) -> Any:
+    """The axis at the given times by one source, in its own arithmetic, shape (times, 3)."""
+    if precision == "closed-form":
+        return closed_form(scene).axis(times)
+    states, _ = integrate(scene, times, precision, chart)
+    return states[:, :3] if chart == "axis" else charts.axis_from_quaternion(states[:, :4])
+
+
+def distance(axis: Any, true: Any) -> float:
+    """Length of the difference of two axes, one in any arithmetic and one in 45 digits, computed in 50."""
+    mp = context(50)
+    return float(mp.norm([mp.mpf(str(a)) - b for a, b in zip(axis, true, strict=True)]))
 
 
 def bound_ratios(data: xr.Dataset) -> tuple[int, int, float]:
     """The number of claimed bounds, how many of them an error exceeds, and the median of bound over error."""
-    error, bound = data[Column.ERROR].values, data[Column.BOUND].values
+    error, bound = data[ERROR].values, data[BOUND].values
     both = np.isfinite(error) & np.isfinite(bound)
     ratios = bound[both] / np.maximum(error[both], 1e-40)
     return int(both.sum()), int(np.sum(error[both] > bound[both])), float(np.median(ratios))

@@ -1,18 +1,19 @@
 """Sentences and tables of the truth study, from its dataset and from the published values."""
 
+from itertools import product
+
 import numpy as np
 import xarray as xr
 
 from symtop.measure.published import OTHER_BODY, START, TRAJECTORY, Published, published_values
 from symtop.runner.study import Table
 
-from .tables import Column, bound_ratios
+from .tables import BOUND, ERROR, SECONDS, bound_ratios
 
-HOW_TO_READ = (
-    "Every error elsewhere in this report is measured against these sources. A line is the true error of a source, the "
-    "shade above it reaches up to the bound that the reference claims. A valid bound lies above the measured error; a "
-    "useful one lies close to it. Points of other figures within ten times of the bound are drawn hollow."
-)
+
+def verdict(data: xr.Dataset) -> list[str]:
+    """Whether bounds hold, what the published values show, and how the closed form is known."""
+    return [bounds(data), published(published_values()), *closed_form(data)]
 
 
 def bounds(data: xr.Dataset) -> str:
@@ -24,24 +25,17 @@ def bounds(data: xr.Dataset) -> str:
     )
 
 
-def _agreeing(values: list[Published]) -> str:
-    return f"{sum(entry.reproduced for entry in values)} of {len(values)}"
-
-
-def published(values: list[Published] | None = None) -> str:
+def published(values: list[Published]) -> str:
     """How many published values are reproduced, and what they test."""
-    values = published_values() if values is None else values
-    printed = [entry for entry in values if entry.kind == "printed"]
-    others = [entry for entry in values if entry.kind != "printed"]
-    trajectory, start, other = (
-        [entry for entry in printed if entry.tests == subject] for subject in (TRAJECTORY, START, OTHER_BODY)
-    )
-    sources = ", ".join(dict.fromkeys(entry.source for entry in trajectory))
+    printed, others = ([entry for entry in values if (entry.kind == "printed") is wanted] for wanted in (True, False))
+    right, agreeing = (f"{sum(entry.reproduced for entry in part)} of {len(part)}" for part in (printed, others))
+    tests = [entry.tests for entry in printed]
+    sources = ", ".join(dict.fromkeys(entry.source for entry in printed if entry.tests == TRAJECTORY))
     return (
-        f"{_agreeing(printed)} printed values are reproduced to the last digit. Only {len(trajectory)} of them test a "
-        f"trajectory of the top ({sources or 'none'}); {len(start)} tests the energy of a start, and {len(other)} "
-        "belong to an asymmetric free body, which SciPy integrates here, not symtop. Of the values that follow from a "
-        f"formula, or from the numbers that a source was built from, {_agreeing(others)} agree."
+        f"{right} printed values are reproduced to the last digit. Only {tests.count(TRAJECTORY)} of them test a "
+        f"trajectory of the top ({sources or 'none'}); {tests.count(START)} tests the energy of a start, and "
+        f"{tests.count(OTHER_BODY)} belong to an asymmetric free body, which SciPy integrates here, not symtop. Of the "
+        f"values that follow from a formula, or from the numbers that a source was built from, {agreeing} agree."
     )
 
 
@@ -49,14 +43,14 @@ def closed_form(data: xr.Dataset) -> list[str]:
     """The error of the closed form on the first scene and why it is known; nothing without that scene and heyoka."""
     if "spheroid" not in data["scene"].values or "quadruple, attitude" not in data["integrator"].values:
         return []
-    closed = data.sel(scene="spheroid", integrator="closed form")
-    horizon = closed["horizon"].values[np.isfinite(closed[Column.ERROR].values)].max()
-    quadruple = data[Column.ERROR].sel(scene="spheroid", integrator="quadruple, attitude")
+    errors = data[ERROR].sel(scene="spheroid")
+    last = errors.sel(integrator="closed form").dropna("horizon")[-1]
+    quadruple = float(errors.sel(integrator="quadruple, attitude").max())
     sentence = (
-        "On spheroid the closed form in double has an axis error of "
-        f"{float(closed[Column.ERROR].sel(horizon=horizon)):.1e} rad at t = {float(horizon):g}, measured with the same "
-        "formula in 45 digits, whose rounding cannot reach the sixteenth digit. The formula itself is confirmed by the "
-        f"integration in quadruple precision, which agrees with it to {float(quadruple.max()):.0e} rad."
+        f"On spheroid the closed form in double has an axis error of {float(last):.1e} rad at t = "
+        f"{float(last['horizon']):g}, measured with the same formula in 45 digits, whose rounding cannot reach the "
+        "sixteenth digit. The formula itself is confirmed by the integration in quadruple precision, which agrees with "
+        f"it to {quadruple:.0e} rad."
     )
     return [sentence]
 
@@ -72,23 +66,16 @@ def tables(data: xr.Dataset) -> list[Table]:
         for entry in published_values()
     ]  # fmt: skip
     header = ["source", "quantity", "published", "ours", "difference", "to the last digit", "kind", "tests", "remark"]
-    return [Table("Published values", header, rows), _costs(data)]
-
-
-def _costs(data: xr.Dataset) -> Table:
-    rows = []
-    for scene in data["scene"].values:
-        for source in data["integrator"].values:
-            cell = data.sel(scene=scene, integrator=source)
-            measured = np.flatnonzero(np.isfinite(cell[Column.ERROR].values))
-            if measured.size:
-                last = cell.isel(horizon=int(measured[-1]))
-                bound = float(last[Column.BOUND])
-                rows.append(
-                    [
-                        str(scene), str(source), f"{float(last['horizon']):g}", f"{float(last[Column.ERROR]):.1e}",
-                        f"{bound:.1e}" if np.isfinite(bound) else "none claimed", f"{float(last[Column.SECONDS]):.2g}",
-                    ]
-                )  # fmt: skip
-    header = ["scene", "source", "longest horizon (s)", "axis error there (rad)", "claimed bound (rad)", "seconds"]
-    return Table("Sources at their longest horizon", header, rows)
+    costs = []
+    for scene, source in product(data["scene"].values, data["integrator"].values):
+        cell = data.sel(scene=scene, integrator=source).dropna("horizon", subset=[ERROR])
+        if cell.sizes["horizon"]:
+            last = cell.isel(horizon=-1)
+            bound = f"{last[BOUND]:.1e}" if np.isfinite(last[BOUND]) else "none claimed"
+            ends = f"{last['horizon']:g}", f"{last[ERROR]:.1e}", bound, f"{last[SECONDS]:.2g}"
+            costs.append([str(scene), str(source), *ends])
+    ends = ["longest horizon (s)", "axis error there (rad)", "claimed bound (rad)", "seconds"]
+    return [
+        Table("Published values", header, rows),
+        Table("Sources at their longest horizon", ["scene", "source", *ends], costs),
+    ]

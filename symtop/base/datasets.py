@@ -17,7 +17,7 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -43,7 +43,6 @@ VARIABLES: dict[str, tuple[str, ...]] = {
 }
 
 Tree = TypeVar("Tree", bound=xr.Dataset | xr.DataTree)
-Row = TypeVar("Row", bound=NamedTuple)
 
 LITTLE = 1_000_000  # bytes of a disk that count as none
 _DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")  # told in every file
@@ -227,18 +226,3 @@ def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:
     except (OSError, ValueError, RuntimeError) as error:
         raise SymtopError(f"cannot read {path} as netCDF: {error}") from error
     return tree if tree.children else tree.to_dataset()
-
-
-def row(kind: type[Row], data: xr.Dataset, prefix: str = "") -> Row:
-    """The variables of a dataset that bear the names of the fields of a NamedTuple, each after `prefix`, as one.
-
-    A variable without dimensions becomes a number or a string, any other one an array. A study defines its columns once
-    in this way: the fields are what it stores, and what its figures and words read. A field with a default may be
-    absent. Raises KeyError for any other variable that is absent.
-    """
-    values: dict[str, Any] = {}
-    for name in kind._fields:
-        if f"{prefix}{name}" in data or name not in kind._field_defaults:
-            variable = data[f"{prefix}{name}"]
-            values[name] = variable.values if variable.ndim else variable.item()
-    return cast("Row", kind(**values))  # type: ignore[call-overload]
