@@ -1,4 +1,4 @@
-"""Captions, tables and sentences of the study."""
+"""Tables of the study, and the sentences of its captions and its verdict."""
 
 import math
 from collections.abc import Mapping
@@ -181,7 +181,8 @@ def verdict(data: xr.DataTree) -> list[str]:
 
 def _constant_sentences(histories: xr.Dataset, name: str) -> list[str]:
     groups: dict[str, list[tuple[float, str, float]]] = {}  # (largest residual, integrator, exponent) by behaviour
-    for integrator, cell in ((name, histories.sel(integrator=name)) for name in histories["integrator"].values):
+    for integrator in histories["integrator"].values:
+        cell = histories.sel(integrator=integrator)
         worst, rate = (float(cell[f"{name}_{part}"].max()) for part in ("largest", "exponent"))
         groups.setdefault(worst_behaviour(cell, name), []).append((worst, str(integrator), rate))
     sentences = []
