@@ -66,9 +66,9 @@ def test_the_shift_of_the_mean_energy_is_relative_to_its_band():
     means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("integrator", "window"))
     cells = xr.Dataset({"energy_mean": means, "modified_energy_mean": means * 1e-10,
                         "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
-    said = words.moved(cells)
-    assert "the mean energy moves by at most 3e-01 of the width" in said
-    assert "the mean modified energy by at most 3e-15 of" in said
+    sentence = words.moved(cells)
+    assert "the mean energy moves by at most 3e-01 of the width" in sentence
+    assert "the mean modified energy by at most 3e-15 of" in sentence
 
 
 def test_a_change_of_law_is_found_in_a_run_and_an_oscillation_that_switches_on_is_none(monkeypatch):
