@@ -25,9 +25,9 @@ import numpy as np
 from symtop.base.validate import SymtopError
 from symtop.methods import unreduced
 from symtop.methods.compiled import register_jitable
-from symtop.methods.discrete_lagrangian import RULES, quadrature
 from symtop.methods.euler_lagrange import accelerations, with_rates
 from symtop.methods.loop import March, Marks, driver
+from symtop.methods.quadrature import RULES, quadrature
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
@@ -75,7 +75,7 @@ march = driver(unreduced.begin, increment, unreduced.observe)
 def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Marks) -> March:
     """States (theta, phi, psi, p_theta, p_phi, p_psi) after the numbers of steps in `marks`, shape (samples, 6).
 
-    `rule` is a name of `discrete_lagrangian.RULES`. SymtopError for a start at a pole.
+    `rule` is a name of `quadrature.RULES`. SymtopError for a start at a pole.
     """
     free, state = unreduced.with_momenta(scene.top, scene.start)
     return march(DampedTop(*free, *friction), quadrature(*RULES[rule][:2])[0], state, h, marks)

@@ -27,9 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symtop.methods.compiled import register_jitable
-from symtop.methods.discrete_lagrangian import RULES, quadrature
 from symtop.methods.loop import driver
-from symtop.methods.quadrature import RULES, Quadrature, quadrature
+from symtop.methods.quadrature import RULES, quadrature
 
 Array = NDArray[np.float64]
 ONE_SIDED = "force-at-one-end"  # the midpoint rule with the whole force in F_d^-, a negative control of order 1

@@ -23,7 +23,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import newton
 
-from symtop.methods.discrete_lagrangian import Quadrature, rule_of
+from symtop.methods.discrete_lagrangian import rule_of
 from symtop.methods.galerkin import is_galerkin
 from symtop.methods.quadrature import Quadrature
 from symtop.methods.registry import Integrator, Plan
