@@ -16,13 +16,13 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.base.validate import SymtopError
+from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
 
-Array = NDArray[np.float64]
+Rates = Callable[[float, Any], Any]
 
 
 def six_variables(scene: Scene) -> tuple[float, ...]:
@@ -31,7 +31,7 @@ def six_variables(scene: Scene) -> tuple[float, ...]:
     return at.phi, at.theta, at.psi, at.phi_dot, at.theta_dot, at.psi_dot
 
 
-def hard_way(scene: Scene) -> Callable[[float, Any], Any]:
+def hard_way(scene: Scene) -> Rates:
     """y' for y = (phi, theta, psi, phi', theta', psi'): the notebook's three equations, a linear system for q''."""
     I1, I3, mgl = scene.top.I1, scene.top.I3, scene.top.mgl
 
@@ -49,7 +49,7 @@ def hard_way(scene: Scene) -> Callable[[float, Any], Any]:
     return rates
 
 
-def easy_way(scene: Scene) -> Callable[[float, Any], Any]:
+def easy_way(scene: Scene) -> Rates:
     """y' for y = (phi, theta, psi, theta'): two first-order equations and one of second order, in a, b and beta."""
     top = scene.top
     momenta = top.momenta(scene.start)
@@ -93,30 +93,22 @@ class Cubic(NamedTuple):
 def nutation_cubic(scene: Scene) -> Cubic:
     """alpha, beta, a, b of a scene's own start."""
     top, at = scene.top, scene.start
-    momenta = top.momenta(at)
-    beta = 2.0 * top.mgl / top.I1
+    momenta, beta = top.momenta(at), 2.0 * top.mgl / top.I1
     alpha = at.theta_dot**2 + (at.phi_dot * math.sin(at.theta)) ** 2 + beta * math.cos(at.theta)
     return Cubic(alpha, beta, momenta.p_psi / top.I1, momenta.p_phi / top.I1)
 
 
-def rate_of_alpha(scene: Scene, alpha: float) -> float:
-    """|theta'| that a scene would need at its start for the given alpha; SymtopError if there is none."""
-    cubic = nutation_cubic(scene)._replace(alpha=alpha)
+def with_alpha(scene: Scene, alpha: float, sign: float) -> Scene:
+    """The scene with the rate theta' of that sign that alpha means at its start; SymtopError if there is none."""
     u = math.cos(scene.start.theta)
-    square = float(cubic(u)) / (1.0 - u * u)
+    square = float(nutation_cubic(scene)._replace(alpha=alpha)(u)) / (1.0 - u * u)
     if square < 0.0:
         raise SymtopError(f"alpha = {alpha!r} is less energy than {scene.name} has at rest")
-    return math.sqrt(square)
-
-
-def with_alpha(scene: Scene, alpha: float, sign: float) -> Scene:
-    """The scene started with the rate theta' of that sign that the given alpha means."""
-    rate = math.copysign(rate_of_alpha(scene, alpha), sign)
+    rate = math.copysign(math.sqrt(square), sign)
     return dataclasses.replace(scene, start=dataclasses.replace(scene.start, theta_dot=rate))
 
 
 def notebook_top() -> tuple[SymmetricTop, tuple[float, float]]:
     """The first top from the notebook's spheroid, and the radii that its inertia gives back."""
-    polar, equatorial = SymmetricTop(2.0, 1.0, 0.0).spheroid_radii(1.0)
-    top = SymmetricTop.from_spheroid(1.0, polar, equatorial, 9.81)
+    top = SymmetricTop.from_spheroid(1.0, *SymmetricTop(2.0, 1.0, 0.0).spheroid_radii(1.0), 9.81)
     return top, top.spheroid_radii(1.0)

@@ -7,50 +7,40 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS
-from symtop.model.charts import axis_from_angles
+from symtop.model.charts import axis_distance, axis_from_angles
 from symtop.model.scenes import scene
 from symtop.report import solid, style
+from symtop.report.figures import largest_so_far
 from symtop.runner.study import Picture
 
 from . import words
 from .tables import ALPHA, FILMED, MODIFIED, SOLVER, STEPS_A_NUTATION, Column
-from .words import cell
 
 PARTS = {"spheroid": "first part", "goldstein": "second part"}  # of the notebook
 NAMED = (SOLVER, "midpoint", "trapezoidal", "stormer-verlet", "strang", "cayley")  # the others are thin grey lines
 LABELS = {"energy": "energy (J)", "p_phi": r"$p_\varphi$ (J s)", "p_psi": r"$p_\psi$ (J s)"}
-NEAREST = 1e-17  # where a difference of exactly zero is drawn
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
     """All figures, in the notebook's order."""
-    return [
-        draw_motion(data), draw_derivations(data), draw_residuals(data), draw_spheres(data), draw_film(data),
-        draw_alpha(data), draw_modified_energy(data),
-    ]  # fmt: skip
-
-
-def _largest_so_far(values: Any) -> Any:
-    return np.maximum.accumulate(np.maximum(np.abs(values), NEAREST))
+    drawn = [draw_motion(data), draw_derivations(data), draw_residuals(data), draw_spheres(data)]
+    return [*drawn, draw_film(data), draw_alpha(data), draw_modified_energy(data)]
 
 
 def draw_motion(data: xr.Dataset) -> Picture:
     """Inclination by the notebook's solver, and its difference from the closed form."""
-    figure, axes = style.panels(1, 2, height=3.0)
-    motion, difference = axes.flat
-    first = cell(data, "spheroid", SOLVER)
+    figure, (motion, difference) = style.grid(2, 2, ("time (s)", ""), height=3.0)
+    first = data.sel(scene="spheroid", integrator=SOLVER)
     time = first[Column.PATH_TIME].values
-    pairs = (
+    for solver, true, label, color, line in (
         (Column.SOLVER_THETA, Column.TRUE_THETA, r"$\theta$ (rad)", style.BLUE, "-"),
-        (Column.SOLVER_THETA_DOT, Column.TRUE_THETA_DOT, r"$\dot\theta$ (rad/s)", style.VERMILLION, "--"),
-    )
-    for solver, true, label, color, line in pairs:
+        (Column.SOLVER_RATE, Column.TRUE_RATE, r"$\dot\theta$ (rad/s)", style.VERMILLION, "--"),
+    ):
         motion.plot(time, first[solver], line, color=color, label=label)
-        gaps = _largest_so_far((first[solver] - first[true]).values)
-        difference.plot(time[1:], gaps[1:], line, color=color, label=label)
-    motion.set(title="the notebook's solver", xlabel="time (s)")
-    difference.set(title="largest difference from the closed form so far", xlabel="time (s)", yscale="log")
-    style.legend_below(figure, axes)
+        difference.plot(time[1:], largest_so_far(first[solver] - first[true])[1:], line, color=color, label=label)
+    motion.set_title("the notebook's solver")
+    difference.set(title="largest difference from the closed form so far", yscale="log")
+    style.legend_below(figure, [motion])
     gap = float(np.abs(first[Column.SOLVER_THETA] - first[Column.TRUE_THETA]).max())
     return Picture(
         "motion",
@@ -64,20 +54,18 @@ def draw_motion(data: xr.Dataset) -> Picture:
 
 def draw_derivations(data: xr.Dataset) -> Picture:
     """The two derivations against each other and against the closed form."""
-    figure, axes = style.panels(1, 2, height=3.2, sharey=True)
+    figure, axes = style.grid(2, 2, ("time (s)", "largest difference so far"), height=3.2, sharey=True)
     lines = (
         (Column.DERIVATIONS_GAP, style.BLUE, "-", "hard way against easy way (rad)"),
         (Column.HARD_GAP, style.VERMILLION, "--", "hard way against closed form (rad)"),
         (Column.EASY_GAP, style.GREEN, ":", "easy way against closed form (rad)"),
         (Column.ENERGY_GAP, style.BLACK, "-.", "E1 + p_psi^2/2 I3 against E (relative)"),
     )
-    for axis, (name, part) in zip(axes.flat, PARTS.items(), strict=True):
-        solver = cell(data, name, SOLVER)
-        for variable, color, line, label in lines:
-            values = _largest_so_far(solver[variable].values)
-            axis.plot(solver[Column.BOTH_TIME].values, values, line, color=color, label=label)
-        axis.set(yscale="log", xlabel="time (s)", title=f"{name} ({part})")
-    axes[0, 0].set_ylabel("largest difference so far")
+    for axis, (name, part) in zip(axes, PARTS.items(), strict=True):
+        solver = data.sel(scene=name, integrator=SOLVER)
+        for column, color, line, label in lines:
+            axis.plot(solver[Column.BOTH_TIME], largest_so_far(solver[column]), line, color=color, label=label)
+        axis.set(yscale="log", title=f"{name} ({part})")
     style.legend_below(figure, axes)
     return Picture(
         "two-ways",
@@ -94,60 +82,54 @@ def draw_derivations(data: xr.Dataset) -> Picture:
 def draw_residuals(data: xr.Dataset) -> Picture:
     """Energy and momenta: the solver's as the notebook drew them, and those of every discrete method."""
     figure, axes = style.panels(3, 3, width=13.0, height=2.3, sharex="col")
-    solver = cell(data, "spheroid", SOLVER)
-    for axis, name in zip(axes[:, 0], CONSTANTS, strict=True):
-        values = solver[name].values - (solver[name].mean().item() if name == "energy" else solver[name].values[0])
-        axis.plot(solver[Column.SAMPLE_TIME].values, values, color=style.look(SOLVER).color, lw=1.0)
-        axis.set_ylabel(f"residual {LABELS[name]}")
-        axis.ticklabel_format(axis="y", scilimits=(-2, 2))
-    axes[0, 0].set_title("as the notebook drew it, spheroid")
-    for column, name in enumerate(PARTS, start=1):
-        for axis, constant in zip(axes[:, column], CONSTANTS, strict=True):
+    solver = data.sel(scene="spheroid", integrator=SOLVER)
+    for line, name in zip(axes, CONSTANTS, strict=True):
+        values = solver[name] - (solver[name].mean() if name == "energy" else solver[name][0])
+        line[0].plot(solver[Column.SAMPLE_TIME], values, color=style.look(SOLVER).color, lw=1.0)
+        line[0].set_ylabel(f"residual {LABELS[name]}")
+        line[0].ticklabel_format(axis="y", scilimits=(-2, 2))
+        for axis, part in zip(line[1:], PARTS, strict=True):
             for method in data["integrator"].values:
-                _residual_line(axis, cell(data, name, method), constant, str(method))
+                _residual_line(axis, data.sel(scene=part, integrator=method), name)
             axis.set(yscale="log")
-        axes[0, column].set_title(f"relative, largest so far, {name}")
-    for axis in axes[-1]:
-        axis.set_xlabel("time (s)")
+    titles = ("as the notebook drew it, spheroid", *(f"relative, largest so far, {part}" for part in PARTS))
+    for column, title in zip(axes.T, titles, strict=True):
+        column[0].set_title(title)
+        column[-1].set_xlabel("time (s)")
     style.legend_below(figure, axes)
+    largest = max(words.largest_momenta(data).values())
     return Picture(
         "residuals",
         figure,
-        f"Energy and both momenta. Left: the solver's residuals. {words.matched()} Corrected: the notebook takes the "
+        f"Energy and both momenta. Left: the solver's residuals. {words.MATCHED} Corrected: the notebook takes the "
         "mean of its momenta over a table with a single entry, so that its residuals of momenta count from the start. "
         f"Right: the solver beside every discrete Lagrangian and splitting at {STEPS_A_NUTATION:.0f} steps a nutation, "
-        f"six of them named; the momenta of all discrete methods stay within {words.largest(data, *words.MOMENTA):.0e}."
-        "",
+        f"six of them named; the momenta of all discrete methods stay within {largest:.0e}.",
         "Left, residuals of the library solver; right, on logarithmic scales, momenta of the discrete methods at "
         "rounding and their bounded energy errors, below or above the solver's.",
     )
 
 
-def _residual_line(axis: Any, run: xr.Dataset, constant: str, method: str) -> None:
-    values = _largest_so_far(run[Column.residual(constant)].values)
+def _residual_line(axis: Any, run: xr.Dataset, constant: str) -> None:
+    method, values = str(run["integrator"].item()), largest_so_far(run[f"{constant}_residual"])
     good = np.isfinite(values)
     time, values = run[Column.SAMPLE_TIME].values[good][1:], values[good][1:]  # all are zero at the start
-    if method not in NAMED:
-        axis.plot(time, values, color="#BBBBBB", lw=0.7, zorder=2, label="other discrete methods")
-        return
-    look = style.look(method)
-    axis.plot(
-        time, values, look.marker + "-", color=look.color, lw=1.6, ms=0.6 * look.size, markevery=0.12, zorder=3,
-        label=method,
-    )  # fmt: skip
+    look, grey = style.look(method), {"color": "#BBBBBB", "lw": 0.7, "zorder": 2, "label": "other discrete methods"}
+    bold = {"color": look.color, "lw": 1.6, "ms": 0.6 * look.size, "markevery": 0.12, "zorder": 3, "label": method}
+    axis.plot(time, values, look.marker + "-", **bold) if method in NAMED else axis.plot(time, values, **grey)
 
 
 def draw_spheres(data: xr.Dataset) -> Picture:
     """The path that the notebook drew and the path of the axis, a quarter turn apart."""
     figure, axes = solid.solid_panels(1, 2, size=5.0)
     for axis, name in zip(axes.flat, PARTS, strict=True):
-        run = cell(data, name, SOLVER)
+        run = data.sel(scene=name, integrator=SOLVER)
         drawn = axis_from_angles(run[Column.SOLVER_THETA].values, run[Column.SOLVER_PHI].values + 0.5 * math.pi)
         true = axis_from_angles(run[Column.TRUE_THETA].values, run[Column.TRUE_PHI].values)
+        early = run[Column.PATH_TIME].values <= 2.0 * scene(name).nutation_period
         solid.sphere(axis, name)
         lines = ((drawn, style.VERMILLION, "as the notebook drew it"), (true, style.BLACK, "where the axis is"))
         for path, color, label in lines:
-            early = run[Column.PATH_TIME].values <= 2.0 * scene(name).nutation_period
             axis.plot(*path.T, color=color, lw=0.6, alpha=0.35)
             axis.plot(*path[early].T, color=color, lw=2.2, label=label)
             axis.plot(*path[:1].T, "o", color=color, ms=7.0)
@@ -168,32 +150,25 @@ def draw_spheres(data: xr.Dataset) -> Picture:
 
 def draw_film(data: xr.Dataset) -> Picture:
     """The turning triad, and the true one."""
-    frames = cell(data, "spheroid", FILMED).dropna("frame", subset=[Column.FRAME_TIME])
-    attitudes = frames[Column.FRAME_ATTITUDE].values, frames[Column.TRUE_ATTITUDE].values
-    film = solid.Film(*attitudes, "midpoint rule, 30 steps a nutation; grey: truth", pause=50)
+    frames = data.sel(scene="spheroid", integrator=FILMED).dropna("frame", subset=[Column.FRAME_TIME])
+    attitudes = [frames[name].values for name in (Column.FRAME_ATTITUDE, Column.TRUE_ATTITUDE)]
+    last, true = (solid.columns_of(quaternions[-1])[2] for quaternions in attitudes)
     return Picture(
         "triad",
-        film,
+        solid.Film(*attitudes, "midpoint rule, 30 steps a nutation; grey: truth", pause=50),
         "The body-fixed triad over two nutations of the first scene, blue the axis, one frame a step; grey is the "
         "truth. Reproduced: the notebook's animation. Added: the truth; at the end the axes are "
-        f"{final_lag(*attitudes):.2f} rad apart.",
+        f"{float(axis_distance(last, true)):.2f} rad apart.",
         "Animation of three coloured rods turning inside a sphere, a grey ghost just ahead of them.",
     )
 
 
-def final_lag(attitudes: Any, true: Any) -> float:
-    """Angle (rad) between the last axis of the film and the true one, from two arrays of quaternions."""
-    tips = [solid.columns_of(quaternions[-1])[2] for quaternions in (attitudes, true)]
-    return float(np.arccos(np.clip(tips[0] @ tips[1], -1.0, 1.0)))
-
-
 def draw_alpha(data: xr.Dataset) -> Picture:
     """What the printed alpha means: the cubic and the motion, against those of a release at rest."""
-    second = cell(data, "goldstein", SOLVER)
+    second = data.sel(scene="goldstein", integrator=SOLVER)
     rest, rate = float(second[Column.ALPHA_AT_REST]), float(second[Column.ALPHA_RATE])
-    figure, axes = style.panels(1, 2, height=3.6)
-    cubic, motion = axes.flat
-    u, start = second[Column.COSINE].values, math.cos(math.radians(43.0))
+    figure, (cubic, motion) = style.grid(2, 2, height=3.6)
+    u, start = second[Column.COSINE], math.cos(math.radians(43.0))
     cubic.plot(u, second[Column.CUBIC_AT_REST], color=style.BLUE, label=f"alpha = {rest:.6f}, at rest")
     cubic.plot(u, second[Column.CUBIC_PRINTED], "--", color=style.VERMILLION, label=f"alpha = {ALPHA:g}, as printed")
     cubic.axvline(start, color=style.GREY, lw=0.9)
@@ -201,15 +176,14 @@ def draw_alpha(data: xr.Dataset) -> Picture:
     cubic.annotate("cos 43 deg ", (start, -0.18), fontsize=8.5, ha="right")
     cubic.set(xlabel=r"$u = \cos\theta$", ylabel=r"$\dot u^2$ (1/s$^2$)", xlim=(0.2, 0.95), ylim=(-0.2, 0.35))
     cubic.set_title("the nutation cubic")
-    lines = (
+    for column, color, line, label in (
         (Column.THETA_AT_REST, style.BLUE, "-", "released at rest"),
         (Column.THETA_FALLING, style.VERMILLION, "--", f"alpha = {ALPHA:g}, theta falling at first"),
         (Column.THETA_RISING, style.ORANGE, ":", f"alpha = {ALPHA:g}, theta rising at first"),
-    )
-    for column, color, line, label in lines:
+    ):
         motion.plot(second[Column.ALPHA_TIME], np.degrees(second[column]), line, color=color, label=label)
     motion.set(xlabel="time (s)", ylabel="theta (degrees)", title="the motion from each start")
-    for axis in axes.flat:  # the panels share colours, not lines: a legend each
+    for axis in (cubic, motion):  # the panels share colours, not lines: a legend each
         axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False)
     return Picture(
         "alpha",
@@ -224,21 +198,22 @@ def draw_alpha(data: xr.Dataset) -> Picture:
 def draw_modified_energy(data: xr.Dataset) -> Picture:
     """Energy and modified energy of two discrete methods, over time and against the step."""
     figure, axes = style.panels(1, 3, width=13.0, height=3.4)
-    midpoint = cell(data, "spheroid", "midpoint")
-    kinds = ((Column.ENERGY_CHANGE, "energy"), (Column.MODIFIED_CHANGE, "modified energy"))
-    for (column, kind), color in zip(kinds, (style.BLUE, style.BLACK), strict=True):
-        values = midpoint[Column.history(column)]
+    midpoint = data.sel(scene="spheroid", integrator="midpoint")
+    kinds = ((Column.ENERGY_CHANGE, "energy", "-"), (Column.MODIFIED_CHANGE, "modified energy", "--"))
+    for (column, kind, _), color in zip(kinds, (style.BLUE, style.BLACK), strict=True):
+        values = midpoint[f"{column}_history"]
         axes[0, 0].plot(midpoint[Column.MODIFIED_TIME], values, color=color, label=f"{kind}, midpoint, over time")
     axes[0, 0].set(title="spheroid, 40 steps a nutation", xlabel="time (s)", ylabel="relative change since the start")
     for axis, name in zip(axes[0, 1:], PARTS, strict=True):
         for method in MODIFIED:
-            look, table = style.look(method), cell(data, name, method)
-            h = table[Column.MODIFIED_STEP].values
-            for (column, kind), line, face in zip(kinds, ("-", "--"), (look.color, "white"), strict=True):
-                axis.plot(h, table[column], look.marker + line, color=look.color, mfc=face, label=f"{kind}, {method}")
-        span = float(np.nanmin(h)), float(np.nanmax(h))
-        for power, (column, _) in zip((2, 4), kinds, strict=True):
-            style.slope_guide(axis, power, span, 0.2 * float(np.nanmin(table[column])), f"$h^{power}$")
+            run, look = data.sel(scene=name, integrator=method), style.look(method)
+            h = run[Column.MODIFIED_STEP]
+            for column, kind, line in kinds:
+                face = look.color if line == "-" else "white"
+                axis.plot(h, run[column], look.marker + line, color=look.color, mfc=face, label=f"{kind}, {method}")
+        for power, column in ((2, Column.ENERGY_CHANGE), (4, Column.MODIFIED_CHANGE)):
+            span = float(h.min()), float(h.max())
+            style.slope_guide(axis, power, span, 0.2 * float(run[column].min()), f"$h^{power}$")
         axis.set(xscale="log", yscale="log", title=name, xlabel="step size (s)", ylabel="largest relative change")
         axis.xaxis.set_minor_formatter("")
     style.legend_below(figure, axes)

@@ -9,23 +9,29 @@ a symmetric rule gives, with the mean rates (w, v, u) = (dtheta, dphi, dpsi)/h a
 
 and psi likewise, so that the momenta are not conserved but balanced, p_phi1 - p_phi0 = -c_phi (phi1 - phi0) exactly:
 the motion itself has the same invariants p_phi + c_phi phi and p_psi + c_psi psi, and the discrete one keeps them to
-rounding. Order 2.
-The conservation laws of the free top are the case c = 0, and this kernel is then `unreduced`.
-Not in the registry, whose methods step the free top. Source: Marsden and West, Acta Numerica 10 (2001) 357, part three.
+rounding. Order 2. With c = 0 this kernel is `unreduced`. Not in the registry, whose methods step the free top.
+
+The motion has no closed form; its truth is a pair of integrations by DOP853 at tolerance 1e-13. One has the six
+Euler-Lagrange equations, the other the four that remain when both momenta are eliminated by their balance.
+Source: Marsden and West, Acta Numerica 10 (2001) 357, part three.
 """
 
+import math
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from symtop.base.validate import SymtopError, finite, one_of
+import numpy as np
+
+from symtop.base.validate import SymtopError
 from symtop.methods import unreduced
 from symtop.methods.compiled import register_jitable
+from symtop.methods.euler_lagrange import accelerations, with_rates
 from symtop.methods.loop import March, Marks, driver
 from symtop.methods.quadrature import RULES, quadrature
-from symtop.methods.unreduced import unreduced_step, with_momenta
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.charts import Array
+from symtop.model.scenes import Scene
 
-begin = unreduced.begin
-observe = unreduced.observe
+Rates = Callable[[float, Any], tuple[float, ...]]
 
 
 class Friction(NamedTuple):
@@ -34,16 +40,9 @@ class Friction(NamedTuple):
     precession: float
     spin: float
 
-    def checked(self) -> "Friction":
-        """The same as floats; refuses negative ones."""
-        for name, value in zip(self._fields, self, strict=True):
-            if finite(f"{name} friction", value) < 0.0:
-                raise SymtopError(f"{name} friction must be at least zero, not {value!r}")
-        return Friction(*map(float, self))
-
 
 class DampedTop(NamedTuple):
-    """The top and its friction: the momenta are state."""
+    """The top and its friction."""
 
     I1: float
     I3: float
@@ -53,13 +52,13 @@ class DampedTop(NamedTuple):
 
 
 @register_jitable
-def _damped_inertia(par: Any, sums: Any, h: float) -> Any:
+def _inertia(par: Any, sums: Any, h: float) -> Any:
     """That of `unreduced` with half a step of friction."""
     return sums.across + 0.5 * h * par.c_phi, par.I3 + 0.5 * h * par.c_psi
 
 
 @register_jitable
-def _damped_momenta(par: Any, sums: Any, v: float, u: float, h: float) -> Any:
+def _momenta(par: Any, sums: Any, v: float, u: float, h: float) -> Any:
     """D2 L_d + F_d^+, from the sums and from nothing else: the balance is a result, not an input."""
     p_phi = sums.across * v + sums.mixed * u - 0.5 * h * par.c_phi * v
     return p_phi, sums.mixed * v + par.I3 * u - 0.5 * h * par.c_psi * u
@@ -67,17 +66,72 @@ def _damped_momenta(par: Any, sums: Any, v: float, u: float, h: float) -> Any:
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations."""
-    return unreduced_step(_damped_inertia, _damped_momenta, par, rule, state, carry, h)
+    return unreduced.unreduced_step(_inertia, _momenta, par, rule, state, carry, h)
 
 
-march = driver(begin, increment, observe)
+march = driver(unreduced.begin, increment, unreduced.observe)
 
 
-def damped_run(top: SymmetricTop, start: Angles, friction: Friction, rule: str, h: float, marks: Marks) -> March:
+def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Marks) -> March:
     """States (theta, phi, psi, p_theta, p_phi, p_psi) after the numbers of steps in `marks`, shape (samples, 6).
 
-    `rule` is a name of `quadrature.RULES`. SymtopError for a pole, an unknown rule or a bad friction.
+    `rule` is a name of `quadrature.RULES`. SymtopError for a start at a pole.
     """
-    numbers = quadrature(*RULES[one_of("rule", rule, RULES)][:2])[0]
-    bare, state = with_momenta(top, start)
-    return march(DampedTop(*bare, *friction.checked()), numbers, state, h, marks)
+    free, state = unreduced.with_momenta(scene.top, scene.start)
+    return march(DampedTop(*free, *friction), quadrature(*RULES[rule][:2])[0], state, h, marks)
+
+
+def _six_equations(scene: Scene, friction: Friction) -> Rates:
+    """y' for y = (theta, phi, psi, theta', phi', psi') with friction: M q'' gains (0, -c_phi phi', -c_psi psi')."""
+    top = scene.top
+
+    def rates(_: float, y: Any) -> tuple[float, ...]:
+        theta, _phi, _psi, theta_dot, phi_dot, psi_dot = y
+        nod, swing, spin = accelerations(top.I1, top.I3, top.mgl, theta, theta_dot, phi_dot, psi_dot)
+        s, c = math.sin(theta), math.cos(theta)
+        torque = -friction.spin * psi_dot
+        turn = (-friction.precession * phi_dot - c * torque) / (top.I1 * s * s)
+        return theta_dot, phi_dot, psi_dot, nod, swing + turn, spin + torque / top.I3 - c * turn
+
+    return rates
+
+
+def _four_equations(scene: Scene, friction: Friction) -> Rates:
+    """y' for y = (theta, phi, psi, p_theta), the momenta p = p0 - c (angle - angle0) eliminated."""
+    top, start = scene.top, scene.start
+    momenta = top.momenta(start)
+
+    def rates(_: float, y: Any) -> tuple[float, ...]:
+        theta, phi, psi, p_theta = y
+        p_phi = momenta.p_phi - friction.precession * (phi - start.phi)
+        p_psi = momenta.p_psi - friction.spin * (psi - start.psi)
+        s, c = math.sin(theta), math.cos(theta)
+        turn = (p_phi - p_psi * c) / (top.I1 * s * s)
+        return p_theta / top.I1, turn, p_psi / top.I3 - turn * c, s * (turn * (top.I1 * turn * c - p_psi) + top.mgl)
+
+    return rates
+
+
+def _integrated(rates: Rates, start: Sequence[float], times: Array, solver: str, tolerance: float) -> Array:
+    from scipy.integrate import solve_ivp  # 0.6 s to import
+
+    done = solve_ivp(rates, (0.0, float(times[-1])), start, method=solver, rtol=tolerance, atol=tolerance, t_eval=times)
+    if not done.success:
+        raise SymtopError(f"the damped top cannot be integrated to t = {times[-1]:g}: {done.message}")
+    states: Array = done.y
+    return states
+
+
+def six_variables(scene: Scene, friction: Friction, times: Array, solver: str, tolerance: float) -> Array:
+    """(theta, phi, psi, theta', phi', psi') by one of SciPy's solvers, shape (6, times); SymtopError if it fails."""
+    start = with_rates(scene.top, scene.start)[1]
+    return _integrated(_six_equations(scene, friction), start, times, solver, tolerance)
+
+
+def damped_truth(scene: Scene, friction: Friction, times: Array) -> tuple[Array, float]:
+    """The same at tolerance 1e-13, and its largest distance (rad) in any angle from the four equations' motion."""
+    at, solver = scene.start, ("DOP853", 1e-13)
+    six = six_variables(scene, friction, times, *solver)
+    start = (at.theta, at.phi, at.psi, scene.top.I1 * at.theta_dot)
+    four = _integrated(_four_equations(scene, friction), start, times, *solver)
+    return six, float(np.max(np.abs(six[:3] - four[:3])))

@@ -1,21 +1,18 @@
 """Figures of the oscillators study."""
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
 from symtop.report import style
+from symtop.report.figures import largest_so_far
 from symtop.runner.study import Picture
 
 from . import words
-from .oscillator import Oscillator
-from .tables import FRICTION, HORIZON, LONG, ONE_SIDED, RK45, RULES, TOP_TOLERANCE, Column, dampings, order, tops
-from .words import cell
+from .oscillator import ONE_SIDED
+from .tables import AGAINST_RK45, FRICTION, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOP_TOLERANCE, Column, order, tops
 
 SYMBOLS = {"midpoint": "o", "trapezoidal": "s", ONE_SIDED: "v"}
-NEAREST = 1e-17  # where an error of exactly zero is drawn
-TIME_UNIT = r"$\sqrt{m/k}$"
+TIME = r"time ($\sqrt{m/k}$)"
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
@@ -23,30 +20,19 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     return [draw_notebook(data), draw_orders(data), draw_decay(data), draw_tops(data), draw_top_orders(data)]
 
 
-def _title(damping: float) -> str:
-    return f"b = {damping:g}, {Oscillator(damping=damping).regime}"
-
-
-def _largest_so_far(values: Any) -> Any:
-    return np.maximum.accumulate(np.maximum(np.abs(values), NEAREST))
-
-
 def draw_notebook(data: xr.Dataset) -> Picture:
     """The notebook's experiment for every damping."""
-    figure, axes = style.panels(2, 3, height=2.5, sharex=True, sharey=True)
-    for axis, (name, b) in zip(axes.flat, dampings(data).items(), strict=False):
-        run = cell(data, name, "midpoint").dropna("seed_step")
-        time = run[Column.NOTEBOOK_TIME].values
-        axis.plot(time, run[Column.ANALYTIC], color=style.BLACK, lw=4.0, alpha=0.35, label="analytic")
-        axis.plot(time, run[Column.NOTEBOOK_UPDATE], color=style.BLUE, label="the notebook's update = midpoint rule")
-        guess = run[Column.NOTEBOOK_GUESS]
-        axis.plot(time, guess, "--", color=style.VERMILLION, lw=1.0, label="the notebook's guess at the forces")
-        axis.set_title(_title(b))
-    axes[0, 0].set_ylim(-1.3, 8.5)
-    for axis in axes[-1]:
-        axis.set_xlabel(f"time ({TIME_UNIT})")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("x")
+    figure, axes = style.grid(len(OSCILLATORS), 3, (TIME, "x"), height=2.5, sharex=True, sharey=True)
+    lines = (
+        (Column.ANALYTIC, "-", {"color": style.BLACK, "lw": 4.0, "alpha": 0.35, "label": "analytic"}),
+        (Column.UPDATE, "-", {"color": style.BLUE, "label": "the notebook's update = midpoint rule"}),
+        (Column.GUESS, "--", {"color": style.VERMILLION, "lw": 1.0, "label": "the notebook's guess at the forces"}),
+    )
+    for axis, (name, oscillator) in zip(axes, OSCILLATORS.items(), strict=True):
+        run = data.sel(scene=name, integrator="midpoint")
+        for column, line, options in lines:
+            axis.plot(run[Column.NOTEBOOK_TIME], run[column], line, **options)
+        axis.set(title=words.title(oscillator), ylim=(-1.3, 8.5))
     style.legend_below(figure, axes)
     return Picture(
         "seed",
@@ -64,34 +50,30 @@ def draw_notebook(data: xr.Dataset) -> Picture:
 def draw_orders(data: xr.Dataset) -> Picture:
     """Errors of the position and of the slow exponent against the step."""
     figure, axes = style.panels(2, 6, width=13.0, height=2.7, sharex=True, sharey="row")
-    for column, (name, b) in enumerate(dampings(data).items()):
-        for line, error in enumerate((Column.POSITION_ERROR, Column.EXPONENT_ERROR)):
-            axis = axes[line, column]
+    for column, (name, oscillator) in zip(axes.T, OSCILLATORS.items(), strict=True):
+        for axis, error in zip(column, (Column.POSITION_ERROR, Column.EXPONENT_ERROR), strict=True):
             for method, marker in SYMBOLS.items():
-                run = cell(data, name, method)
-                above_rounding = run[error].values > 1e-13
-                h, errors = run[Column.STEP].values[above_rounding], run[error].values[above_rounding]
+                run = data.sel(scene=name, integrator=method)
                 color = style.PURPLE if method == ONE_SIDED else style.look(method).color
-                axis.plot(
-                    h, errors, marker + "-", color=color, ms=4,
-                    mfc="none" if method == "trapezoidal" else color, label=method,
-                )  # fmt: skip
+                face = "none" if method == "trapezoidal" else color
+                errors = run[error].where(run[error] > 1e-13)  # above rounding
+                axis.plot(run[Column.STEP], errors, marker + "-", color=color, ms=4, mfc=face, label=method)
             style.slope_guide(axis, 2.0, (1e-2, 1.0), 1e-9, "$h^2$")
-            if line == 0:
-                style.slope_guide(axis, 1.0, (1e-3, 1e-1), 2e-2, "$h$")
             axis.set(xscale="log", yscale="log")
-        axes[0, column].set_title(f"b = {b:g}\n{Oscillator(damping=b).regime}")
-        axes[1, column].set_xlabel(f"step size ({TIME_UNIT})")
+        style.slope_guide(column[0], 1.0, (1e-3, 1e-1), 2e-2, "$h$")
+        column[0].set_title(words.title(oscillator, "\n"))
+        column[1].set_xlabel(TIME.replace("time", "step size"))
     axes[0, 0].set_ylabel("largest error of x")
     axes[1, 0].set_ylabel("relative error of\nthe slow exponent")
     style.legend_below(figure, axes)
+    halved = (f"{m} {order(data, 'damping-2', m, Column.EXPONENT_ERROR).slope:.2f}" for m in ("trapezoidal", ONE_SIDED))
     return Picture(
         "orders",
         figure,
         f"The oscillator released from rest, T = {HORIZON:g}. Above: both rules have order 2 in every regime; the "
         "whole force at one end of the step costs an order. Below: the slow exponent lambda of exp(lambda t). At "
         "critical damping (b = 2) it is the square root of a perturbation of the discriminant, so that the errors "
-        f"there have half the usual order ({words.critical_orders(data)}). The midpoint rule leaves critical damping "
+        f"there have half the usual order ({', '.join(halved)}). The midpoint rule leaves critical damping "
         "in place and keeps its order.",
         "Log-log plots of errors against step for six dampings: slope 2 for both rules, slope 1 for the one-sided "
         "force.",
@@ -100,49 +82,43 @@ def draw_orders(data: xr.Dataset) -> Picture:
 
 def draw_decay(data: xr.Dataset) -> Picture:
     """Errors of the energy over time at equal cost."""
-    shown = words.with_rk45(data)
-    figure, axes = style.panels(1, len(shown), sharey=True)
-    for axis, (name, b) in zip(axes.flat, shown.items(), strict=True):
+    figure, axes = style.grid(len(AGAINST_RK45), 2, (TIME, "largest |E/E(exact) - 1| so far"), sharey=True)
+    for axis, name in zip(axes, AGAINST_RK45, strict=True):
         for method in (*RULES, RK45):
-            run, look = cell(data, name, method), style.look(method)
-            error = _largest_so_far(run[Column.ENERGY_ERROR].values)
-            axis.plot(
-                run[Column.TIME].values[1:], error[1:], look.marker + "-", color=look.color, ms=0.7 * look.size,
-                markevery=0.1, label=method,
-            )  # fmt: skip
-        axis.set(xscale="log", yscale="log", xlabel=f"time ({TIME_UNIT})", title=_title(b))
-    axes[0, 0].set_ylabel("largest |E/E(exact) - 1| so far")
+            run, look = data.sel(scene=name, integrator=method), style.look(method)
+            time, error = run[Column.TIME].values, largest_so_far(run[Column.ENERGY_ERROR])
+            line = {"color": look.color, "ms": 0.7 * look.size, "markevery": 0.1, "label": method}
+            axis.plot(time[1:], error[1:], look.marker + "-", **line)
+        axis.set(xscale="log", yscale="log", title=words.title(OSCILLATORS[name]))
     style.legend_below(figure, axes)
     return Picture(
         "decay",
         figure,
         f"Energy against its exact decay over T = {LONG:g}, at equal cost: {words.cost(data)}. {words.energy(data)}",
         "Log-log plots of the relative energy error over time for two rules and RK45.",
-    )  # fmt: skip
+    )
 
 
 def draw_tops(data: xr.Dataset) -> Picture:
     """Inclination, momenta and momentum balance of the damped tops."""
     names = tops(data)
     figure, axes = style.panels(3, len(names), width=4.8 * max(2, len(names)), height=2.3, sharex="col")
-    for column, name in enumerate(names):
-        first = cell(data, name, "midpoint")
+    for (theta, momenta, balance), name in zip(axes.T, names, strict=True):
+        first = data.sel(scene=name, integrator="midpoint")
         time = first[Column.TOP_TIME].values
-        axes[0, column].plot(time, np.degrees(first[Column.THETA]), color=style.BLUE, label="theta, midpoint")
-        axes[0, column].plot(time, np.degrees(first[Column.TRUE_THETA]), ":", color=style.BLACK, label="theta, truth")
-        axes[1, column].plot(time, first[Column.P_PHI], color=style.GREEN, label=r"$p_\varphi$")
-        axes[1, column].plot(time, first[Column.P_PSI], "--", color=style.PURPLE, label=r"$p_\psi$")
+        theta.plot(time, np.degrees(first[Column.THETA]), color=style.BLUE, label="theta, midpoint")
+        theta.plot(time, np.degrees(first[Column.TRUE_THETA]), ":", color=style.BLACK, label="theta, truth")
+        momenta.plot(time, first[Column.P_PHI], color=style.GREEN, label=r"$p_\varphi$")
+        momenta.plot(time, first[Column.P_PSI], "--", color=style.PURPLE, label=r"$p_\psi$")
         for method in (*RULES, RK45):
-            run, look = cell(data, name, method), style.look(method)
-            for variable, line in ((Column.BALANCE_PHI, "-"), (Column.BALANCE_PSI, "--")):
-                defect = _largest_so_far(run[variable].values)
-                label = f"balance, {method}" if line == "-" else None
-                axes[2, column].plot(time[1:], defect[1:], line, color=look.color, label=label)
-        axes[2, column].set(yscale="log", xlabel="time (s)")
-        axes[0, column].set_title(f"{name}, damped")
-    for axis, label in zip(
-        axes[:, 0], ("theta (degrees)", "momenta (J s)", "defect of the balance,\nrelative"), strict=True
-    ):
+            run, color = data.sel(scene=name, integrator=method), style.look(method).color
+            phi, psi = largest_so_far(run[Column.BALANCE_PHI]), largest_so_far(run[Column.BALANCE_PSI])
+            balance.plot(time[1:], phi[1:], color=color, label=f"balance, {method}")
+            balance.plot(time[1:], psi[1:], "--", color=color)
+        theta.set_title(f"{name}, damped")
+        balance.set(yscale="log", xlabel="time (s)")
+    labels = ("theta (degrees)", "momenta (J s)", "defect of the balance,\nrelative")
+    for axis, label in zip(axes[:, 0], labels, strict=True):
         axis.set_ylabel(label)
     style.legend_below(figure, axes)
     return Picture(
@@ -154,39 +130,31 @@ def draw_tops(data: xr.Dataset) -> Picture:
         f"and {words.largest_balance(data, (RK45,)):.1e} with RK45 at tolerance {TOP_TOLERANCE:g}. Below, solid: phi, "
         "dashed: psi.",
         "Inclination, momenta and the residual of the momentum balance against time for the damped tops.",
-    )  # fmt: skip
+    )
 
 
 def draw_top_orders(data: xr.Dataset) -> Picture:
     """Errors of theta of the damped tops against the step."""
-    names = tops(data)
-    figure, axes = style.panels(1, max(2, len(names)), height=3.2, sharey=True)
-    for axis in axes.flat[len(names) :]:
-        axis.set_visible(False)
-    for axis, name in zip(axes.flat, names, strict=False):
+    labels = ("step size (s)", "largest error of theta (rad)")
+    figure, axes = style.grid(len(tops(data)), 2, labels, height=3.2, sharey=True)
+    bound = {"color": style.GREY, "lw": 3, "alpha": 0.5, "label": "error of the reference"}
+    orders = []
+    for axis, name in zip(axes, tops(data), strict=True):
         for method in RULES:
-            run, look = cell(data, name, method), style.look(method)
-            h, error = run[Column.TOP_STEP].values, run[Column.THETA_ERROR].values
+            run, look = data.sel(scene=name, integrator=method), style.look(method)
+            h, error = run[Column.TOP_STEP], run[Column.THETA_ERROR]
             axis.plot(h, error, look.marker + "-", color=look.color, label=method)
-        axis.axhline(
-            float(cell(data, name, "midpoint")[Column.TOP_BOUND]), color=style.GREY, lw=3, alpha=0.5,
-            label="error of the reference",
-        )  # fmt: skip
-        style.slope_guide(axis, 2.0, (float(np.nanmin(h)), float(np.nanmax(h))), 0.3 * float(np.nanmin(error)), "$h^2$")
-        axis.set(xscale="log", yscale="log", title=f"{name}, damped", xlabel="step size (s)")
+            orders.append(f"{method} on {name} {order(data, name, method, Column.THETA_ERROR)}")
+        axis.axhline(float(run[Column.TOP_BOUND]), **bound)
+        style.slope_guide(axis, 2.0, (float(h.min()), float(h.max())), 0.3 * float(error.min()), "$h^2$")
+        axis.set(xscale="log", yscale="log", title=f"{name}, damped")
         axis.xaxis.set_minor_formatter("")
-    axes[0, 0].set_ylabel("largest error of theta (rad)")
     style.legend_below(figure, axes)
-    orders = "; ".join(
-        f"{method} on {name} {order(data, name, method, Column.THETA_ERROR, Column.TOP_STEP)}"
-        for name in names
-        for method in RULES
-    )
     return Picture(
         "damped-top-orders",
         figure,
-        f"Order of the forced methods on the damped top: {orders}. Reference: the six Euler-Lagrange equations with "
-        "friction at tolerance 1e-13; the grey line is the largest difference of any angle from the form of four "
-        "equations.",
+        f"Order of the forced methods on the damped top: {'; '.join(orders)}. Reference: the six Euler-Lagrange "
+        "equations with friction at tolerance 1e-13; the grey line is the largest difference of any angle from the "
+        "form of four equations.",
         "Log-log plots of the error of theta against the step, slope 2.",
     )

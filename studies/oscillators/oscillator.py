@@ -21,35 +21,25 @@ Source: Marsden and West, Discrete mechanics and variational integrators, Acta N
 
 import cmath
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.base.validate import SymtopError, finite, positive, whole
 from symtop.methods.compiled import register_jitable
 from symtop.methods.loop import driver
-from symtop.methods.quadrature import RULES, Quadrature, quadrature
+from symtop.methods.quadrature import RULES, quadrature
 
 Array = NDArray[np.float64]
+ONE_SIDED = "force-at-one-end"  # the midpoint rule with the whole force in F_d^-, a negative control of order 1
 
 
-@dataclass(frozen=True, slots=True)
-class Oscillator:
-    """A mass on a spring with a viscous damper."""
+class Oscillator(NamedTuple):
+    """A mass on a spring with a viscous damper; all three are floats, of which the damping may be zero."""
 
     mass: float = 1.0
     damping: float = 0.0
     stiffness: float = 1.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", positive("mass", self.mass))
-        object.__setattr__(self, "stiffness", positive("stiffness", self.stiffness))
-        if finite("damping", self.damping) < 0.0:
-            raise SymtopError(f"damping must be at least zero, not {self.damping!r}")
-        object.__setattr__(self, "damping", float(self.damping))
 
     @property
     def discriminant(self) -> float:
@@ -104,28 +94,17 @@ class Sums(NamedTuple):
     right: float  # sum w a
     cross: float  # sum w a (1-a)
     square: float  # sum w a^2
-    push: float  # share of the force that F_d^- has
-    pull: float  # and F_d^+
+    push: float  # share of the force that F_d^- has: sum w (1-a) by virtual work
+    pull: float  # and F_d^+: sum w a
 
 
-def rule_sums(rule: "str | Quadrature", left_force: float | None = None) -> Sums:
-    """The sums of a rule; `left_force` overrides the share of the force that acts at the start of a step.
-
-    By virtual work the shares follow from the rule (1/2 and 1/2 for a symmetric one); all of it at the left end is the
-    simplest choice in the literature, and of order 1.
-    """
-    numbers = quadrature(*RULES[rule][:2])[0] if isinstance(rule, str) else rule
-    a, w = np.array(numbers.nodes), np.array(numbers.weights)
+def rule_sums(method: str) -> Sums:
+    """The sums of a rule of `discrete_lagrangian` by its name, or of `ONE_SIDED`."""
+    rule = quadrature(*RULES["midpoint" if method == ONE_SIDED else method][:2])[0]
+    a, w = np.array(rule.nodes), np.array(rule.weights)
     left, right = float(np.sum(w * (1.0 - a))), float(np.sum(w * a))
-    push = left if left_force is None else finite("left_force", left_force)
-    pull = right if left_force is None else 1.0 - push
+    push, pull = (1.0, 0.0) if method == ONE_SIDED else (left, right)
     return Sums(left, right, float(np.sum(w * a * (1.0 - a))), float(np.sum(w * a * a)), push, pull)
-
-
-class _Numbers(NamedTuple):
-    mass: float
-    damping: float
-    stiffness: float
 
 
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
@@ -148,60 +127,39 @@ def _increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     return (d, kick), carry, 1, 0 if np.isfinite(d) else 3
 
 
-def _observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+def legendre(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     """Both discrete Legendre transforms of the step: -D1 L_d - F_d^- and D2 L_d + F_d^+."""
     first, last = _stiffnesses(par, rule, h)
     push = h * par.stiffness * before[0]
     return first * dstate[0] + rule.left * push, last * dstate[0] - rule.right * push
 
 
-_march = driver(_begin, _increment, _observe)
-
-
-def start_momentum(oscillator: Oscillator, rule: Sums, first: float, second: float, h: float) -> float:
-    """p0 = -D1 L_d - F_d^- of the step from one position to the next: the start of a two-step method in this form."""
-    par = _Numbers(oscillator.mass, oscillator.damping, oscillator.stiffness)
-    return float(_observe(par, rule, (first, 0.0), (second - first, 0.0), h)[0])
-
-
-class Path(NamedTuple):
-    """A discrete motion at some of its steps."""
-
-    times: Array
-    position: Array
-    momentum: Array
-    step_size: float
+_march = driver(_begin, _increment, legendre)
 
 
 def discrete_path(
-    oscillator: Oscillator, rule: "str | Sums", position: float, velocity: float, horizon: float, steps: int,
+    oscillator: Oscillator, rule: Sums, position: float, velocity: float, horizon: float, steps: int,
     samples: int = 2001,
-) -> Path:  # fmt: skip
-    """The discrete motion from p0 = m x'(0), at `samples` of its steps (all of them if there are fewer)."""
-    count = whole("steps", steps, 1)
-    marks = np.unique(np.rint(np.linspace(0.0, count, min(samples, count + 1))).astype(np.int64))
-    h = positive("horizon", horizon) / count
-    sums = rule_sums(rule) if isinstance(rule, str) else rule
-    par = _Numbers(oscillator.mass, oscillator.damping, oscillator.stiffness)
-    start = (finite("position", position), oscillator.mass * finite("velocity", velocity))
-    states = _march(par, sums, start, h, marks).states
-    return Path(marks.astype(np.float64) * h, states[:, 0], states[:, 1], h)
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Times, positions and momenta from p0 = m x'(0) on, at `samples` of the steps (all of them if there are fewer)."""
+    marks = np.unique(np.rint(np.linspace(0.0, steps, min(samples, steps + 1))).astype(np.int64))
+    h, start = horizon / steps, (position, oscillator.mass * velocity)
+    states = _march(oscillator, rule, start, h, marks).states
+    return marks.astype(np.float64) * h, states[:, 0], states[:, 1]
 
 
-def discrete_exponents(oscillator: Oscillator, rule: "str | Sums", h: float) -> tuple[complex, complex]:
+def discrete_exponents(oscillator: Oscillator, rule: Sums, h: float) -> tuple[complex, complex]:
     """log(z)/h of the two eigenvalues z of the step map, the slower decay first: the exponents of the discrete motion.
 
     In positions alone the step reads A q2 - B q1 + C q0 = 0 with A - C = b, whatever the rule, and the discriminant
     B^2 - 4 A C = (b + h k (r-l))^2 - 4 m k + 4 (h k)^2 (s - r^2) + 4 b h k (f - r), free of cancellation
     (l, r, s, f: the sums `left`, `right`, `square`, `pull`).
     """
-    sums = rule_sums(rule) if isinstance(rule, str) else rule
-    par = _Numbers(oscillator.mass, oscillator.damping, oscillator.stiffness)
-    first, last = _stiffnesses(par, sums, h)
+    first, last = _stiffnesses(oscillator, rule, h)
     b, spring = oscillator.damping, h * oscillator.stiffness
-    middle = first + last - spring * sums.left
-    discriminant = (b + spring * (sums.right - sums.left)) ** 2 - 4.0 * oscillator.mass * oscillator.stiffness
-    discriminant += 4.0 * spring * (spring * (sums.square - sums.right**2) + b * (sums.pull - sums.right))
+    middle = first + last - spring * rule.left
+    discriminant = (b + spring * (rule.right - rule.left)) ** 2 - 4.0 * oscillator.mass * oscillator.stiffness
+    discriminant += 4.0 * spring * (spring * (rule.square - rule.right**2) + b * (rule.pull - rule.right))
     root = cmath.sqrt(discriminant)
     if b < 0.5 * first and abs(root) < 0.5 * middle:  # z near 1: its logarithm without cancellation
         mean, half = complex(math.log1p(-b / first) / (2.0 * h)), cmath.atanh(root / middle) / h
@@ -213,38 +171,17 @@ def discrete_exponents(oscillator: Oscillator, rule: "str | Sums", h: float) -> 
     return slow, fast
 
 
-def notebook_update(damping: float, h: float, first: float, second: float, steps: int) -> Array:
-    """The notebook's own recurrence for m = k = 1, positions only, shape (steps + 1,).
+def notebook_positions(damping: float, h: float, first: float, second: float, steps: int) -> tuple[Array, Array]:
+    """The notebook's update and its guess at the forces, for m = k = 1: positions, each of shape (steps + 1,).
 
-    x[k+2] = ((-4 + 2 b h - h^2) x[k] + 2 (4 - h^2) x[k+1]) / (4 + 2 b h + h^2): the midpoint rule above.
+    update    x[k+2] = ((-4 + 2 b h - h^2) x[k] + 2 (4 - h^2) x[k+1]) / (4 + 2 b h + h^2), the midpoint rule above
+    guess     (x[k+2] - 2 x[k+1] + x[k])/h^2 = -(V'(x[k+1/2]) + V'(x[k+3/2]) + 2 dF/dx')/2 with dF/dx' = -b
+
+    The guess has dF/dx' where F belongs, and with the sign of V': a constant push and no damping at all.
     """
-    x = [first, second]
-    before, now, ahead = -4.0 + 2.0 * damping * h - h * h, 2.0 * (4.0 - h * h), 4.0 + 2.0 * damping * h + h * h
+    update, guess = [first, second], [first, second]
+    old, new, ahead = -4.0 + 2.0 * damping * h - h * h, 2.0 * (4.0 - h * h), 4.0 + 2.0 * damping * h + h * h
     for _ in range(steps - 1):
-        x.append((before * x[-2] + now * x[-1]) / ahead)
-    return np.array(x)
-
-
-def notebook_guess(damping: float, h: float, first: float, second: float, steps: int) -> Array:
-    """The notebook's guess for the forces, for m = k = 1: dF/dx' where F belongs, and with the sign of V'.
-
-    (x[k+1] - 2 x[k] + x[k-1])/h^2 = -(V'(x[k-1/2]) + V'(x[k+1/2]) + 2 dF/dx')/2 with dF/dx' = -b: a constant push
-    and no damping at all, an oscillation about x = b.
-    """
-    x = [first, second]
-    for _ in range(steps - 1):
-        x.append((2.0 * (4.0 - h * h) * x[-1] - (4.0 + h * h) * x[-2] + 4.0 * h * h * damping) / (4.0 + h * h))
-    return np.array(x)
-
-
-def relative_energy_error(oscillator: Oscillator, path: Path, position: float, velocity: float) -> Array:
-    """E_h(t)/E(t) - 1 along a discrete motion."""
-    x, v = oscillator.exact(path.times, position, velocity)
-    true = oscillator.energy(x, oscillator.mass * v)
-    error: Array = oscillator.energy(path.position, path.momentum) / true - 1.0
-    return error
-
-
-def step_counts(horizon: float, steps: Sequence[float]) -> list[int]:
-    """Whole numbers of steps over the horizon, nearest to the given step sizes."""
-    return [max(1, round(horizon / h)) for h in steps]
+        update.append((old * update[-2] + new * update[-1]) / ahead)
+        guess.append((new * guess[-1] - (4.0 + h * h) * guess[-2] + 4.0 * h * h * damping) / (4.0 + h * h))
+    return np.array(update), np.array(guess)

@@ -5,8 +5,8 @@ import xarray as xr
 
 from symtop.runner.study import Table
 
-from .oscillator import Oscillator
-from .tables import HORIZON, LONG, ONE_SIDED, RK45, RULES, TOP_TOLERANCE, Column, dampings, order, tops
+from .oscillator import ONE_SIDED, Oscillator
+from .tables import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOP_TOLERANCE, Column, order, tops
 
 HOW_TO_READ = (
     "The damped oscillator has an exact solution, so that every error is known. The slope of a line is the order. The "
@@ -15,77 +15,9 @@ HOW_TO_READ = (
 )
 
 
-def cell(data: xr.Dataset, scene: str, integrator: str) -> xr.Dataset:
-    """One scene and one integrator."""
-    return data.sel(scene=scene, integrator=integrator)
-
-
-def orders(data: xr.Dataset) -> str:
-    """Orders of the position."""
-    both, one = (
-        [
-            order(data, name, method, Column.POSITION_ERROR, Column.STEP).slope
-            for name, b in dampings(data).items()
-            for method in methods
-            if b > 0.0 or method in RULES
-        ]
-        for methods in (RULES, (ONE_SIDED,))
-    )
-    return (
-        f"Both rules have orders between {min(both):.3f} and {max(both):.3f} against the analytic solution in every "
-        "regime, from undamped to overdamped; with the whole force at one end of the step the order is "
-        f"{min(one):.2f} to {max(one):.2f}."
-    )
-
-
-def critical_orders(data: xr.Dataset) -> str:
-    """Orders of the slow exponent at critical damping."""
-    name = next(name for name, b in dampings(data).items() if Oscillator(damping=b).discriminant == 0.0)
-    slopes = {
-        method: order(data, name, method, Column.EXPONENT_ERROR, Column.STEP).slope
-        for method in ("trapezoidal", ONE_SIDED)
-    }
-    return ", ".join(f"{method} {slope:.2f}" for method, slope in slopes.items())
-
-
-def update(data: xr.Dataset) -> str:
-    """What the notebook's update and its guess are."""
-    return (
-        "The notebook's update is the midpoint rule with forced discrete Euler-Lagrange equations: the same positions "
-        f"within {float(data[Column.UPDATE_GAP].max()):.0e} over {HORIZON:g} time units. Its guess at the forces is "
-        "not: it damps nothing."
-    )
-
-
-def with_rk45(data: xr.Dataset) -> dict[str, float]:
-    """The oscillators that RK45 was run on: damping by name."""
-    return {
-        name: b for name, b in dampings(data).items() if np.isfinite(cell(data, name, RK45)[Column.EVALUATIONS].item())
-    }
-
-
-def energy(data: xr.Dataset) -> str:
-    """Errors of the energy at equal cost."""
-    rows = []
-    for name, b in with_rk45(data).items():
-        errors = {m: np.nanmax(np.abs(cell(data, name, m)[Column.ENERGY_ERROR])) for m in (*RULES, RK45)}
-        rows.append(f"b = {b:g}: " + ", ".join(f"{method} {float(error):.1e}" for method, error in errors.items()))
-    return (
-        f"Largest relative error of the energy at equal cost to T = {LONG:g}: {'; '.join(rows)}. The symplectic "
-        "structure bounds the energy error of a discrete Lagrangian, and friction breaks it: with b > 0 the rate of "
-        "decay of every method is off by a constant, and the error grows with time."
-    )
-
-
-def cost(data: xr.Dataset) -> str:
-    """Force evaluations of the discrete rules and of RK45."""
-    names = list(with_rk45(data))
-    evaluations = data[Column.EVALUATIONS].sel(scene=names)
-    rules, rk45 = float(evaluations.sel(integrator=RULES[0]).max()), evaluations.sel(integrator=RK45)
-    return (
-        f"{rules:.0f} force evaluations for a rule (h = {LONG / rules:g}), {float(rk45.min()):.0f} to "
-        f"{float(rk45.max()):.0f} for RK45"
-    )
+def title(oscillator: Oscillator, between: str = ", ") -> str:
+    """The damping and what it makes of the motion."""
+    return f"b = {oscillator.damping:g}{between}{oscillator.regime}"
 
 
 def largest_balance(data: xr.Dataset, methods: tuple[str, ...]) -> float:
@@ -94,28 +26,71 @@ def largest_balance(data: xr.Dataset, methods: tuple[str, ...]) -> float:
     return max(float(np.abs(runs[name]).max()) for name in (Column.BALANCE_PHI, Column.BALANCE_PSI))
 
 
-def balance(data: xr.Dataset) -> str:
-    """What the momenta of the damped top do."""
+def cost(data: xr.Dataset) -> str:
+    """Force evaluations of the discrete rules and of RK45."""
+    evaluations = data[Column.EVALUATIONS].sel(scene=list(AGAINST_RK45))
+    rules, rk45 = float(evaluations.sel(integrator=RULES[0]).max()), evaluations.sel(integrator=RK45)
     return (
+        f"{rules:.0f} force evaluations for a rule (h = {LONG / rules:g}), {float(rk45.min()):.0f} to "
+        f"{float(rk45.max()):.0f} for RK45"
+    )
+
+
+def energy(data: xr.Dataset) -> str:
+    """Errors of the energy at equal cost."""
+    largest, rows = np.abs(data[Column.ENERGY_ERROR]).max("sample"), []
+    for name in AGAINST_RK45:
+        errors = [f"{m} {float(largest.sel(scene=name, integrator=m)):.1e}" for m in (*RULES, RK45)]
+        rows.append(f"b = {OSCILLATORS[name].damping:g}: {', '.join(errors)}")
+    return (
+        f"Largest relative error of the energy at equal cost to T = {LONG:g}: {'; '.join(rows)}. The symplectic "
+        "structure bounds the energy error of a discrete Lagrangian, and friction breaks it: with b > 0 the rate of "
+        "decay of every method is off by a constant, and the error grows with time."
+    )
+
+
+def verdict(data: xr.Dataset) -> list[str]:
+    """Orders, the notebook's update, decay and balance."""
+    both, one = (
+        [
+            order(data, name, method, Column.POSITION_ERROR).slope
+            for name, oscillator in OSCILLATORS.items()
+            for method in methods
+            if oscillator.damping > 0.0 or method in RULES
+        ]
+        for methods in (RULES, (ONE_SIDED,))
+    )
+    orders = (
+        f"Both rules have orders between {min(both):.3f} and {max(both):.3f} against the analytic solution in every "
+        "regime, from undamped to overdamped; with the whole force at one end of the step the order is "
+        f"{min(one):.2f} to {max(one):.2f}."
+    )
+    update = (
+        "The notebook's update is the midpoint rule with forced discrete Euler-Lagrange equations: the same positions "
+        f"within {float(data[Column.UPDATE_GAP].max()):.0e} over {HORIZON:g} time units. Its guess at the forces is "
+        "not: it damps nothing."
+    )
+    balance = (
         "On the damped top the momenta change by exactly the discrete forces: the relative defect of the balance is at "
         f"most {largest_balance(data, RULES):.1e}, against {largest_balance(data, (RK45,)):.1e} with RK45 at tolerance "
         f"{TOP_TOLERANCE:g}."
     )
+    return [orders, update, energy(data), balance]
 
 
 def tables(data: xr.Dataset) -> list[Table]:
     """Orders and errors in numbers."""
+    largest = np.abs(data[Column.ENERGY_ERROR]).max("sample")
     rows = [
         [
-            f"{b:g}", Oscillator(damping=b).regime, method,
-            str(order(data, name, method, Column.POSITION_ERROR, Column.STEP)),
-            str(order(data, name, method, Column.EXPONENT_ERROR, Column.STEP)),
-            f"{float(np.abs(cell(data, name, method)[Column.ENERGY_ERROR]).max()):.1e}",
+            f"{oscillator.damping:g}", oscillator.regime, method,
+            str(order(data, name, method, Column.POSITION_ERROR)),
+            str(order(data, name, method, Column.EXPONENT_ERROR)),
+            f"{float(largest.sel(scene=name, integrator=method)):.1e}",
         ]
-        for name, b in dampings(data).items()
+        for name, oscillator in OSCILLATORS.items()
         for method in (*RULES, ONE_SIDED)
     ]  # fmt: skip
-    header = [
-        "b", "regime", "rule", "order of x", "order of the slow exponent", f"relative energy error to T = {LONG:g}"
-    ]  # fmt: skip
+    orders = ["order of x", "order of the slow exponent"]
+    header = ["b", "regime", "rule", *orders, f"relative energy error to T = {LONG:g}"]
     return [Table("Damped oscillator against the analytic solution", header, rows)]

@@ -12,18 +12,8 @@ from symtop.methods.registry import integrator, integrators
 from symtop.model.scenes import added_scenes, scene
 from symtop.runner.study import Case, Study
 
-from . import figures, words
+from . import figures, tables, words
 from .commutation import reduced_first
-from .tables import (
-    COMPARED_STEPS,
-    chart_table,
-    commutation_table,
-    several_charts,
-    unreduced_cost,
-    unreduced_form,
-    unreduced_gaps,
-    with_unreduced_form,
-)
 
 SCENES = ["spheroid", "goldstein"]
 CHART_PERIODS = 32.0  # nutations: long enough that the call itself does not count
@@ -33,45 +23,35 @@ def cases(quick: bool) -> list[Case]:
     """Every method with several charts (first scene), with an unreduced form, and with a reduced-first step."""
     grid = []
     for name in [*(SCENES[:1] if quick else SCENES), *added_scenes()]:
-        period = scene(name).nutation_period
-        several = several_charts() if name == SCENES[0] else []
+        start, period = scene(name), scene(name).nutation_period
+        several = [method for method in integrators().values() if len(method.charts()) > 1 and name == SCENES[0]]
         for method in several[:6] if quick else several:
-            settings = ladder(method, scene(name), CHART_PERIODS * period, 8, 1e5)[1 :: 3 if quick else 2]
+            settings = ladder(method, start, CHART_PERIODS * period, 8, 1e5)[1 :: 3 if quick else 2]
             plan = {"settings": settings, "horizon": CHART_PERIODS * period, "batches": 2 if quick else 3}
             grid.append(Case(name, method.name, {"part": "charts", **plan}))
-        for reduced in with_unreduced_form():
-            steps = [period / 30.7, period / 307.0]
-            plan = {"horizon": 8.0 * period, "step_sizes": steps, "batches": 3 if quick else 5}
-            grid.append(Case(name, reduced, {"part": "twins", **plan}))
-        counts = [round(50 * 2**k) for k in range(4 if quick else 6)]
-        grid += [
-            Case(name, method.name, {"part": "commutation", "horizon": 2.0 * period, "counts": counts})
-            for method in integrators().values()
-            if reduced_first(scene(name), method)
-        ]
+        plan = {"horizon": 8.0 * period, "step_sizes": [period / 30.7, period / 307.0], "batches": 3 if quick else 5}
+        grid += [Case(name, reduced, {"part": "twins", **plan}) for reduced in tables.unreduced_forms()]
+        plan = {"horizon": 2.0 * period, "counts": [50 * 2**k for k in range(4 if quick else 6)]}
+        known = [method.name for method in integrators().values() if reduced_first(start, method)]
+        grid += [Case(name, method, {"part": "commutation", **plan}) for method in known]
     return grid
 
 
 def measure(case: Case) -> xr.Dataset:
     """The part of the question that a case asks."""
-    start, method, plan = scene(case.scene), case.integrator, case.settings
+    start, method, plan = scene(case.scene), integrator(case.integrator), case.settings
     if plan["part"] == "charts":
-        return chart_table(start, integrator(method), plan["settings"], plan["horizon"], plan["batches"])
+        return tables.chart_table(start, method, plan["settings"], plan["horizon"], plan["batches"])
     if plan["part"] == "twins":
-        gaps = unreduced_gaps(start, method, plan["horizon"], COMPARED_STEPS)
-        return gaps.merge(unreduced_cost(start, method, plan["step_sizes"], plan["batches"]))
-    return commutation_table(start, integrator(method), plan["horizon"], plan["counts"])
+        gaps = tables.unreduced_gaps(start, method.name, plan["horizon"], tables.COMPARED_STEPS)
+        return gaps.merge(tables.unreduced_cost(start, method.name, plan["step_sizes"], plan["batches"]))
+    return tables.commutation_table(start, method, plan["horizon"], plan["counts"])
 
 
 def uses(case: Case) -> list[str]:
     """The integrators that a case runs: its own, and for a comparison of kernels the unreduced form."""
-    form = unreduced_form(case.integrator) if case.settings["part"] == "twins" else None
-    return [case.integrator, *([form] if form else [])]
-
-
-def verdict(data: xr.Dataset) -> list[str]:
-    """One sentence a comparison."""
-    return [words.commuting(data), words.eliminating(data), *words.larger_charts(data)]
+    name = case.integrator
+    return [name, tables.unreduced_forms()[name]] if case.settings["part"] == "twins" else [name]
 
 
 STUDY = Study(
@@ -83,7 +63,7 @@ STUDY = Study(
     measure=measure,
     pictures=figures.pictures,
     tables=words.tables,
-    verdict=verdict,
+    verdict=words.verdict,
     timed=True,
     uses=uses,
 )

@@ -1,8 +1,10 @@
-"""The drawings that studies share: the grey band of the reference's error bound, and the Pareto front."""
+"""What drawings of studies share: the grey band of the reference's error bound, the Pareto front, running maxima."""
 
 from typing import Any
 
 import numpy as np
+
+SMALLEST = 1e-17  # where an error of exactly zero is drawn
 
 
 def error_band(axis: Any, bounds: Any, least: float = 1e-16) -> float:
@@ -21,3 +23,8 @@ def pareto(cost: Any, error: Any) -> Any:
         if np.isfinite(cost[k]) and error[k] < best:
             best, front[k] = error[k], True
     return front.reshape(shape)
+
+
+def largest_so_far(values: Any) -> Any:
+    """The largest size up to each sample; zeros are `SMALLEST`, for a logarithmic axis."""
+    return np.maximum.accumulate(np.maximum(np.abs(np.asarray(values)), SMALLEST))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from symtop_studies.reduction.tables import Column, unreduced_cost, unreduced_gaps, with_unreduced_form
+from symtop_studies.reduction.tables import Column, unreduced_cost, unreduced_forms, unreduced_gaps
 
 import symtop
 from symtop.measure.conservation import trend
@@ -40,7 +40,7 @@ def test_another_rule_is_another_trajectory(scene_name):
 
 
 def test_every_twin_is_of_a_registered_method_and_its_history_is_rounding():
-    assert {name: name + TWIN for name in PAIRS}.items() <= with_unreduced_form().items()
+    assert {name: name + TWIN for name in PAIRS}.items() <= unreduced_forms().items()
     where = symtop.scene("goldstein")
     history = unreduced_gaps(where, "midpoint", where.nutation_period, 500, samples=51)
     assert float(history[Column.PSI_GAP].max()) < 1e-12
