@@ -7,12 +7,12 @@ Two rounds. First every method walks down to each target on every scene and over
 
 import xarray as xr
 
-from symtop.measure.timing import BATCH
 from symtop.methods.registry import integrators
 from symtop.model.scenes import added_scenes
 from symtop.runner.study import Case, Study
 
 from . import words
+from .energy import COMPARED
 from .figures import pictures
 from .opening import charts, opening
 from .tables import errors_and_work, run_times
@@ -24,6 +24,10 @@ SCENES = [
 PERIODS = ([10.0, 1000.0], [10.0, 100.0])  # in full, and quick
 BUDGET = {"compiled": 1e6, "python": 2.5e4}  # force evaluations of one run
 SOFTWARE = 4e4  # the same for arithmetic in software: quadruple precision costs 2 us an evaluation
+EFFORT = (  # rounds and seconds of a batch, of all timed runs and of the contenders; in full, and quick
+    {"first": (3, 0.005), "further": (5, 0.01)},
+    {"first": (3, 0.002), "further": (4, 0.003)},
+)
 
 
 def cases(quick: bool) -> list[Case]:
@@ -37,15 +41,13 @@ def cases(quick: bool) -> list[Case]:
 
 
 def follow_up(data: xr.Dataset) -> list[Case]:
-    """One case a scene that times all runs which ended well against each other."""
+    """One case a scene that times its methods against each other."""
     grid = []
     periods = [float(value) for value in data["horizon"].values]
-    quick = periods == PERIODS[True]
-    effort = {"rounds": 4, "batch": 0.003} if quick else {"rounds": 5, "batch": BATCH}
     for name in data["scene"].values:
-        runs = timed_runs(data.sel(scene=name))
+        runs = timed_runs(data.sel(scene=name), COMPARED)
         names = list(dict.fromkeys(run.name for run in runs))
-        settings = {"runs": runs, "integrators": names, "periods": periods, "size": data.sizes["setting"], **effort}
+        settings = {"runs": runs, "integrators": names, "periods": periods, **EFFORT[periods == PERIODS[True]]}
         grid.append(Case(str(name), "together", settings, timed=True))
     return grid
 

@@ -7,23 +7,24 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
+from symtop.measure.timing import NOISY
 from symtop.measure.work import TARGETS
 from symtop.runner.study import Table
 
-from .tables import Column
+from .energy import CLASSIC, STRUCTURE, crossings, growth_at_equal_settings
 
-STRUCTURE = ("midpoint", "trapezoidal", "stormer-verlet", "galerkin-simpson")
-CLASSIC = ("rk4", "rk45-compiled")
 MOST_NAMES = 3  # of a list of names; the others are counted
 
 HOW_TO_READ = (
     "Choose the error that you accept on the vertical axis: the first curve to the right of it is the fastest method. "
     "Seconds include the call of the compiled loop, about twenty microseconds, so that all curves bend where runs are "
-    "that short. A force evaluation is one evaluation of the equations of motion: a Newton iteration at one node, a "
-    "kick, a stage, or one derivative of a Taylor series, which costs more the higher it is. The settings of a method "
-    "were searched for, so that they just meet 1e-3, 1e-6, 1e-9 and 1e-12; no fixed step is longer than a quarter of a "
-    "nutation, and no run was longer than a million force evaluations (25 thousand in plain Python, 40 thousand in "
-    "quadruple precision). `exact` spends its time on constants in 40 digits, whatever the horizon."
+    "that short. A run is timed, and drawn against seconds, if it is its method's cheapest in force evaluations for "
+    "some target, or belongs to the comparison of energy errors; no time is computed from others. A force evaluation "
+    "is one evaluation of the equations of motion: a Newton iteration at one node, a kick, a stage, or one derivative "
+    "of a Taylor series, which costs more the higher it is. The settings of a method were searched for, so that they "
+    "just meet 1e-3, 1e-6, 1e-9 and 1e-12; no fixed step is longer than a quarter of a nutation, and no run was longer "
+    "than a million force evaluations (25 thousand in plain Python, 40 thousand in quadruple precision). `exact` "
+    "spends its time on constants in 40 digits, whatever the horizon."
 )
 
 
@@ -37,18 +38,15 @@ def seconds(value: float) -> str:
     return f"{value * 1e6:.3g} us" if value < 1e-3 else f"{value * 1e3:.3g} ms" if value < 1.0 else f"{value:.3g} s"
 
 
-def few(names: Sequence[str]) -> str:
-    """The first names, and how many more there are."""
-    more = len(names) - MOST_NAMES
-    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+def of_tier(data: xr.Dataset, tier: str) -> list[str]:
+    """The names of the compiled methods, or of those in plain Python."""
+    return [str(name) for name in data["integrator"].values if tier in data["tier"].sel(integrator=name).values]
 
 
-def winner(won: ranking.Win | None) -> str:
-    """The fastest method, its time, and which methods are level with it."""
-    if won is None:
-        return "none"
-    level = f", level with {few(won.level)}" if won.level else ""
-    return f"{won.best.integrator}, {seconds(won.best.cost)}{level}"
+def level(won: ranking.Win) -> str:
+    """The first methods that are level with the fastest, and how many more there are."""
+    more = len(won.level) - MOST_NAMES
+    return "level with " + ", ".join(won.level[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 def lead(target: float, cell: xr.Dataset) -> str:
@@ -58,10 +56,9 @@ def lead(target: float, cell: xr.Dataset) -> str:
         return f"{target:.0e} no method"
     text = f"{target:.0e} {won.best.integrator} in {seconds(won.best.cost)}"
     if won.level:
-        text += f" (level with {few(won.level)})"
-    elif won.behind and won.lead:
-        predicted = "" if won.rival_timed else ", by a predicted time"
-        text += f" ({won.lead.ratio:.1f} times faster than {won.behind.integrator}{predicted})"
+        text += f" ({level(won)})"
+    elif won.behind:
+        text += f" ({won.ratio:.1f} times faster than {won.behind.integrator})"
     if won.best.integrator == "exact" and (other := ranking.win(cell, target, without=("exact",))):
         text += f", the fastest that steps {other.best.integrator} in {seconds(other.best.cost)}"
     return text
@@ -79,51 +76,39 @@ def left_out(names: Sequence[str]) -> str:
 
 def growth(data: xr.Dataset, names: Sequence[str], part: str) -> str:
     """Median growth of a part of the error from the first to the last horizon."""
-    grown = {name: ranking.growth_at_equal_settings(data.sel(integrator=name), part) for name in names}
+    grown = {name: growth_at_equal_settings(data.sel(integrator=name), part) for name in names}
     listed = ", ".join(f"{value:.3g} with {name}" for name, value in grown.items() if np.isfinite(value))
     rest = [name for name, value in grown.items() if not np.isfinite(value)]
     return listed + (f" (not judged: {', '.join(rest)}, at rounding or over budget)" if rest else "")
 
 
-def _at_long_horizon(data: xr.Dataset) -> list[xr.Dataset]:
-    """The scenes that count, over the long horizon."""
-    kept = ranking.counted(data)[0]
-    return [kept.sel(scene=name).isel(horizon=-1) for name in kept["scene"].values]
-
-
-def crossings(data: xr.Dataset) -> list[str]:
+def energy_of_each(data: xr.Dataset) -> str:
     """For each classical method, which structure-preserving ones have less energy error at equal time, and where."""
-    cells = _at_long_horizon(data)
-    sentences = []
-    for classic in CLASSIC:
-        parts = []
-        for method in STRUCTURE:
-            compared = [one for cell in cells if (one := ranking.crossing(cell, method, classic))]
-            won = [one for one in compared if one.share > 0.0]
-            lost = [one.scene for one in compared if one.share == 0.0]
-            if not compared:
-                parts.append(f"{method} nowhere, because no run times are common")
-                continue
-            if not won:
-                parts.append(f"{method} on none of {len(compared)} scenes")
-                continue
+    parts: dict[str, list[str]] = {classic: [] for classic in CLASSIC}
+    for (classic, method), compared in crossings(data).items():
+        won = [one for one in compared if one.share > 0.0]
+        lost = [one.scene for one in compared if one.share == 0.0]
+        if not compared:
+            parts[classic].append(f"{method} nowhere, because no run times are common")
+        elif not won:
+            parts[classic].append(f"{method} on none of {len(compared)} scenes")
+        else:
             top = max(won, key=lambda one: one.gain)
-            longest = seconds(float(np.median([one.dearest_won for one in won])))
+            longest = seconds(float(np.median([one.longest_won for one in won])))
             never = f", not on {', '.join(lost)}" if lost else ""
-            parts.append(
+            parts[classic].append(
                 f"{method} on {len(won)} of {len(compared)} scenes{never} (for runs up to {longest} in the median; at "
                 f"best {top.gain:.2g} times smaller, on {top.scene}, where it is {top.error:.1g})"
             )
-        sentences.append(
-            f"At equal run time the energy error is smaller than that of {classic} with {'; '.join(parts)}."
-        )
-    return sentences
+    return " ".join(
+        f"At equal run time the energy error is smaller than that of {classic} with {'; '.join(listed)}."
+        for classic, listed in parts.items()
+    )
 
 
-def crossed(data: xr.Dataset) -> str:
+def energy_in_all(data: xr.Dataset) -> str:
     """How often structure-preserving methods have less energy error at equal time, in one sentence."""
-    cells = _at_long_horizon(data)
-    compared = [one for cell in cells for a in STRUCTURE for b in CLASSIC if (one := ranking.crossing(cell, a, b))]
+    compared = [one for listed in crossings(data).values() for one in listed]
     coarse = sum(one.at_least and not one.at_most for one in compared)
     fine = sum(one.at_most and not one.at_least for one in compared)
     return (
@@ -134,49 +119,35 @@ def crossed(data: xr.Dataset) -> str:
     )
 
 
-def _worth_of_times(data: xr.Dataset, wins: Sequence[ranking.Win]) -> str:
-    """How many times were measured, and how far off the predicted ones may be."""
-    sure = [won for won in wins if won.reliable and won.lead]
-    timed, finite = data[Column.TIMED].values == 1.0, np.isfinite(data[Column.SECONDS].values)
-    miss = data[Column.PREDICTION_MISS].values
-    text = f"{int(timed.sum())} of {int(finite.sum())} run times were measured"
-    if not np.isfinite(miss).any():
-        return f"{text}."
-    return (
-        f"{text}; the others are predicted from two measured runs of the same method on the same scene. "
-        f"{sum(won.rival_timed for won in sure)} of {len(sure)} leads larger than the noise are over a method timed in "
-        "the same rounds, the others over a predicted time. Where a prediction was tested by a measurement it was off "
-        f"by {np.nanmedian(miss):.0%} (median) and by {np.nanmax(miss):.0%} at worst. "
-        f"{int(np.sum(data[Column.RELIABLE].values == 0.0))} of the measured times are too noisy to trust."
-    )
-
-
 def sentences(data: xr.Dataset) -> list[str]:
     """The fastest method for each scene, horizon and target, the crossover in energy, and what the times are worth."""
     kept, uncounted = ranking.counted(data)
     wins = [won for won in ranking.winners(kept).values() if won]
     count = Counter(won.best.integrator for won in wins)
-    said = [
+    spoken = [
         f"Of {len(wins)} combinations of scene, horizon and target that a compiled method met, the fastest is "
         + ", ".join(f"{name} in {times}" for name, times in count.most_common())
-        + f"; in {sum(won.reliable for won in wins)} its lead is larger than the noise."
+        + f"; in {sum(not won.level for won in wins)} its lead is larger than the noise."
         + left_out(uncounted),
-        f"Energy error {spans(data)[-1]}. " + " ".join(crossings(data)),
+        f"Energy error {spans(data)[-1]}. {energy_of_each(data)}",
     ]
-    tiers = {str(name): data[Column.IMPLEMENTATION].sel(integrator=name).values for name in data["integrator"].values}
-    python = [name for name, tier in tiers.items() if "python" in tier]
-    if python:
-        said.append(
+    if python := of_tier(data, "python"):
+        spoken.append(
             f"Only compiled methods are ranked. Those in plain Python ({', '.join(python)}) are ranked "
             "among themselves in the table; compare them with the rest by force evaluations."
         )
-    said.append(_worth_of_times(data, wins))
+    spoken.append(
+        f"{int(data['seconds'].notnull().sum())} of the {int((data['outcome'] == 'ok').sum())} runs that ended well "
+        f"were timed, every one in at least {ranking.LEAST_ROUNDS} rounds with the other methods of its scene. "
+        f"{int((data['spread'] >= NOISY).sum())} of the times are too noisy to trust: the median of their samples is "
+        f"more than {NOISY:.0%} above the smallest."
+    )
     for name in data["scene"].values:
         for far, span in enumerate(spans(data)):
             cell = data.sel(scene=name).isel(horizon=far)
             fastest = "; ".join(lead(target, cell) for target in TARGETS)
-            said.append(f"{name}, the fastest to an axis error {span}: {fastest}.")
-    return said
+            spoken.append(f"{name}, the fastest to an axis error {span}: {fastest}.")
+    return spoken
 
 
 def tables(data: xr.Dataset) -> list[Table]:
@@ -188,14 +159,24 @@ def tables(data: xr.Dataset) -> list[Table]:
         for name in data["scene"].values:
             cell = data.sel(scene=name).isel(horizon=far)
             for tier in ("compiled", "python"):
-                won = [ranking.win(cell, target, tier=tier) for target in TARGETS]
-                fastest.append([str(name), tier, *(winner(one) for one in won)])
-            met = [{place.integrator: place for place in ranking.cheapest(cell, target)} for target in TARGETS]
-            for method in map(str, cell["integrator"].values):
-                row = [seconds(places[method].cost) if method in places else "-" for places in met]
-                times.append([str(name), method, *row, str(cell[Column.STOPPED].sel(integrator=method).values)])
-        columns = ["scene", "implementation", *header]
-        shown.append(Table(f"Fastest method to an axis error {span}", columns, fastest))
-        columns = ["scene", "integrator", *header, "nothing finer because of"]
-        shown.append(Table(f"Time of every method to the same errors {span}", columns, times))
+                won = [ranking.win(cell, target, tier) for target in TARGETS]
+                fastest.append([str(name), tier, *map(_winner, won)])
+            met = [{place.integrator: seconds(place.cost) for place in ranking.cheapest(cell, target)}
+                   for target in TARGETS]  # fmt: skip
+            for method, stopped in zip(map(str, cell["integrator"].values), cell["stopped"].values, strict=True):
+                times.append([str(name), method, *(cost.get(method, "-") for cost in met), str(stopped)])
+        shown += [
+            Table(f"Fastest method to an axis error {span}", ["scene", "implementation", *header], fastest),
+            Table(
+                f"Time of every method to the same errors {span}",
+                ["scene", "integrator", *header, "nothing finer because of"],
+                times,
+            ),
+        ]
     return shown
+
+
+def _winner(won: ranking.Win | None) -> str:
+    if won is None:
+        return "none"
+    return ", ".join([won.best.integrator, seconds(won.best.cost), *([level(won)] if won.level else [])])

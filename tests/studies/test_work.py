@@ -6,25 +6,16 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.work_precision import opening
+from symtop_studies.work_precision import energy, opening
 from symtop_studies.work_precision import timing_rounds as rounds_module
 from symtop_studies.work_precision import words as work_words
-from symtop_studies.work_precision.tables import Column
-from symtop_studies.work_precision.timing_rounds import (
-    TimedRun,
-    calibration_runs,
-    contenders,
-    cost_line,
-    speed_probe,
-    timed_runs,
-    timing_rounds,
-)
+from symtop_studies.work_precision.timing_rounds import Effort, TimedRun, contenders, timed_runs, timing_rounds
 
 import symtop
 from symtop.measure import ranking
 from symtop.measure.phase import phase, split
 from symtop.measure.timing import Timing, timings
-from symtop.measure.work import TARGETS, Walk, spans, work_table
+from symtop.measure.work import TARGETS, Walk, least_work, spans, work_table
 from symtop.model import charts
 from symtop.model.scenes import closed_form
 from symtop.run.reference import reference
@@ -179,62 +170,43 @@ def test_a_separatrix_has_spans_too():
     assert spans(scene, [10.0]) == [10.0 * scene.nutation_period]
 
 
-def timed(name, far=0, place=0, work=100.0, targets=()):
-    return TimedRun(name, far, place, 0.1, work, tuple(targets))
-
-
-def test_a_line_of_cost_goes_through_two_runs_and_never_pays_for_starting():
-    assert cost_line([(100.0, 3e-6), (1100.0, 13e-6)]) == pytest.approx((2e-6, 1e-8))
-    assert cost_line([(100.0, 1e-6), (200.0, 3e-6)]) == pytest.approx((0.0, 1.5e-8))  # a negative overhead is noise
-    assert cost_line([(100.0, 1e-6)]) == pytest.approx((0.0, 1e-8))
-
-
-def test_calibration_runs_are_a_short_and_a_longer_run_near_a_target():
-    runs = [timed("a", place=k, work=10.0**k, targets=[0] if k in (2, 4) else []) for k in range(8)]
-    assert [run.place for run in calibration_runs(runs, "compiled")] == [0, 4]
-    alone = [timed("a", place=k, work=10.0**k, targets=[0] if k == 2 else []) for k in range(8)]
-    assert [run.place for run in calibration_runs(alone, "compiled")] == [0, 2]
-    coarse = [timed("a", place=k, work=10.0**k, targets=[0] if k == 0 else []) for k in range(8)]
-    assert [run.place for run in calibration_runs(coarse, "compiled")] == [0, 5]
+def timed(name, far=0, place=0, targets=()):
+    return TimedRun(name, far, place, 0.1, tuple(targets))
 
 
 def test_contenders_are_the_runs_that_may_be_the_fastest():
-    runs = [timed(name, targets=[0]) for name in "abc"] + [timed("p", targets=[0])]
-    runs += [timed("d", targets=[0]), timed("q", targets=[0])]
-    cost = dict(zip(runs, (1.0, 1.5, 9.0, 50.0, 10.0, 500.0), strict=True))
+    runs = [timed(name, targets=[0]) for name in "abcdpq"] + [timed("a", place=1, targets=[1]), timed("b", place=1)]
+    cost = dict(zip(runs, (1.0, 1.5, 9.0, 10.0, 0.5, 500.0, 1.0, 1.0), strict=True))
     tier = dict.fromkeys("abcd", "compiled") | dict.fromkeys("pq", "python")
-    groups = [[run.name for run in group] for group in contenders(runs, cost, tier)]
-    assert groups == [["a", "b", "c"], ["p"]]  # c is the first behind: a lead must be over one that was timed
+    near = contenders(runs, cost, tier)
+    assert [(run.name, run.place) for run in near] == [("a", 0), ("b", 0)]  # p and the other a are alone in front
 
 
-def test_the_speed_ratio_is_measured_on_the_longest_run_that_a_batch_can_hold():
-    runs = [timed("a", place=k, work=10.0**k) for k in range(3)]
-    taken = {run: Timing((10.0 ** (k - 3),), 1.0) for k, run in enumerate(runs)}
-    assert speed_probe(runs, taken, 0.02).place == 1
-    assert speed_probe(runs, taken, 1e-6).place == 0
-
-
-def test_a_machine_that_turns_slow_before_the_rounds_slows_the_predictions_too(monkeypatch):
+def test_a_time_that_is_taken_twice_and_differs_by_a_quarter_is_taken_again(monkeypatch):
     scene = symtop.scene("goldstein")
-    runs = [timed(name, place=k, work=w) for name in ("strang", "midpoint") for k, w in enumerate((10.0, 1e3, 1e5))]
-    runs[1] = timed("strang", place=1, work=1e3, targets=[0])
-    calls_made = []
+    runs = [timed("strang", targets=[0]), timed("midpoint", targets=[0]), timed("rk4", place=2, targets=[0])]
+    speed = {"strang": (1.0, 1.1, 9.0), "midpoint": (1.2, 1.6, 1.4), "rk4": (9.0, 9.0, 9.0)}
+    stages = []
 
-    def slower(calls, batches, batch, seed=0):
-        calls_made.append(len(calls))
-        return [Timing((1e-8 * work * (3.0 if seed else 1.0),) * batches, 1.0) for work in calls]
+    def pretended(names, rounds, batch, seed):
+        stages.append((sorted(names), rounds, batch))
+        return [Timing((speed[name][seed],) * rounds, 7.0 + seed) for name in names]
 
-    monkeypatch.setattr(rounds_module, "timings", slower)
-    monkeypatch.setattr(rounds_module, "_call", lambda _where, _methods, run, *_: run.work)
-    table = timing_rounds(scene, [1.0], runs, rounds=3, size=3).isel(horizon=0)
-    assert len(calls_made) == 2  # the second is three times slower
-    true = 3e-8 * np.array([10.0, 1e3, 1e5])
-    np.testing.assert_allclose(table["seconds"].sel(integrator="strang"), true)  # one of them timed, two predicted
-    np.testing.assert_allclose(
-        table["seconds"].sel(integrator="midpoint"), true
-    )  # no contender: the others' speed ratio
-    assert table["seconds_timed"].values.tolist() == [[0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]
-    assert table["seconds_pace"].values[0] == pytest.approx(3.0)
+    monkeypatch.setattr(rounds_module, "timings", pretended)
+    monkeypatch.setattr(rounds_module, "bare_run", lambda _scene, method, *_: method.name)
+    table = timing_rounds(scene, [1.0], runs, Effort(3, 0.005), Effort(5, 0.01)).isel(horizon=0)
+    assert stages == [
+        (["midpoint", "rk4", "strang"], 3, 0.005),
+        (["midpoint", "strang"], 5, 0.01),
+        (["midpoint"], 5, 0.01),
+    ]
+    row = table.sel(integrator="midpoint").isel(setting=0)
+    assert row["seconds_samples"].values.tolist() == [1.2] * 3 + [1.6] * 5 + [1.4] * 5
+    assert float(row["seconds"]) == 1.2
+    assert float(row["spread"]) == pytest.approx(1.4 / 1.2 - 1.0)
+    assert table["seconds"].isel(setting=1).isnull().all()  # nobody timed it: no time
+    assert float(table["seconds"].sel(integrator="rk4").isel(setting=2)) == 9.0
+    assert table["first_call"].values.tolist() == [7.0] * 3
 
 
 def test_batches_of_a_round_are_neighbours_in_time():
@@ -254,87 +226,76 @@ def timed_study():
     far = [10.0 * scene.nutation_period, 100.0 * scene.nutation_period]
     tables = [(Case("goldstein", name), work_table(scene, symtop.integrator(name), far, 4e4)) for name in LEADERS]
     data = store.combine(tables)
-    runs = timed_runs(data.sel(scene="goldstein"))
-    seconds = timing_rounds(scene, far, runs, rounds=3, batch=0.002, size=data.sizes["setting"])
+    runs = timed_runs(data.sel(scene="goldstein"), ["stormer-verlet"])
+    seconds = timing_rounds(scene, far, runs, Effort(3, 0.001), Effort(3, 0.002))
     return store.combine([*tables, (Case("goldstein", "together"), seconds)]).assign_coords(horizon=[10.0, 100.0])
 
 
-def test_timing_rounds_time_every_leader_and_predict_the_rest(timed_study):
+def test_the_cheapest_runs_of_each_method_have_a_time_and_no_other_run(timed_study):
     assert list(timed_study["integrator"].values) == LEADERS
-    for key, won in ranking.winners(timed_study).items():
-        if won is not None:
-            cell = timed_study.sel(scene="goldstein", integrator=won.best.integrator)
-            run = cell.isel(horizon=key[1], setting=won.best.setting)
-            assert float(run["seconds_timed"]) == 1.0
-            assert float(run["seconds_race"]) >= 1.0
-            assert np.isfinite(run["seconds_samples"].values).sum() == 3
-    ran = np.isfinite(timed_study["seconds"].values)
-    assert np.array_equal(ran, timed_study["outcome"].values == "ok")
-    assert 0 < np.nansum(timed_study["seconds_timed"].values) < ran.sum()
+    ran = timed_study["outcome"] == "ok"
+    least = [least_work(timed_study.transpose(..., "setting"), target) for target in TARGETS]
+    place = xr.DataArray(np.stack(least), dims=("target", *timed_study["axis"].dims[:-1]))
+    cheapest = (timed_study["setting"] == place).any("target")
+    compared = ran & (timed_study["integrator"] == "stormer-verlet") & (timed_study["horizon"] == 100.0)
+    expected, has_time = xr.broadcast(cheapest | compared, timed_study["seconds"].notnull())
+    assert (expected == has_time).all()
+    assert 0 < has_time.sum() < ran.sum()
+    samples = timed_study["seconds_samples"]
+    assert ((samples.notnull().sum("batch") >= 3) == has_time).all()
+    assert (timed_study["seconds"] == samples.min("batch")).where(has_time, True).all()
 
 
-def test_the_variables_that_figures_and_words_read_are_written(timed_study):
-    assert {value for key, value in vars(Column).items() if key.isupper()} <= set(timed_study.data_vars)
+def test_a_chart_shows_timed_runs_against_seconds_and_every_run_against_work(timed_study):
+    seconds, work = (
+        [[point for series in panel for point in series.points] for panel in chart.panels.values()]
+        for chart in opening.charts(timed_study)
+    )
+    ran = (timed_study["outcome"] == "ok").sum(["integrator", "setting"]).values.ravel()
+    assert (
+        list(map(len, seconds))
+        == timed_study["seconds"].notnull().sum(["integrator", "setting"]).values.ravel().tolist()
+    )
+    assert list(map(len, work)) == ran.tolist()
+    assert all(any(f" {unit}," in words for unit in ("us", "ms")) for panel in seconds for *_, words in panel)
+    assert sum("us," in words or "ms," in words for *_, words in work[0]) == len(
+        seconds[0]
+    )  # a time where there is one
 
 
-def test_a_point_of_the_chart_says_whether_its_time_was_measured(timed_study):
-    (chart,) = opening.charts(timed_study)
-    for panel, far in zip(chart.panels.values(), range(2), strict=True):
-        words = [point[2] for series in panel for point in series.points]
-        measured = timed_study["seconds_timed"].isel(scene=0, horizon=far).values == 1.0
-        assert sum("(predicted)" not in one for one in words) == measured.sum()
-        assert any("(predicted)" in one for one in words)
-
-
-def cell(samples, errors=None, tiers=None, races=None):
+def cell(samples, errors=None, tiers=None):
     """One scene and one horizon of a dataset: a setting each, with the given samples."""
     samples = np.asarray(samples, float)
     count = len(samples)
-    races = np.full(count, 1.0) if races is None else np.array(races)
-    names = list("abcdefg"[:count])
     errors = np.full(count, 1e-7) if errors is None else np.asarray(errors)
-    return xr.Dataset(
-        {
-            "seconds": (("integrator", "setting"), samples.min(axis=1)[:, None]),
-            "seconds_samples": (("integrator", "setting", "batch"), samples[:, None, :]),
-            "seconds_race": (
-                ("integrator", "setting"),
-                np.full((count, 1), 1.0) if races is None else np.array(races)[:, None],
-            ),
-            "force_evaluations": (("integrator", "setting"), np.full((count, 1), 100.0)),
-            "axis": (("integrator", "setting"), errors[:, None]),
-            "outcome": (("integrator", "setting"), np.full((count, 1), "ok")),
-            "tier": (("integrator", "setting"), np.array(tiers or ["compiled"] * count)[:, None]),
-        },
-        coords={"integrator": names},
-    )
+    table = {
+        "seconds": np.nanmin(samples, axis=1), "axis": errors, "outcome": np.full(count, "ok"),
+        "tier": np.array(tiers or ["compiled"] * count), "nutation_lag": np.zeros(count),
+    }  # fmt: skip
+    data = xr.Dataset({name: (("integrator", "setting"), values[:, None]) for name, values in table.items()})
+    data["seconds_samples"] = (("integrator", "setting", "batch"), samples[:, None, :])
+    return data.assign_coords(integrator=list("abcdefg"[:count]))
 
 
 def test_a_lead_is_sure_only_if_every_round_agrees_and_it_is_more_than_a_hair():
     clear = ranking.win(cell([[1.0, 1.1, 1.0], [1.3, 1.4, 1.35]]), 1e-6)
     assert clear.best.integrator == "a"
-    assert clear.reliable
+    assert clear.level == ()
+    assert (clear.behind.integrator, clear.ratio) == ("b", pytest.approx(1.3, rel=0.03))
+    assert "1.3 times faster than b)" in work_words.lead(1e-6, cell([[1.0, 1.1, 1.0], [1.3, 1.4, 1.35]]))
     mixed = ranking.win(cell([[1.0, 1.6, 1.0], [1.3, 1.4, 1.35]]), 1e-6)
     assert mixed.level == ("b",)
     hair = ranking.win(cell([[1.0, 1.0, 1.0], [1.05, 1.05, 1.05]]), 1e-6)
-    assert not hair.reliable
+    assert hair.level == ("b",)
 
 
-def settings_of_one(seconds, errors, races):
-    """One method on one scene and horizon: settings coarse to fine."""
-    data = {
-        "seconds": seconds, "axis": errors, "seconds_race": races, "outcome": ["ok"] * len(seconds),
-        "tier": ["compiled"] * len(seconds), "force_evaluations": [10.0**k for k in range(len(seconds))],
-    }  # fmt: skip
-    return xr.Dataset({k: (("integrator", "setting"), [v]) for k, v in data.items()}, {"integrator": ["a"]})
-
-
-def test_a_run_raced_for_a_finer_target_is_not_the_cost_of_a_coarse_one():
-    data = settings_of_one([2.0, 1.0, 7.0], [1e-4, 1e-5, 1e-12], [0.0, 0.0, 1.0])
-    assert ranking.cheapest(data, 1e-3)[0].cost == 1.0  # nothing was raced for it: the least seconds
-    assert ranking.cheapest(data, 1e-11)[0].cost == 7.0
-    data = settings_of_one([2.0, 1.0, 7.0], [1e-4, 1e-5, 1e-12], [1.0, 0.0, 1.0])
-    assert ranking.cheapest(data, 1e-3)[0].cost == 2.0  # raced for it: more sure than a forecast
+def test_the_cost_of_a_target_is_that_of_the_cheapest_timed_run_that_meets_it():
+    rows = {"seconds": [0.5, 2.0, math.nan, 7.0], "axis": [1e-2, 1e-4, 1e-5, 1e-12], "outcome": ["ok"] * 4}
+    data = xr.Dataset({name: (("integrator", "setting"), [values]) for name, values in rows.items()})
+    data = data.assign(tier=("integrator", ["compiled"]), seconds_samples=data["seconds"].expand_dims(batch=3))
+    data = data.assign_coords(integrator=["a"])
+    assert [ranking.cheapest(data, target)[0].cost for target in (1e-1, 1e-3, 3e-5, 1e-12)] == [0.5, 2.0, 7.0, 7.0]
+    assert ranking.cheapest(data, 1e-13) == []
 
 
 def test_a_scene_without_nutation_is_shown_but_not_counted():
@@ -348,28 +309,20 @@ def test_a_scene_without_nutation_is_shown_but_not_counted():
     assert ranking.counted(data.isel(scene=[1]))[1] == []  # nothing else to count
 
 
-def test_a_lead_over_a_rival_that_was_not_timed_is_called_predicted():
-    both, one = (cell([[1.0] * 3, [2.0] * 3], races=races) for races in ([1.0, 1.0], [1.0, 0.0]))
-    assert ranking.win(both, 1e-6).rival_timed
-    assert not ranking.win(one, 1e-6).rival_timed
-    assert "2.0 times faster than b)" in work_words.lead(1e-6, both)
-    assert "2.0 times faster than b, by a predicted time)" in work_words.lead(1e-6, one)
-
-
 def test_a_slow_spell_that_hits_a_whole_round_does_not_blur_a_lead():
     won = ranking.win(cell([[1.0, 3.0, 1.0], [1.3, 4.0, 1.3]]), 1e-6)
-    assert won.reliable
-    apart = ranking.win(cell([[1.0, 3.0, 1.0], [1.3, 4.0, 1.3]], races=[1.0, 2.0]), 1e-6)
+    assert won.level == ()
     restless = ranking.win(cell([[1.0, 1.0, 1.0], [1.3, 5.0, 6.0]]), 1e-6)
-    assert not restless.reliable
-    assert not apart.reliable  # samples of different races are no pairs
+    assert restless.level == ("b",)
 
 
-def test_a_rival_that_was_only_predicted_is_behind_by_no_less_than_predictions_miss():
-    data = cell([[1.0] * 3, [2.0] * 3], races=[1.0, 0.0])
-    assert ranking.win(data, 1e-6).reliable
-    doubtful = data.assign(foreseen_miss=("integrator", [1.5, np.nan]))
-    assert ranking.win(doubtful, 1e-6).level == ("b",)
+def test_samples_are_pairs_only_within_a_round_and_the_last_common_rounds_count():
+    no = math.nan
+    apart = ranking.win(cell([[1.0, 1.0, 1.0, no, no, no], [no, no, no, 2.0, 2.0, 2.0]]), 1e-6)
+    assert apart.level == ("b",)
+    base, later = [1.0, 3.0, 1.0], [1.0] * 5
+    assert ranking.win(cell([[*base, *later], [2.0, 2.0, 2.0, *[1.3] * 5]]), 1e-6).ratio == pytest.approx(1.3)
+    assert ranking.win(cell([[*base, *later], [2.0, 4.0, 2.0, *[no] * 5]]), 1e-6).ratio == pytest.approx(2.0)
 
 
 def test_plain_python_is_ranked_apart_and_a_failure_does_not_win():
@@ -392,19 +345,19 @@ def test_a_crossing_of_two_power_laws_is_found_where_it_is():
         },
         coords={"integrator": ["a", "b"], "scene": "x"},
     )
-    crossing = ranking.crossing(data, "a", "b")
-    assert crossing.dearest_won == pytest.approx(100.0, rel=0.06)
+    crossing = energy.crossing(data, "a", "b")
+    assert crossing.longest_won == pytest.approx(100.0, rel=0.06)
     assert (crossing.at_least, crossing.at_most) == (True, False)
     assert crossing.share == pytest.approx(0.5, abs=0.01)
     assert crossing.gain == pytest.approx(100.0)
-    turned = ranking.crossing(data, "b", "a")
+    turned = energy.crossing(data, "b", "a")
     assert (turned.at_least, turned.at_most) == (False, True)
-    assert turned.dearest_won == pytest.approx(1e4)
+    assert turned.longest_won == pytest.approx(1e4)
 
 
 def test_costs_relative_to_the_best_keep_failures_visible():
     data = cell([[2.0] * 3, [1.0] * 3], errors=[1e-7, 1e-4]).expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
-    ratios = ranking.relative(ranking.costs(data), ["a", "b"])
+    ratios = ranking.relative_costs(data, ["a", "b"])
     assert ratios.sel(target=1e-3).values.ravel().tolist() == [2.0, 1.0]
     assert ratios.sel(target=1e-6).values.ravel().tolist() == [1.0, math.inf]
     assert np.isinf(ratios.sel(target=1e-12).values).all()
