@@ -3,12 +3,13 @@
 import base64
 import datetime
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from symtop.base.validate import SymtopError
-from symtop.methods.registry import integrators
-from symtop.model.scenes import scenes
+from symtop.methods.registry import Integrator, integrators
+from symtop.model.scenes import Scene, scenes
 from symtop.report import interactive, markdown
 from symtop.runner import run as runner
 from symtop.runner import store
@@ -20,47 +21,37 @@ INTRODUCTION = (
 )
 
 
-def integrator_table() -> tuple[list[str], list[list[str]]]:
-    """Header and rows of the table of integrators, from the registry."""
-    records = [entry.record() for entry in integrators().values()]
+def table_of(catalogue: Mapping[str, Integrator | Scene]) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of the table of integrators, or of scenes, from the registry."""
+    records = [entry.record() for entry in catalogue.values()]
     return list(records[0]), [list(record.values()) for record in records]
-
-
-def scene_table() -> tuple[list[str], list[list[str]]]:
-    """Header and rows of the table of scenes."""
-    records = [entry.record() for entry in scenes().values()]
-    return list(records[0]), [list(record.values()) for record in records]
-
-
-def _embedded(path: Path) -> str:
-    return f"data:image/{path.suffix[1:]};base64," + base64.b64encode(path.read_bytes()).decode()
-
-
-BENCHMARKS = ("peers",)  # programs of `benchmarks` that leave findings in the form of a study's
-
-
-def _command(name: str) -> str:
-    return f"make {name}" if name in BENCHMARKS else f"symtop study {name}"
 
 
 def gather(results: Path) -> list[dict[str, Any]]:
-    """The findings of all studies that were run, in the order of the report, with their pictures."""
-    gathered = []
-    for name in [*runner.names(), *BENCHMARKS]:
+    """The findings that are in the folder, with their pictures: of all studies, in order, then of `make` targets.
+
+    A target of the Makefile may leave findings in the form of a study's, as NAME.json. Raises SymtopError if findings
+    are incomplete, or there are none.
+    """
+    studies, gathered = list(runner.names()), []
+    others = sorted({file.stem for file in results.glob("*.json")} - set(studies))
+    for name in [*studies, *others]:
         findings = store.read_json(results / f"{name}.json")
-        if findings is None:
+        if findings is None or (name in others and not (isinstance(findings, dict) and "pictures" in findings)):
             continue
         try:
             for picture in findings["pictures"]:
-                picture["data"] = _embedded(results / "figures" / picture["file"])
+                file = results / "figures" / picture["file"]
+                code = base64.b64encode(file.read_bytes()).decode()
+                picture["data"] = f"data:image/{file.suffix[1:]};base64,{code}"
+            for chart in findings["charts"]:
+                chart["prepared"] = interactive.prepared(chart)
         except (OSError, KeyError, TypeError) as error:
+            command = f"make {name}" if name in others else f"symtop study {name}"
             raise SymtopError(
-                f"the findings of {name} in {results} are incomplete ({error}); run it again: {_command(name)}"
+                f"the findings of {name} in {results} are incomplete ({error}); run it again: {command}"
             ) from error
         findings.setdefault("opening", None)
-        findings["charts"] = [
-            {**chart, "prepared": interactive.prepared(chart)} for chart in findings.get("charts", [])
-        ]
         findings["dataset"] = f"{name}.nc" if (results / f"{name}.nc").is_file() else ""
         gathered.append(findings)
     if not gathered:
@@ -77,15 +68,17 @@ def write(results: Path) -> Path:
     )
     studies = gather(results)
     provenance = studies[-1]["provenance"]
-    facts = {**provenance, "dependencies": _plain(provenance["dependencies"])}
+    versions = json.loads(provenance["dependencies"])
+    facts = {**provenance, "dependencies": ", ".join(f"{name} {version}" for name, version in versions.items())}
+    templates = Path(__file__).parent / "templates"
     text = environment.get_template("report.html").render(
         title=TITLE,
         introduction=INTRODUCTION,
-        css=_part("style.css"),
-        script=_part("chart.js"),
+        css=(templates / "style.css").read_text(encoding="utf-8"),
+        script=(templates / "chart.js").read_text(encoding="utf-8"),
         studies=studies,
-        integrators=integrator_table(),
-        scenes=scene_table(),
+        integrators=table_of(integrators()),
+        scenes=table_of(scenes()),
         provenance=facts,
         quick=any(study["quick"] for study in studies),
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
@@ -95,12 +88,3 @@ def write(results: Path) -> Path:
     opening = ["# " + TITLE, INTRODUCTION, *map(markdown.opening, studies)]
     store.write_text(results / "report.md", markdown.page(studies, opening, facts))
     return target
-
-
-def _part(name: str) -> str:
-    """A piece of the page from the templates, unchanged."""
-    return (Path(__file__).parent / "templates" / name).read_text(encoding="utf-8")
-
-
-def _plain(dependencies: str) -> str:
-    return ", ".join(f"{name} {version}" for name, version in json.loads(dependencies).items())

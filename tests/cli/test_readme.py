@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from symtop.report.markdown import table
-from symtop.report.page import integrator_table
+from symtop.report.page import table_of
 
 registry = importlib.import_module("symtop.methods.registry")
 scenes = importlib.import_module("symtop.model.scenes")
@@ -17,7 +17,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 def test_the_table_of_integrators_is_the_generated_one():
     shown = re.search(r"<!-- integrators -->\n(.*?)\n<!-- /integrators -->", README, re.DOTALL)
     assert shown is not None
-    assert shown.group(1) == table(*integrator_table()), "regenerate: symtop integrators --markdown"
+    assert shown.group(1) == table(*table_of(registry.integrators())), "regenerate: symtop integrators --markdown"
 
 
 def test_every_study_is_explained():
