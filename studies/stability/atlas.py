@@ -32,12 +32,53 @@ class OutcomeMap(NamedTuple):
     settings: np.ndarray  # steps in nutation periods, or tolerances
     control: str  # step_size, tolerance or none
 
+    @property
+    def reach(self) -> np.ndarray:
+        """For each row the largest setting up to which every run is accurate; 0 if the smallest is not."""
+        wrong = self.outcome != 0
+        first = np.where(wrong.any(axis=1), wrong.argmax(axis=1), self.settings.size)
+        return np.where(first > 0, self.settings[np.maximum(first - 1, 0)], 0.0)
 
-def stored_map(data: xr.Dataset, scene: str, name: str) -> OutcomeMap | None:
-    """The map of an integrator over a family of scenes, or None if there is none."""
-    if Column.OUTCOME not in data or scene not in data["scene"].values or name not in data["integrator"].values:
+    @property
+    def usual_reach(self) -> dict[str, float]:
+        """The lower 10 % quantile of the reach of fast tops and of slow tops; NaN where the map has none."""
+        rows = {"fast": self.reach[self.parameter > FAST], "slow": self.reach[self.parameter < SLOW]}
+        return {
+            kind: float(np.quantile(values, LOWER_SHARE, method="lower")) if values.size else math.nan
+            for kind, values in rows.items()
+        }
+
+    @property
+    def shares(self) -> np.ndarray:
+        """The share of the map that each of `VERDICTS` has."""
+        return np.bincount(self.outcome.ravel(), minlength=len(VERDICTS)) / self.outcome.size
+
+    @property
+    def early(self) -> float:
+        """The share of the runs that ended early."""
+        return float(np.mean(self.outcome >= len(JUDGED)))
+
+    @property
+    def silent(self) -> float:
+        """The share of the inaccurate runs that ended without an error."""
+        wrong = self.outcome[self.outcome != 0]
+        return float(np.mean(wrong < len(JUDGED))) if wrong.size else 0.0
+
+    def first_failures(self) -> list[tuple[float, str]]:
+        """Smallest setting at which each outcome but `accurate` and `bounded_but_wrong` is common, smallest first."""
+        rows = max(1, math.ceil(COMMON * self.outcome.shape[0]))
+        starts = []
+        for index, word in enumerate(VERDICTS):
+            columns = np.flatnonzero(np.sum(self.outcome == index, axis=0) >= rows)
+            if columns.size and index not in (0, BOUNDED_BUT_WRONG):
+                starts.append((float(self.settings[columns[0]]), word))
+        return sorted(starts)
+
+
+def map_of(cell: xr.Dataset) -> OutcomeMap | None:
+    """The map in the dataset of one scene and one integrator, or None if there is none."""
+    if Column.OUTCOME not in cell:
         return None
-    cell = data.sel(scene=scene, integrator=name)
     outcome = cell[Column.OUTCOME].values
     rows, columns = (outcome != NOT_RUN).any(axis=1), (outcome != NOT_RUN).any(axis=0)
     if not rows.any():
@@ -46,92 +87,57 @@ def stored_map(data: xr.Dataset, scene: str, name: str) -> OutcomeMap | None:
     return OutcomeMap(outcome[rows][:, columns], parameter, settings, str(cell[Column.CONTROL].values))
 
 
+def maps(data: xr.Dataset, scene: str) -> dict[str, OutcomeMap]:
+    """The maps over a family of scenes by the names of their integrators."""
+    if scene not in data["scene"].values:
+        return {}
+    read = {str(name): map_of(data.sel(scene=scene, integrator=name)) for name in data["integrator"].values}
+    return {name: one for name, one in read.items() if one is not None}
+
+
 def families(data: xr.Dataset) -> list[str]:
     """The scenes that have a map over spin."""
     return [str(name) for name in data["scene"].values if str(name) not in MECHANISMS]
 
 
-def maps(data: xr.Dataset, family: str) -> dict[str, OutcomeMap]:
-    """The maps over a family by the names of their integrators."""
-    read = {str(name): stored_map(data, family, str(name)) for name in data["integrator"].values}
-    return {name: one for name, one in read.items() if one is not None}
-
-
-def reach(one: OutcomeMap) -> np.ndarray:
-    """For each row the largest setting up to which every run is accurate; 0 if the smallest is not."""
-    wrong = one.outcome != 0
-    first = np.where(wrong.any(axis=1), wrong.argmax(axis=1), one.settings.size)
-    return np.where(first > 0, one.settings[np.maximum(first - 1, 0)], 0.0)
-
-
-def first_failures(one: OutcomeMap) -> list[tuple[float, str]]:
-    """Smallest setting at which each outcome but `accurate` and `bounded_but_wrong` is common, smallest first."""
-    rows = max(1, math.ceil(COMMON * one.outcome.shape[0]))
-    starts = []
-    for index, word in enumerate(VERDICTS):
-        if index in (0, BOUNDED_BUT_WRONG):
-            continue
-        columns = np.flatnonzero(np.sum(one.outcome == index, axis=0) >= rows)
-        if columns.size:
-            starts.append((float(one.settings[columns[0]]), word))
-    return sorted(starts)
-
-
-def lower_quantile(values: np.ndarray) -> float:
-    """The lower 10 % quantile; NaN of nothing."""
-    return float(np.quantile(values, LOWER_SHARE, method="lower")) if values.size else math.nan
-
-
 class PoleEffect(NamedTuple):
     """How a pole next to the path changes the reach of a method."""
 
-    away: float  # median reach at gaps of `FAR` and more
-    near: float  # at gaps of `NEAR` and less
+    near: float  # median reach at gaps of `NEAR` and less
+    halves: bool  # is that less than half of the median reach at gaps of `FAR` and more
     width: float  # rad, distance of the pole below which the reach is less than half of that away from it
 
-    @property
-    def halves(self) -> bool:
-        """Is the reach next to the pole less than half of that away from it?"""
-        return self.near < 0.5 * self.away
 
-
-def pole_effect(data: xr.Dataset, name: str) -> PoleEffect | None:
-    """The effect of a pole on a method; None if it has no map over the gap, or nothing to set."""
-    one = stored_map(data, "grazing", name)
+def pole_effect(one: OutcomeMap | None) -> PoleEffect | None:
+    """The effect of a pole on a method by its map over the gap; None if it has none, or nothing to set."""
     if one is None or one.control == "none":
         return None
-    limits, gaps = reach(one), one.parameter
+    limits, gaps = one.reach, one.parameter
     away, near = float(np.median(limits[gaps >= FAR])), float(np.median(limits[gaps <= NEAR]))
-    return PoleEffect(away, near, 1.1 * float(gaps[limits < 0.5 * away].max(initial=0.0)))
+    return PoleEffect(near, near < 0.5 * away, 1.1 * float(gaps[limits < 0.5 * away].max(initial=0.0)))
 
 
-def shares(data: xr.Dataset, family: str) -> dict[str, np.ndarray]:
-    """For each integrator the share of its map that each of `VERDICTS` has."""
-    return {
-        name: np.bincount(one.outcome.ravel(), minlength=len(VERDICTS)) / one.outcome.size
-        for name, one in maps(data, family).items()
-    }
-
-
-def silent_share(one: OutcomeMap) -> float:
-    """Share of a map's inaccurate runs that ended without an error."""
-    wrong = one.outcome != 0
-    silent = wrong & (one.outcome < len(JUDGED))
-    return float(silent.sum() / wrong.sum()) if wrong.any() else 0.0
+PAGES = {
+    "discrete-lagrangian": "discrete Lagrangians",
+    "splitting-angles": "splitting methods in the angles chart",
+    "splitting-space": "splitting methods up to order 4 in charts without poles",
+    "splitting-high-order": "splitting methods above order 4 in charts without poles",
+    "runge-kutta": "explicit Runge-Kutta methods of fixed step",
+    "gauss": "Gauss methods",
+    "adaptive": "adaptive methods and the exact solution",
+    "other": "other methods",
+}
 
 
 def pages(names: Sequence[str]) -> dict[str, list[str]]:
     """The integrators of the atlas by page: one a family, the large splitting family in three."""
-    registered = integrators()
     by_page: dict[str, list[str]] = {}
     for name in names:
-        method = registered.get(name)
+        method = integrators().get(name)
         page = method.family if method else "other"
         if method and page == "splitting":
-            if method.charts() == ("angles",):
-                page = "splitting-angles"
-            else:
-                page = "splitting-space" if (method.order or 2) <= 4 else "splitting-high-order"
+            high = "splitting-high-order" if (method.order or 2) > 4 else "splitting-space"
+            page = "splitting-angles" if method.charts() == ("angles",) else high
         elif method and page == "runge-kutta" and method.symmetric:
             page = "gauss"
         elif method and method.knob != "step_size":

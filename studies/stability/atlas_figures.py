@@ -13,39 +13,29 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.measure.verdicts import VERDICTS
-from symtop.report.style import GREY, OUTCOME_COLORS, use
+from symtop.report.style import GREY, OUTCOME_COLORS, panels
 
-from .atlas import OutcomeMap, stored_map
+from .atlas import OutcomeMap, maps
 from .tables import Column
 
 RASTER = (110, 430)  # pixels of one map, about those it has in the figure
 SHADE = 0.72  # a hatch line is the same colour, darker
-WORDS = {
-    "accurate": "accurate", "bounded_but_wrong": "bounded but wrong", "drifting": "drifting",
-    "wrong_regime": "wrong regime", "left_chart": "left chart", "not_converged": "not converged",
-    "not_finite": "not finite", "step_too_small": "step too small", "out_of_budget": "out of budget",
-}  # fmt: skip
+DARK = ("not_finite", "not_converged", "accurate", "left_chart")  # colours that need white letters
 CONTROLS = {"step_size": "step (nutation periods)", "tolerance": "tolerance", "none": "nothing to set"}
-HATCHES = {
-    "left_chart": "////", "wrong_regime": "\\\\\\\\", "not_converged": "xxxx", "drifting": "----",
-    "step_too_small": "....", "out_of_budget": "||||",
-}  # fmt: skip
-LIMIT, THIRD_TURN, PASSAGE = "-", (0, (4, 2)), (0, (1, 1.5))  # dashes of the lines over a map
+HATCHES = {  # of the legend, and in the map: which pixels, by row and column
+    "left_chart": ("////", lambda row, column: (row + column) % 10 == 0),
+    "wrong_regime": ("\\\\\\\\", lambda row, column: (row - column) % 10 == 0),
+    "not_converged": ("xxxx", lambda row, column: ((row + column) % 10 == 0) | ((row - column) % 10 == 0)),
+    "drifting": ("----", lambda row, column: (row % 6 == 0) & (column >= 0)),
+    "step_too_small": ("....", lambda row, column: (row % 5 == 0) & (column % 5 == 0)),
+    "out_of_budget": ("||||", lambda row, column: (column % 6 == 0) & (row >= 0)),
+}
+LINES = {  # over the maps: label and dashes
+    "limit": ("linear limit", "-"),
+    "third": ("a third of a turn a step", (0, (4, 2))),
+    "passage": ("one step passes the pole", (0, (1, 1.5))),
+}
 FALL_SPEED, FALL_PERIOD = 1.2, 4.22  # of the grazing family: rad/s at the pole, and its nutation period, s
-
-
-def _hatch(word: str, rows: Any, columns: Any) -> Any:
-    """Which pixels of a raster the hatch of an outcome covers."""
-    down, up = (rows + columns) % 10 == 0, (rows - columns) % 10 == 0
-    marks = {
-        "left_chart": down,
-        "wrong_regime": up,
-        "not_converged": down | up,
-        "drifting": rows % 6 == 0,
-        "step_too_small": (rows % 5 == 0) & (columns % 5 == 0),
-        "out_of_budget": columns % 6 == 0,
-    }
-    return marks.get(word, np.zeros_like(down))
 
 
 def painted(outcome: NDArray[np.uint8]) -> NDArray[np.float64]:
@@ -54,12 +44,12 @@ def painted(outcome: NDArray[np.uint8]) -> NDArray[np.float64]:
 
     height, width = RASTER
     big = outcome[np.arange(height) * outcome.shape[0] // height][:, np.arange(width) * outcome.shape[1] // width]
-    rows, columns = np.indices(big.shape)
     image = np.ones((*big.shape, 3))
     for index, word in enumerate(VERDICTS):
         region = big == index
         image[region] = to_rgb(OUTCOME_COLORS[word])
-        image[region & _hatch(word, rows, columns)] *= SHADE
+        if word in HATCHES:
+            image[region & HATCHES[word][1](*np.indices(big.shape))] *= SHADE
     return image
 
 
@@ -68,26 +58,21 @@ def _name_regions(axis: Any, outcome: NDArray[np.uint8], extent: Sequence[float]
     from scipy.ndimage import distance_transform_edt, label
 
     height, width = outcome.shape
-    for index in np.unique(outcome):
-        regions, count = label(outcome == index)
-        if not count:
-            continue
+    for index in map(int, np.unique(outcome)):
+        word = VERDICTS[index].replace("_", " ")
+        regions, _ = label(outcome == index)
         largest = 1 + int(np.argmax(np.bincount(regions.ravel())[1:]))
         # a cell is seen from the text's shape: six times as wide as high
-        across, upright = 1.0 / width * 3.0 / 6.0, 1.0 / height
-        depth = distance_transform_edt(np.pad(regions == largest, 1), sampling=(upright, across))[1:-1, 1:-1]
+        shape = (1.0 / height, 0.5 / width)
+        depth = distance_transform_edt(np.pad(regions == largest, 1), sampling=shape)[1:-1, 1:-1]
         row, column = np.unravel_index(int(np.argmax(depth)), depth.shape)
-        if depth[row, column] < 0.055 or VERDICTS[int(index)] not in WORDS:
+        if depth[row, column] < 0.055:
             continue
-        x = extent[0] + (column + 0.5) / width * (extent[1] - extent[0])
-        y = extent[2] + (row + 0.5) / height * (extent[3] - extent[2])
-        for_word = 0.0085 * len(WORDS[VERDICTS[int(index)]])  # half the width of the text, of the map's
-        x = min(max(x, extent[0] + for_word * (extent[1] - extent[0])), extent[1] - for_word * (extent[1] - extent[0]))
-        y = min(max(y, extent[2] + 0.07 * (extent[3] - extent[2])), extent[3] - 0.07 * (extent[3] - extent[2]))
-        dark = VERDICTS[int(index)] in ("not_finite", "not_converged", "accurate", "left_chart")
+        half = 0.0085 * len(word)  # of the text's width, in units of the map's
+        x, y = np.clip((column + 0.5) / width, half, 1.0 - half), np.clip((row + 0.5) / height, 0.07, 0.93)
         axis.text(
-            x, y, WORDS[VERDICTS[int(index)]], ha="center", va="center", fontsize=7.5, weight="bold",
-            color="white" if dark else "black",
+            extent[0] + x * (extent[1] - extent[0]), extent[2] + y * (extent[3] - extent[2]), word, ha="center",
+            va="center", fontsize=7.5, weight="bold", color="white" if VERDICTS[index] in DARK else "black",
         )  # fmt: skip
 
 
@@ -99,103 +84,79 @@ def _edges(values: NDArray[np.float64]) -> tuple[float, float]:
     return float(np.log10(values[0]) - half), float(np.log10(values[-1]) + half)
 
 
-def _ticks(axis: Any, which: str, ends: tuple[float, float]) -> None:
+def _ticks(ends: tuple[float, float]) -> tuple[range, list[str]]:
+    """Places and names of the powers of ten between two decimal logarithms."""
     powers = range(int(np.ceil(ends[0] - 1e-9)), int(np.floor(ends[1] + 1e-9)) + 1)
-    step = 1 if len(powers) <= 5 else 2 if len(powers) <= 8 else 3
-    shown = powers[::step]
-    names = [f"{10.0**k:g}" if -3 <= k <= 2 else rf"$10^{{{k}}}$" for k in shown]
-    getattr(axis, f"set_{which}ticks")(shown, names, fontsize=7.5)
+    shown = powers[:: 1 if len(powers) <= 5 else 2 if len(powers) <= 8 else 3]
+    return shown, [f"{10.0**k:g}" if -3 <= k <= 2 else rf"$10^{{{k}}}$" for k in shown]
 
 
 def draw_map(axis: Any, one: OutcomeMap) -> None:
     """One map; parameter upwards, step or tolerance to the right, both logarithmic."""
     x, y = _edges(one.settings), _edges(one.parameter)
-    extent = (*x, *y)
-    axis.imshow(painted(one.outcome), origin="lower", extent=extent, aspect="auto", interpolation="nearest")
-    _name_regions(axis, one.outcome, extent)
+    axis.imshow(painted(one.outcome), origin="lower", extent=(*x, *y), aspect="auto", interpolation="nearest")
+    _name_regions(axis, one.outcome, (*x, *y))
     axis.grid(visible=False)
-    if one.control == "none":
-        axis.set_xticks([])
-    else:
-        _ticks(axis, "x", x)
-    _ticks(axis, "y", y)
+    axis.set_xticks(*(([], []) if one.control == "none" else _ticks(x)), fontsize=7.5)
+    axis.set_yticks(*_ticks(y), fontsize=7.5)
 
 
-def _line(axis: Any, x: Any, y: Any, dashes: Any) -> None:
+def _line(axis: Any, x: Any, y: Any, name: str) -> None:
+    """One of `LINES` over a map, with a white edge."""
     from matplotlib.patheffects import Normal, Stroke
 
-    ends = axis.get_xlim(), axis.get_ylim()
-    axis.plot(
-        np.log10(x), np.log10(y), color="black", lw=1.1, ls=dashes,
-        path_effects=[Stroke(linewidth=2.6, foreground="white"), Normal()],
-    )  # fmt: skip
-    axis.set(xlim=ends[0], ylim=ends[1])
-
-
-def _overlay(axis: Any, cell: xr.Dataset) -> None:
-    """The linear limit and the third of a turn over a map over spin."""
-    if Column.LINEAR_LIMIT not in cell:
-        return
-    for variable, dashes in ((Column.LINEAR_LIMIT, LIMIT), (Column.THIRD_TURN, THIRD_TURN)):
-        x, y = cell[variable].values, cell[Column.LIMIT_PARAMETER].values
-        if np.isfinite(x).sum() > 1:
-            _line(axis, x, y, dashes)
+    if np.isfinite(x).sum() > 1:
+        ends = {"xlim": axis.get_xlim(), "ylim": axis.get_ylim()}
+        edge = [Stroke(linewidth=2.6, foreground="white"), Normal()]
+        axis.plot(np.log10(x), np.log10(y), color="black", lw=1.1, ls=LINES[name][1], path_effects=edge)
+        axis.set(**ends)
 
 
 def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: Mapping[str, str]) -> Any:
     """One row an integrator: its map over spin and step, its map over the gap to a pole and step, its sentence."""
-    import matplotlib.pyplot as plt
-
-    use()
-    grazed = any(stored_map(data, "grazing", name) is not None for name in names)
-    figure, axes = plt.subplots(
-        len(names), 1 + grazed, figsize=(8.4, 1.7 * len(names) + 0.95), squeeze=False,
-        gridspec_kw={"width_ratios": [1.25, 1.0][: 1 + grazed]},
-    )  # fmt: skip
-    shown: set[int] = set()
-    controls = [one.control if (one := stored_map(data, family, name)) else "" for name in names]
+    over_spin, over_gap = maps(data, family), maps(data, "grazing")
+    grazed = any(name in over_gap for name in names)
+    ratios = {"width_ratios": [1.25, 1.0][: 1 + grazed]}
+    figure, axes = panels(len(names), 1 + grazed, width=8.4, height=1.7, gridspec_kw=ratios)
+    drawn: dict[str, None] = {}  # outcomes and lines, for the legend
+    controls = [over_spin[name].control for name in names]
     for line, name, control, below in zip(axes, names, controls, [*controls[1:], None], strict=True):
-        for axis, scene, label in zip(line, (family, "grazing"), ("spin r", r"gap $\delta$"), strict=False):
-            one = stored_map(data, scene, name)
+        for axis, drawn_maps, label in zip(line, (over_spin, over_gap), ("spin r", r"gap $\delta$"), strict=False):
+            one = drawn_maps.get(name)
             if one is None:
                 axis.set_visible(False)
                 continue
-            shown |= {int(k) for k in np.unique(one.outcome)}
+            drawn |= dict.fromkeys(VERDICTS[k] for k in np.unique(one.outcome))
             draw_map(axis, one)
             axis.set_ylabel(label, fontsize=8.5)
-            if scene == family:
-                _overlay(axis, data.sel(scene=scene, integrator=name))
-            elif one.control == "step_size":  # the step in which the axis falls past the pole: speed times h = 1.1 gap
-                _line(axis, 1.1 * one.parameter / FALL_SPEED / FALL_PERIOD, one.parameter, PASSAGE)
+            if drawn_maps is over_spin and Column.LINEAR_LIMIT in data:
+                cell = data.sel(scene=family, integrator=name)
+                for variable, kind in ((Column.LINEAR_LIMIT, "limit"), (Column.THIRD_TURN, "third")):
+                    _line(axis, cell[variable].values, cell[Column.LIMIT_PARAMETER].values, kind)
+            elif (
+                drawn_maps is over_gap and one.control == "step_size"
+            ):  # the fall at 1.1 gap past the pole takes one step
+                _line(axis, 1.1 * one.parameter / FALL_SPEED / FALL_PERIOD, one.parameter, "passage")
             if below != control:
                 axis.set_xlabel(CONTROLS[one.control], fontsize=8.5)
-        _caption(line[0], name, sentences[name])
-    handles = _legend(shown, steps="step_size" in controls, grazed=grazed)
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+        lines = textwrap.wrap(sentences[name], 128)
+        line[0].set_title("\n".join(["", *lines]), loc="left", fontsize=8.0)
+        line[0].annotate(
+            name, (0.0, 1.0), (0.0, 5.5 + 11.2 * len(lines)), xycoords="axes fraction", textcoords="offset points",
+            fontsize=9.0, weight="bold", annotation_clip=False,
+        )  # fmt: skip
+    shown = [word for word in VERDICTS if word in drawn]
+    shown += list(LINES)[: 2 + grazed] if "step_size" in controls else []
+    figure.legend(handles=list(map(_handle, shown)), loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure
 
 
-def _legend(shown: set[int], *, steps: bool, grazed: bool) -> list[Any]:
-    """A patch for each outcome that is drawn, and the lines over the maps where there are steps."""
+def _handle(name: str) -> Any:
+    """The entry of the legend for an outcome, or for one of `LINES`."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    words = [VERDICTS[k] for k in sorted(shown) if k < len(VERDICTS)]
-    handles: list[Any] = [
-        Patch(facecolor=OUTCOME_COLORS[word], label=WORDS[word], hatch=HATCHES.get(word), edgecolor=GREY, lw=0.4)
-        for word in words
-    ]
-    lines = ((LIMIT, "linear limit"), (THIRD_TURN, "a third of a turn a step"), (PASSAGE, "one step passes the pole"))
-    for dashes, label in lines[: (2 + grazed) * steps]:
-        handles.append(Line2D([], [], color="black", lw=1.1, ls=dashes, label=label))
-    return handles
-
-
-def _caption(axis: Any, name: str, sentence: str) -> None:
-    """The integrator's name, and below it its sentence, over a row of maps."""
-    lines = textwrap.wrap(sentence, 128)
-    axis.set_title("\n".join(["", *lines]), loc="left", fontsize=8.0)
-    axis.annotate(
-        name, (0.0, 1.0), (0.0, 5.5 + 11.2 * len(lines)), xycoords="axes fraction", textcoords="offset points",
-        fontsize=9.0, weight="bold", annotation_clip=False,
-    )  # fmt: skip
+    if name in LINES:
+        return Line2D([], [], color="black", lw=1.1, ls=LINES[name][1], label=LINES[name][0])
+    hatch = HATCHES[name][0] if name in HATCHES else None
+    return Patch(facecolor=OUTCOME_COLORS[name], label=name.replace("_", " "), hatch=hatch, edgecolor=GREY, lw=0.4)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.measure.verdicts import ROUNDING, barriers, judge
+from symtop.measure.verdicts import NO_GAP, barriers, judge
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.registry import Integrator, Plan, solve
 from symtop.model import charts, scenes
@@ -81,14 +81,14 @@ def row_plan(method: Integrator, settings: Sequence[float], periods: float) -> R
     return RowPlan(method, tuple(settings), tuple(steps), tuple(marks), phases)
 
 
-class Row(NamedTuple):
-    """What became of the runs of one row."""
+class Judged(NamedTuple):
+    """What became of the runs of one row of a map, or of all its rows; the last dimension is that of the settings."""
 
     verdict: NDArray[np.uint8]  # index into VERDICTS
     axis_error: Array  # largest over the run; NaN if it ended early
 
 
-def row(runs: RowPlan, scene: Scene) -> Row:
+def row(runs: RowPlan, scene: Scene) -> Judged:
     """Run and judge one row of a map: one scene at every setting."""
     chart = runs.method.chart_for("axis")
     period = scene.nutation_period
@@ -96,7 +96,11 @@ def row(runs: RowPlan, scene: Scene) -> Row:
     shape = runs.phases.shape
     states, momenta = np.full((*shape, charts.DIMENSIONS[chart]), math.nan), np.full((2, *shape), math.nan)
     for k, value in enumerate(runs.settings):
-        run = solve(runs.method, chart, scene.top, scene.start, _plan(runs, k, value, period))
+        if runs.steps:
+            plan = Plan.steps(value * period, runs.marks[k], runs.steps[k] * (value * period))
+        else:
+            plan = Plan.until(runs.phases[k] * period, value)
+        run = solve(runs.method, chart, scene.top, scene.start, plan)
         count = len(run.p_phi)
         states[k, :count] = run.states
         momenta[0, k, :count], momenta[1, k, :count] = run.p_phi, run.p_psi
@@ -107,14 +111,7 @@ def row(runs: RowPlan, scene: Scene) -> Row:
         return _judged(scene, view(chart, scene.top, states, *momenta), runs.phases, outcome)
 
 
-def _plan(runs: RowPlan, k: int, value: float, period: float) -> Plan:
-    if runs.method.knob == "step_size":
-        h = value * period
-        return Plan.steps(h, runs.marks[k], runs.steps[k] * h)
-    return Plan.until(runs.phases[k] * period, value)
-
-
-def _judged(scene: Scene, seen: View, phases: Array, outcome: NDArray[np.int64]) -> Row:
+def _judged(scene: Scene, seen: View, phases: Array, outcome: NDArray[np.int64]) -> Judged:
     energy = seen.energy
     drift = np.abs(energy - energy[:, :1]) / scene.energy_scale
     half = SAMPLES // 2
@@ -126,12 +123,12 @@ def _judged(scene: Scene, seen: View, phases: Array, outcome: NDArray[np.int64])
     error = np.fmax.reduce(charts.axis_distance(seen.axis, true_axis(scene, phases)), axis=1)
     error[outcome != 0] = math.nan
     start = scene.top.momenta(scene.start)
-    least, passed = ROUNDING * scene.momentum_scale, np.zeros(len(outcome), dtype=bool)
+    least, passed = NO_GAP * scene.momentum_scale, np.zeros(len(outcome), dtype=bool)
     for gap, now in ((start.north, seen.p_phi - seen.p_psi), (start.south, seen.p_phi + seen.p_psi)):
         if abs(gap) > least:
             passed |= (now * gap < 0.0).any(axis=1)
     low, high = np.fmin.reduce(seen.theta, axis=1), np.fmax.reduce(seen.theta, axis=1)
-    return Row(judge(_barriers(scene), outcome, error, low, high, early, late, passed), error)
+    return Judged(judge(_barriers(scene), outcome, error, low, high, early, late, passed), error)
 
 
 _barriers = functools.lru_cache(maxsize=512)(barriers)
@@ -148,17 +145,10 @@ def true_axis(scene: Scene, phases: Array) -> Array:
     return axis
 
 
-class Map(NamedTuple):
-    """One integrator's map; rows are scenes of the family, columns settings of its control."""
-
-    verdict: NDArray[np.uint8]
-    axis_error: Array
-
-
 def outcome_map(
     name: str, parameters: Sequence[float], method: Integrator, settings: Sequence[float], periods: float
-) -> Map:
-    """Run and judge a whole map of the family of scenes called `name`."""
+) -> Judged:
+    """Run and judge a whole map of the family of scenes called `name`: a row a scene, a column a setting."""
     runs, scene_at = row_plan(method, settings, periods), family(name)
-    rows = [row(runs, scene_at(float(value))) for value in parameters]
-    return Map(np.stack([entry.verdict for entry in rows]), np.stack([entry.axis_error for entry in rows]))
+    verdicts, errors = zip(*(row(runs, scene_at(float(value))) for value in parameters), strict=True)
+    return Judged(np.stack(verdicts), np.stack(errors))

@@ -16,7 +16,7 @@ import numpy as np
 from symtop.methods import discrete_lagrangian
 from symtop.methods.angles import reduced
 from symtop.methods.compiled import compile_kernel, register_jitable
-from symtop.methods.registry import Integrator
+from symtop.methods.quadrature import Quadrature
 from symtop.model import top as model
 from symtop.model.scenes import Scene
 
@@ -59,34 +59,32 @@ class SolverError(NamedTuple):
     """What a badly solved equation does to the constants of the motion."""
 
     energy: float  # largest |E - E0|
-    momentum: float  # largest |p - p0| of p_phi and p_psi; NaN where they are parameters
+    momentum: float  # largest |p - p0| of p_phi and p_psi
     iterations: float  # a step
 
 
-def textbook_midpoint(scene: Scene, h: float, steps: int, tolerance: float, iterations: int = 50) -> SolverError:
-    """The textbook's midpoint rule, whose Newton iteration stops after a correction of at most `tolerance` rad."""
+def textbook_midpoint(scene: Scene, h: float, steps: int, tolerance: float, iterations: int = 50) -> float:
+    """Largest |E - E0| of the midpoint rule if Newton stops after a correction of at most `tolerance` rad."""
     par, state = reduced(scene.top, scene.start)
     marks = np.unique(np.linspace(0, steps, SAMPLES).astype(np.int64))
     samples = np.full((marks.size, 2), math.nan)
     _compiled_textbook()(par, state[0], state[1], h, tolerance, iterations, marks, samples)
-    momenta = scene.top.momenta(scene.start)
-    with np.errstate(all="ignore"):
-        energy = scene.top.reduced_energy(samples[:, 0], samples[:, 1], momenta.p_phi, momenta.p_psi)
-    return SolverError(float(np.nanmax(np.abs(energy - energy[0]))), math.nan, math.nan)
+    return _energy_error(scene, samples)
 
 
-def solver_sweep(method: Integrator, scene: Scene, h: float, steps: int, tolerance: float) -> SolverError:
+def solver_sweep(rule: Quadrature, scene: Scene, h: float, steps: int, tolerance: float) -> SolverError:
     """A discrete Lagrangian of this package, its iteration stopped at `tolerance` of the increment (inf: after one)."""
-    rule = discrete_lagrangian.rule_of(method)
-    if rule is None:
-        return SolverError(math.nan, math.nan, math.nan)
     par, state = reduced(scene.top, scene.start)
     marks = np.unique(np.linspace(0, steps, SAMPLES).astype(np.int64))
     done = discrete_lagrangian.march(par, rule._replace(tolerance=tolerance), state, h, marks)
     momenta = scene.top.momenta(scene.start)
     with np.errstate(all="ignore"):
-        energy = scene.top.reduced_energy(done.states[:, 0], done.states[:, 1], momenta.p_phi, momenta.p_psi)
         lost = np.abs(done.momenta[1:] - np.array([momenta.p_phi, momenta.p_psi]))
-    return SolverError(
-        float(np.nanmax(np.abs(energy - energy[0]))), float(np.nanmax(lost)), done.work / max(done.steps, 1)
-    )
+    return SolverError(_energy_error(scene, done.states), float(np.nanmax(lost)), done.work / max(done.steps, 1))
+
+
+def _energy_error(scene: Scene, states: np.ndarray) -> float:
+    momenta = scene.top.momenta(scene.start)
+    with np.errstate(all="ignore"):
+        energy = scene.top.reduced_energy(states[:, 0], states[:, 1], momenta.p_phi, momenta.p_psi)
+        return float(np.nanmax(np.abs(energy - energy[0])))

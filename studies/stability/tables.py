@@ -5,7 +5,7 @@ the scene they belong to; phases are h omega, the step times the angular frequen
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -26,45 +26,29 @@ PAST_RESONANCE = 1.05  # times the resonant step: far enough for what a resonanc
 
 
 class Column:
-    """Names of the variables of the study's dataset."""
+    """Names of the variables of the study's dataset, with dimensions."""
 
-    # maps of outcomes, dimensions parameter and setting
-    OUTCOME = "outcome"
-    PARAMETER = "parameter_value"  # relative spin, or gap delta
-    SETTING = "knob"  # step in nutation periods, or tolerance
-    CONTROL = "knob_name"  # step_size, tolerance or none
-    GRID = "grid"  # settings x parameters
-    # along a map over spin, dimension curve
-    LIMIT_PARAMETER = "limit_parameter"
-    LINEAR_LIMIT = "linear_limit"
-    THIRD_TURN = "third_turn"
-    # one column of the map over the gap to a pole
-    SHOWN_SETTING = "shown_knob"
-    GRAZING_ERROR = "grazing_error"
-    # resonances, dimension phase
-    PHASE = "phase_value"
-    SURVIVING = "surviving"
-    LIMIT_PHASE = "limit_phase"
-    THIRD_TURN_PHASE = "third_turn_phase"
-    SURVIVING_AT_THIRD_TURN = "surviving_at_third_turn"
-    SURVIVING_PAST_THIRD_TURN = "surviving_past_third_turn"
-    # the sleeping top, dimension rung
-    SLEEPING_STEP = "sleeping_step"
-    SLEEPING_THRESHOLD = "sleeping_threshold"
-    # next to the separatrix, dimension setting
-    EARLY_ERROR = "early_error"
-    HORIZON = "horizon"
-    PREDICTED_HORIZON = "predicted_horizon"
-    # sampling
-    ENERGY_ONCE = "energy_once"
-    ENERGY_EVERY = "energy_every"
-    # the solver of an implicit method, dimension tolerance_setting
-    SOLVER_TOLERANCE = "solver_tolerance"
-    SOLVER_ENERGY = "solver_energy"
-    SOLVER_MOMENTUM = "solver_momentum"
-    SOLVER_ITERATIONS = "solver_iterations"
-    TEXTBOOK_ENERGY = "plain_energy"
-    ONE_ITERATION_ENERGY = "one_iteration_energy"
+    # maps of outcomes; parameter (relative spin or gap delta), setting (steps in nutation periods, or tolerances)
+    OUTCOME, PARAMETER, SETTING = "outcome", "parameter_value", "knob"
+    CONTROL, GRID = "knob_name", "grid"  # step_size, tolerance or none; settings x parameters
+    # limits of a step along a map over spin; curve
+    LIMIT_PARAMETER, LINEAR_LIMIT, THIRD_TURN = "limit_parameter", "linear_limit", "third_turn"
+    # one column of the map over the gap to a pole; parameter
+    SHOWN_SETTING, GRAZING_ERROR = "shown_knob", "grazing_error"
+    # resonances: largest displacement that survives at h omega; phase. Linear limit, a third of a turn, what survives
+    PHASE, SURVIVING = "phase_value", "surviving"
+    LIMIT_PHASE, THIRD_TURN_PHASE = "limit_phase", "third_turn_phase"
+    SURVIVING_AT_THIRD_TURN, SURVIVING_PAST_THIRD_TURN = "surviving_at_third_turn", "surviving_past_third_turn"
+    # the sleeping top; rung
+    SLEEPING_STEP, SLEEPING_THRESHOLD = "sleeping_step", "sleeping_threshold"
+    # next to the separatrix; setting
+    EARLY_ERROR, HORIZON, PREDICTED_HORIZON = "early_error", "horizon", "predicted_horizon"
+    # an energy error that is sampled once a nutation, and at every step
+    ENERGY_ONCE, ENERGY_EVERY = "energy_once", "energy_every"
+    # the solver of an implicit method; tolerance_setting
+    SOLVER_TOLERANCE, SOLVER_ITERATIONS = "solver_tolerance", "solver_iterations"
+    SOLVER_ENERGY, SOLVER_MOMENTUM = "solver_energy", "solver_momentum"
+    TEXTBOOK_ENERGY, ONE_ITERATION_ENERGY = "plain_energy", "one_iteration_energy"
 
 
 def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
@@ -92,7 +76,7 @@ def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.
     return xr.Dataset(table)
 
 
-def family_limits(name: str, method: Integrator, parameter: float, most: float) -> tuple[float, float]:
+def family_limits(name: str, method: Integrator, parameter: float, longest: float) -> tuple[float, float]:
     """Linear limit and third of a turn, in nutation periods, at the steady precession with a scene's momenta."""
     member = family(name)(parameter)
     momenta, period = member.top.momenta(member.start), member.nutation_period
@@ -100,7 +84,7 @@ def family_limits(name: str, method: Integrator, parameter: float, most: float) 
     if not 0.0 < theta < math.pi or not math.isfinite(period):
         return math.nan, math.nan
     steady = Scene(member.name, member.top, with_momenta(member.top, theta, momenta), member.horizon)
-    limit, third = linear_limits(method, steady, np.geomspace(0.05, most, 48) * period)
+    limit, third = linear_limits(method, steady, np.geomspace(0.05, longest, 48) * period)
     return limit / period, third / period
 
 
@@ -110,60 +94,59 @@ def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) 
     omega = scene.top.nutation_frequency(scene.top.momenta(scene.start))
     phases = np.asarray(settings["phases"], float)
     limit, third = linear_limits(method, scene, np.linspace(0.02, phases[-1], 120) / omega)
-    alive = [surviving_displacement(method, scene, float(x) / omega, settings["steps"]) for x in phases]
-    at, past = math.nan, math.nan
-    if math.isfinite(third):
-        at, past = (surviving_displacement(method, scene, x * third, settings["steps"]) for x in (1.0, PAST_RESONANCE))
+
+    def surviving(h: float) -> float:
+        return surviving_displacement(method, scene, h, settings["steps"]) if math.isfinite(h) else math.nan
+
     return xr.Dataset(
         {
             Column.PHASE: ("phase", phases),
-            Column.SURVIVING: ("phase", alive),
+            Column.SURVIVING: ("phase", [surviving(float(x) / omega) for x in phases]),
             Column.LIMIT_PHASE: limit * omega,
             Column.THIRD_TURN_PHASE: third * omega,
-            Column.SURVIVING_AT_THIRD_TURN: at,
-            Column.SURVIVING_PAST_THIRD_TURN: past,
+            Column.SURVIVING_AT_THIRD_TURN: surviving(third),
+            Column.SURVIVING_PAST_THIRD_TURN: surviving(PAST_RESONANCE * third),
         }
     )
 
 
 def sleeping_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
     """The spin at which the upright top begins to sleep, against the step."""
-    steps = settings["steps"]
-    return xr.Dataset(
-        {
-            Column.SLEEPING_STEP: ("rung", np.asarray(steps, float)),
-            Column.SLEEPING_THRESHOLD: ("rung", [sleeping_threshold(method, float(h)) for h in steps]),
-        }
-    )
+    steps = np.asarray(settings["steps"], float)
+    thresholds = [sleeping_threshold(method, float(h)) for h in steps]
+    return xr.Dataset({Column.SLEEPING_STEP: ("rung", steps), Column.SLEEPING_THRESHOLD: ("rung", thresholds)})
 
 
 def separatrix_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
     """How long runs next to the separatrix stay right, and how long their early error says that they will."""
     rows = [separatrix_horizon(method, scenes.scene(name), float(value)) for value in settings["ladder"]]
-    columns: Sequence[Any] = list(zip(*rows, strict=True))
-    names = (Column.EARLY_ERROR, Column.HORIZON, Column.PREDICTED_HORIZON)
-    return xr.Dataset({key: ("setting", np.asarray(column)) for key, column in zip(names, columns, strict=True)})
+    return xr.Dataset(
+        {
+            Column.EARLY_ERROR: ("setting", [row.error for row in rows]),
+            Column.HORIZON: ("setting", [row.reached for row in rows]),
+            Column.PREDICTED_HORIZON: ("setting", [row.predicted for row in rows]),
+        }
+    )
 
 
 def sampling_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
     """An energy error as it looks once a nutation and at every step; for discrete Lagrangians, the solver's share."""
-    scene = scenes.scene(name)
+    scene, rule = scenes.scene(name), rule_of(method)
     once, every = sampled_energy_error(method, scene, settings["steps"], settings["periods"])
     table: dict[str, Any] = {Column.ENERGY_ONCE: once, Column.ENERGY_EVERY: every}
-    if rule_of(method) is not None:
-        tolerances = settings["tolerances"]
-        h, steps = settings["step_size"], settings["solver_steps"]
-        rows = [solver_sweep(method, scene, h, steps, float(value)) for value in tolerances]
-        table |= {
-            Column.SOLVER_TOLERANCE: ("tolerance_setting", np.asarray(tolerances, float)),
-            Column.SOLVER_ENERGY: ("tolerance_setting", [entry.energy for entry in rows]),
-            Column.SOLVER_MOMENTUM: ("tolerance_setting", [entry.momentum for entry in rows]),
-            Column.SOLVER_ITERATIONS: ("tolerance_setting", [entry.iterations for entry in rows]),
+    if rule is not None:
+        run, tolerances = (scene, settings["step_size"], settings["solver_steps"]), settings["tolerances"]
+        rows = [solver_sweep(rule, *run, float(value)) for value in tolerances]
+        columns = {
+            Column.SOLVER_TOLERANCE: tolerances,
+            Column.SOLVER_ENERGY: [entry.energy for entry in rows],
+            Column.SOLVER_MOMENTUM: [entry.momentum for entry in rows],
+            Column.SOLVER_ITERATIONS: [entry.iterations for entry in rows],
         }
         if is_midpoint(method):
-            textbook = [textbook_midpoint(scene, h, steps, float(value)).energy for value in tolerances]
-            table[Column.TEXTBOOK_ENERGY] = ("tolerance_setting", textbook)
-            table[Column.ONE_ITERATION_ENERGY] = textbook_midpoint(scene, h, steps, 0.0, 1).energy
+            columns[Column.TEXTBOOK_ENERGY] = [textbook_midpoint(*run, float(value)) for value in tolerances]
+            table[Column.ONE_ITERATION_ENERGY] = textbook_midpoint(*run, 0.0, 1)
+        table |= {column: ("tolerance_setting", np.asarray(values, float)) for column, values in columns.items()}
     return xr.Dataset(table)
 
 

@@ -1,12 +1,21 @@
-"""What the stability study says in words and tables, all of it from its dataset."""
+"""What the stability study says in words and tables, all of it from its dataset.
 
+Each measured mechanism stands beside what theory says. A quick or a partial study says less.
+"""
+
+import math
+from collections.abc import Collection, Mapping
+
+import numpy as np
 import xarray as xr
 
+from symtop.methods.registry import Integrator, integrators
 from symtop.runner.study import Table
 
-from .atlas import families
-from .atlas_words import all_advice, summary
-from .mechanism_words import limit_table, mechanism_sentences
+from .atlas import NEAR, families, map_of, pole_effect
+from .atlas_words import advice, summary
+from .failures import LOST, SEEN
+from .tables import MECHANISMS, Column
 
 HOW_TO_READ = (
     "A map has one cell a run. To the right the step or the tolerance grows; upwards the spin r, or the gap delta "
@@ -16,6 +25,156 @@ HOW_TO_READ = (
     "of a turn. A limit for fast tops (r > 3) or slow tops (r < 1) holds for nine rows in ten; a method first fails in "
     "some way at the smallest step or tolerance at which one row in twenty does."
 )
+LOOSE = 10.0  # times the change of the solved equation: lost because the solver's tolerance is too loose
+BARELY = 0.02  # rad: a largest surviving displacement below this counts as none
+REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
+EARLY = 1e-15, 1e-2  # rad, axis errors that predict the time next to a separatrix: above rounding, still small
+
+
+def _rows(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
+    """The integrators that have a value of a variable, by name."""
+    cells = {str(name): part.sel(integrator=name) for name in part["integrator"].values}
+    return {name: cell for name, cell in cells.items() if np.isfinite(cell[variable].values).any()}
+
+
+def _methods(part: xr.Dataset) -> dict[str, Integrator]:
+    """The integrators of a dataset that are registered."""
+    return {name: method for name, method in integrators().items() if name in part["integrator"].values}
+
+
+def _listed(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{value:.4f} for {name}" for name, value in sorted(values.items(), key=lambda one: one[1]))
+
+
+def poles(part: xr.Dataset) -> str:
+    """Which methods need shorter steps where a pole is next to the path."""
+    halved: dict[bool, list[bool]] = {True: [], False: []}  # by: is it in the angles chart
+    for name, method in _methods(part).items():
+        effect = pole_effect(map_of(part.sel(integrator=name)))
+        if effect is not None and method.knob == "step_size":
+            halved[method.charts() == ("angles",)].append(effect.halves)
+    if not halved[True] + halved[False]:
+        return ""
+    return (
+        f"A pole closer than {NEAR:g} rad to the path at least halves the accurate step of {sum(halved[True])} of "
+        f"{len(halved[True])} fixed-step methods in the angles chart, and of {sum(halved[False])} of "
+        f"{len(halved[False])} in charts without poles."
+    )
+
+
+def limits(part: xr.Dataset) -> str:
+    """Linear limits of the step."""
+    phases = {name: float(cell[Column.LIMIT_PHASE]) for name, cell in _rows(part, Column.LIMIT_PHASE).items()}
+    growing = "Small nutations about a steady precession grow from h omega (step times nutation frequency) = "
+    return f"{growing}{_listed(phases)}." if phases else ""
+
+
+def resonances(part: xr.Dataset) -> str:
+    """The linearly stable steps at which hardly any displacement survives."""
+    resonant = {}
+    for name, cell in _rows(part, Column.THIRD_TURN_PHASE).items():
+        at, past = float(cell[Column.SURVIVING_AT_THIRD_TURN]), float(cell[Column.SURVIVING_PAST_THIRD_TURN])
+        if past > REVIVAL * at and at < BARELY:
+            resonant[name] = float(cell[Column.THIRD_TURN_PHASE])
+    if not resonant:
+        return ""
+    return (
+        f"A step that advances the nutation by a third of a turn is linearly stable, but a top displaced by "
+        f"{BARELY:g} rad or more leaves its steady precession. This step is h omega = {_listed(resonant)} (theory: "
+        "sqrt 3 = 1.7321 for Verlet, 2 sqrt 3 = 3.4641 for the midpoint rule)."
+    )
+
+
+def sleepers(part: xr.Dataset) -> str:
+    """The sleeping thresholds of methods that move it, beside their closed forms."""
+    moved, methods = [], _methods(part)
+    for name, cell in _rows(part, Column.SLEEPING_THRESHOLD).items():
+        if name in methods and (theory := methods[name].sleeps_from) is not None:
+            good = np.isfinite(cell[Column.SLEEPING_THRESHOLD].values)
+            h, measured = cell[Column.SLEEPING_STEP].values[good], cell[Column.SLEEPING_THRESHOLD].values[good]
+            miss = np.max(np.abs(measured - np.array([theory(float(x)) for x in h])))
+            moved.append(f"{measured[-1]:.6f} with {name} at h = {h[-1]:g}, within {miss:.0e} of theory")
+    if not moved:
+        return ""
+    return (
+        "The true top sleeps (spins upright and stays so) from a spin I3 w3 of 2 on, if I1 = mgl = 1. A step moves "
+        f"this threshold, to {'; to '.join(moved)}."
+    )
+
+
+def horizons(part: xr.Dataset) -> str:
+    """Is the accurate time next to a separatrix what the early error says?"""
+    names = (Column.HORIZON, Column.PREDICTED_HORIZON, Column.EARLY_ERROR)
+    horizon, predicted, early = (part[name].values for name in names)
+    methods = _methods(part)
+    conserving = np.array([name in methods and "energy" in (methods[name].conserves or ())
+                           for name in part["integrator"].values])  # fmt: skip
+    good = np.isfinite(horizon) & np.isfinite(predicted) & (early < EARLY[1]) & (early > EARLY[0])
+    good[conserving] = False
+    gap = np.abs(horizon[good] - predicted[good])
+    if not gap.size:
+        return ""
+    text = (
+        "Next to the separatrix (the motion that rises towards the upright for ever, on a scale of 1/g = sqrt(I1/mgl)) "
+        f"{gap.size} runs reach an axis error of {LOST:g} rad within {np.max(gap):.1f}/g of the time that their error "
+        f"at {SEEN:g}/g predicts (median {np.median(gap):.2f}/g); the longest takes {np.max(horizon[good]):.0f}/g."
+    )
+    if np.isfinite(horizon[conserving]).any():
+        least = np.nanmin(horizon[conserving])
+        text += f" Methods that conserve the energy stay below it for at least {least:.0f}/g at every step tried."
+    return text
+
+
+def sampling(part: xr.Dataset) -> str:
+    """What an energy error sampled once a nutation hides."""
+    once, every = part[Column.ENERGY_ONCE].values, part[Column.ENERGY_EVERY].values
+    good = np.isfinite(once) & (every > 1e-12)
+    if not good.any():
+        return ""
+    ratio = np.where(good, every / np.maximum(once, 1e-16), 0.0)
+    worst = int(np.argmax(ratio))
+    name = str(part["integrator"].values[worst])
+    text = f"An energy error that is sampled once a nutation appears up to {ratio[worst]:.0e} times too small ({name})"
+    if "stormer-verlet" in part["integrator"].values:
+        verlet = part.sel(integrator="stormer-verlet")
+        true, seen = float(verlet[Column.ENERGY_EVERY]), float(verlet[Column.ENERGY_ONCE])
+        text += f"; that of stormer-verlet is {true:.2g} and appears as {seen:.1g}"
+    return f"{text}."
+
+
+def solver(part: xr.Dataset) -> str:
+    """The share of the solver in what an implicit method does to energy and momenta."""
+    for name, row in _rows(part, Column.TEXTBOOK_ENERGY).items():
+        solved, one = float(row[Column.TEXTBOOK_ENERGY][-1]), float(row[Column.ONE_ITERATION_ENERGY])
+        energy, momenta = row[Column.SOLVER_ENERGY].values, row[Column.SOLVER_MOMENTUM].values
+        first = f"grows to {one:.1e}" if one > LOOSE * solved else f"stays at {one:.1e}"
+        cause = ": the difference comes from the solver" if one > LOOSE * solved else ""
+        lost = {"energy": energy[0] > LOOSE * energy[-1], "momenta": momenta[0] > LOOSE * momenta[-1]}
+        verbs = {name: f"{'loses' if gone else 'conserves'} the {name}" for name, gone in lost.items()}
+        return (
+            f"With one Newton iteration a step the energy error of {name} {first}; with its equation solved it stays "
+            f"within {solved:.1e}{cause}. The kernel of this package, stopped after one iteration, {verbs['energy']} "
+            f"({energy[0]:.1e}, and {energy[-1]:.1e} when solved) {'and' if len(set(lost.values())) == 1 else 'but'} "
+            f"{verbs['momenta']} ({momenta[0]:.0e}, and {momenta[-1]:.0e} when solved)."
+        )
+    return ""
+
+
+SENTENCES = (  # the scene of a mechanism, a variable without which there is nothing to say, and what says it
+    ("grazing", Column.OUTCOME, poles),
+    ("steady-fast", Column.LIMIT_PHASE, limits),
+    ("steady-fast", Column.THIRD_TURN_PHASE, resonances),
+    ("sleeping", Column.SLEEPING_THRESHOLD, sleepers),
+    ("separatrix", Column.HORIZON, horizons),
+    ("goldstein", Column.ENERGY_ONCE, sampling),
+    ("goldstein", Column.TEXTBOOK_ENERGY, solver),
+)
+
+
+def mechanism_sentences(data: xr.Dataset, on: Collection[str] = tuple(MECHANISMS)) -> list[str]:
+    """What the dataset says of the mechanisms that are measured on the scenes `on`."""
+    measured = [one for one in SENTENCES if one[0] in on and one[0] in data["scene"].values and one[1] in data]
+    return [sentence for scene, _, speak in measured if (sentence := speak(data.sel(scene=scene)))]
 
 
 def sentences(data: xr.Dataset) -> list[str]:
@@ -24,11 +183,29 @@ def sentences(data: xr.Dataset) -> list[str]:
     return atlas + mechanism_sentences(data)
 
 
+LIMITS = (  # scene, variable, header, format
+    ("steady-fast", Column.LIMIT_PHASE, "linear limit, h omega", "{:.4f}"),
+    ("steady-fast", Column.THIRD_TURN_PHASE, "a third of a turn a step, h omega", "{:.4f}"),
+    ("steady-fast", Column.SURVIVING_AT_THIRD_TURN, "largest displacement that stays near there (rad)", "{:.2g}"),
+    ("sleeping", Column.SLEEPING_THRESHOLD, "sleeps from a spin I3 w3 of (largest step)", "{:.6f}"),
+    ("goldstein", Column.ENERGY_EVERY, "largest energy error, every step", "{:.1e}"),
+    ("goldstein", Column.ENERGY_ONCE, "the same, once a nutation", "{:.1e}"),
+)
+
+
 def tables(data: xr.Dataset) -> list[Table]:
     """The atlas in words, and the limits in numbers."""
-    shown = []
-    for family in families(data):
-        lines = [[line.integrator, line.use, line.fails] for line in all_advice(data, family).values()]
-        shown.append(Table(f"The atlas in words: {family}", ["integrator", "use it", "it fails"], lines))
-    limits = limit_table(data)
-    return [*shown, limits] if limits else shown
+    shown = [
+        Table(f"The atlas in words: {family}", ["integrator", "use it", "it fails"],
+              [list(line) for line in advice(data, family).values()])
+        for family in families(data)
+    ]  # fmt: skip
+    columns = [one for one in LIMITS if one[0] in data["scene"].values and one[1] in data]
+    rows = []
+    for name in map(str, data["integrator"].values):
+        last = [float(np.ravel(data[key].sel(scene=scene, integrator=name).values)[-1]) for scene, key, *_ in columns]
+        if np.isfinite(last).any():
+            texts = [one[3].format(x) if math.isfinite(x) else "" for one, x in zip(columns, last, strict=True)]
+            rows.append([name, *texts])
+    limits_of_all = Table("Limits in numbers", ["integrator", *(one[2] for one in columns)], rows)
+    return [*shown, limits_of_all] if columns else shown

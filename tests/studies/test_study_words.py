@@ -8,7 +8,7 @@ import xarray as xr
 from symtop_studies.drift import tables, words
 from symtop_studies.notebook import words as notebook_words
 from symtop_studies.notebook.tables import SOLVER, Column
-from symtop_studies.stability import mechanism_words
+from symtop_studies.stability import words as stability_words
 from symtop_studies.truth import tables as truth_tables
 from symtop_studies.truth import words as truth_words
 
@@ -142,7 +142,7 @@ def test_the_share_of_the_solver_is_read_from_the_numbers(one, energy, momentum,
         "solver_energy": ("tolerance_setting", [energy, 1e-4]),
         "solver_momentum": ("tolerance_setting", [momentum, 1e-15]),
     }).expand_dims(scene=["goldstein"], integrator=["midpoint"])  # fmt: skip
-    (said,) = mechanism_words.solver(data)
+    (said,) = stability_words.mechanism_sentences(data)
     for part in says:
         assert part in said
 
