@@ -18,7 +18,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.base.fingerprint import by_name
+from symtop.base.walk import by_name
 from symtop.base.validate import SymtopError, SymtopWarning, finite, label, one_of, positive, whole
 from symtop.methods.about import paragraphs
 from symtop.model.top import Angles, Momenta, SymmetricTop

@@ -14,7 +14,8 @@ import pytest
 
 import symtop
 from symtop.base import cache, fingerprint, imports, signals
-from symtop.base.fingerprint import Walk, changes, digest, merged
+from symtop.base.fingerprint import changes, digest, merged
+from symtop.base.walk import Walk
 from symtop.methods import compiled
 from symtop.runner import depends
 
@@ -159,7 +160,7 @@ def test_an_edited_callee_makes_a_new_kernel_and_a_comment_makes_none(tmp_path):
     before = kernels_of(tmp_path, tmp_path / "cache")
     assert before["files"]
     for name in ("measure/errors.py", "measure/modified_energy.py", "explore/answers.py", "methods/gauss.py",
-                 "methods/loop.py", "methods/compiled.py", "base/code.py"):  # fmt: skip
+                 "methods/loop.py", "methods/compiled.py", "base/walk.py"):  # fmt: skip
         file = tmp_path / "symtop" / name
         text = file.read_text()
         assert "\nfrom " in text
@@ -208,7 +209,7 @@ def test_what_numba_compiles_in_place_of_a_function_counts():
 
     names = {part.__qualname__ for part in compiled.code_of(lambda a: fused.fused(a, a, a)).functions}
     assert names  # the control: the walk went somewhere
-    walk = compiled.CodeWalk("kernel", also=compiled._overloads)
+    walk = Walk("kernel", whole=False, also=compiled._overloads)
     walk.add(fused.fused)
     reached = {part.__name__ for part in walk.functions}
     assert {"fused", "_fused", "_fma"} <= reached
@@ -272,3 +273,4 @@ def test_versions_of_packages_are_reasons():
         "package numpy": importlib.metadata.version("numpy"),
         "package no-such-package": "absent",
     }
+    assert fingerprint.packages()["package python"] == ".".join(map(str, sys.version_info[:2]))
