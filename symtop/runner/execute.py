@@ -78,7 +78,7 @@ def _see_through(study: Study, tasks: list[Task], workers: Workers, size: int, h
 
 def _judge(task: Task, note: Heard, doubted: list[Task], *, alone: bool) -> None:
     """Settle a case whose process has ended: it hung, it ended its process, or it is put down to be tried alone."""
-    trace = work.trace_path(Path(task.path))
+    trace = store.trace_path(Path(task.path))
     traceback = trace.read_text() if trace.is_file() else ""
     trace.unlink(missing_ok=True)
     if traceback:

@@ -7,18 +7,17 @@ written to a file is the caller's choice (`Save`): this room knows no style.
 """
 
 import contextlib
-import hashlib
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import xarray as xr
 from tqdm import tqdm
 
-from symtop.base import datasets
+from symtop.base import datasets, fingerprint
 from symtop.base.validate import SymtopError, positive
 from symtop.runner import depends, plugins, store
 from symtop.runner.execute import execute
@@ -46,6 +45,14 @@ class Round:
     failures: list[str] = field(default_factory=list)
     computed: int = 0
 
+    @classmethod
+    def stored(cls, study: Study, results: Path, *, quick: bool, full: bool) -> Self:
+        """The cases of a study with what is stored of them; of the second round only if the first one is done."""
+        cases = cls(study, results.resolve())
+        if not cases.add(study.grid(quick=quick, full=full), fresh=False) and study.follow_up is not None:
+            cases.add(study.follow_up(cases.combined()), fresh=False)
+        return cases
+
     def add(self, cases: Iterable[Case], *, fresh: bool) -> dict[Path, Case]:
         """Take cases in; returns those that have to be computed."""
         new = {store.case_path(self.results, self.study, case): case for case in cases}
@@ -54,15 +61,16 @@ class Round:
             self._look(new)
         return {path: case for path, case in new.items() if path not in self.done}
 
-    def _look(self, paths: dict[Path, Case]) -> None:
+    def _look(self, paths: Iterable[Path]) -> None:
         loaded = {path: data for path in paths if (data := store.load_case(path)) is not None}
-        self.done |= {path: (paths[path], data) for path, data in loaded.items()}
+        self.done |= {path: (self.paths[path], data) for path, data in loaded.items()}
 
     def compute(self, missing: dict[Path, Case], workers: Workers, limit: float, *, fresh: bool, quiet: bool) -> None:
         """Have cases computed, with a progress bar where somebody is watching."""
         script = str(file_of(self.study.name))
         tasks = [Task(script, case, str(path), tuple(plugins.loaded()), limit, fresh) for path, case in missing.items()]
-        with _bar(self.study.name, len(tasks), quiet=quiet) as bar:
+        unseen = quiet or sys.stderr is None or not sys.stderr.isatty() or not tasks
+        with tqdm(total=len(tasks), desc=self.study.name, unit="case", disable=unseen, leave=False) as bar:
 
             def heard(_: Task, result: Result) -> None:
                 if result.state == "failed":
@@ -86,18 +94,10 @@ class Round:
         return store.combine(self.in_order())
 
 
-def _bar(name: str, total: int, *, quiet: bool) -> Any:
-    unseen = quiet or sys.stderr is None or not sys.stderr.isatty() or total == 0
-    return tqdm(total=total, desc=name, unit="case", disable=unseen, leave=False)
-
-
 def _stamp(study: Study, digests: Iterable[str], save: Save | None) -> str:
     """Hash of what the findings depend on: the cases, the script and the code that combines, draws and judges."""
-    digest = hashlib.sha256("".join(digests).encode())
-    if study.follow_up is not None:  # its cases are timed
-        digest.update(datasets.provenance()["processor"].encode())
-    digest.update(depends.script_digest(file_of(study.name), store, save).encode())
-    return digest.hexdigest()[:20]
+    processor = "" if study.follow_up is None else datasets.provenance()["processor"]  # the second round is timed
+    return fingerprint.hashed(*digests, processor, depends.script_digest(file_of(study.name), store, save))
 
 
 def _drawn(study: Study, results: Path, stamp: str) -> dict[str, Any] | None:

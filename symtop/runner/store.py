@@ -10,8 +10,9 @@ results/figures/STUDY-NAME.png
 SETTINGS is a hash of what the case was asked to do, DIGEST one of everything that its numbers depend on. Its file holds
 the settings and the reasons that make up the digest, and a hash of its values: a truncated, damaged or foreign file
 counts as none. A file is removed only when a case with the same SETTINGS and another DIGEST takes its place; what was
-computed for another grid stays. The lock is the operating system's, so that it ends with the process that holds it,
-however that ends.
+computed for another grid stays, until a user deletes it: remove ``cases/STUDY`` and run the study again, which computes
+its grid, or remove single files, of which nothing depends on any. The lock is the operating system's, so that it ends
+with the process that holds it, however that ends.
 """
 
 import contextlib
@@ -119,7 +120,7 @@ def load_case(path: Path) -> xr.Dataset | None:
 
 def failure_path(path: Path) -> Path:
     """Where the failure of a case is recorded."""
-    return path.with_name(f"{path.name.removesuffix('.nc')}.failed.json")
+    return path.with_name(f"{path.stem}.failed.json")
 
 
 def save_failure(path: Path, case: Case, message: str, trace: str) -> None:
@@ -137,9 +138,14 @@ def save_failure(path: Path, case: Case, message: str, trace: str) -> None:
     path.unlink(missing_ok=True)
 
 
+def trace_path(path: Path) -> Path:
+    """Where a worker that hangs in compiled code writes its traceback before it ends."""
+    return path.with_name(f".{path.stem}.trace")
+
+
 def lock_path(path: Path) -> Path:
     """The lock of a case, or of a study's dataset."""
-    return path.with_name(f".{path.name.removesuffix('.nc')}.lock")
+    return path.with_name(f".{path.stem}.lock")
 
 
 @contextlib.contextmanager
@@ -302,8 +308,8 @@ def forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
 def tidy(results: Path, study: Study) -> None:
     """Remove what processes that were killed have left beside the cases of a study, and nobody holds any more."""
     for lock in (results / "cases" / study.name).glob(".*.lock"):
-        path = lock.with_name(f"{lock.name[1:].removesuffix('.lock')}.nc")
+        path = lock.with_name(f"{lock.stem[1:]}.nc")
         with claim(path, wait=False) as ours:
             if ours:
                 datasets.sweep(path)
-                path.with_name(f".{path.name.removesuffix('.nc')}.trace").unlink(missing_ok=True)
+                trace_path(path).unlink(missing_ok=True)

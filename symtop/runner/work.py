@@ -76,9 +76,9 @@ def compute(task: Task, study: Study | None = None, *, wait: bool = False) -> Re
 
 def _compute(study: Study, task: Task, path: Path) -> Result:
     datasets.sweep(path)
-    trace_path(path).unlink(missing_ok=True)  # of a worker that was killed
+    store.trace_path(path).unlink(missing_ok=True)  # of a worker that was killed
     try:
-        with limited(task.limit, trace_path(path)):
+        with limited(task.limit, store.trace_path(path)):
             data = study.measure(task.case)
         if not isinstance(data, xr.Dataset):
             raise SymtopError(f"the measure of a study must return a Dataset, not {type(data).__name__}")  # noqa: TRY301
@@ -95,11 +95,6 @@ def sentence(case: Case, error: BaseException | str) -> str:
     if isinstance(error, BaseException) and not isinstance(error, SymtopError):
         error = "".join(traceback.format_exception_only(error))
     return f"{case.integrator} on {case.scene} failed: {' '.join(str(error).split())}"
-
-
-def trace_path(path: Path) -> Path:
-    """Where a worker that hangs in compiled code says what it was doing."""
-    return path.with_name(f".{path.name.removesuffix('.nc')}.trace")
 
 
 @contextlib.contextmanager

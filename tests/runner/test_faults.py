@@ -257,7 +257,7 @@ def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(t
     assert code == 0, output
     (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.nc")
     case.unlink()
-    for name in (work.trace_path(case), store.lock_path(case), case.with_name(f".{case.name}.x.part.nc")):
+    for name in (store.trace_path(case), store.lock_path(case), case.with_name(f".{case.name}.x.part.nc")):
         name.touch()
     code, output = probe(tmp_path)
     assert "1 of 4 cases computed" in output
