@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from symtop.base import datasets
 from symtop.base.numbers import TINY
 from symtop.base.validate import SymtopError, one_of, positive
 from symtop.measure import meet, ranking
@@ -165,10 +166,9 @@ def _stored(file: Path) -> xr.Dataset:
     if not file.is_file():
         raise SymtopError(f"results holds no {file.name}: {str(file.parent)!r}; run symtop study work_precision first")
     try:
-        with xr.open_dataset(file) as data:
-            return data.load()
-    except (OSError, ValueError) as error:
-        raise SymtopError(f"{file} cannot be read ({error}); run symtop study work_precision --fresh") from error
+        return datasets.read(file)
+    except SymtopError as error:
+        raise SymtopError(f"{file} cannot be read ({error.__cause__}); run symtop study work_precision --fresh") from error
 
 
 def _usable(quantity: str) -> dict[str, Integrator]:

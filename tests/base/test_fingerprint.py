@@ -133,6 +133,47 @@ def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again()
     assert digests[0] == depends.digest(study, case)
 
 
+CLASSES = """
+class Base:
+    def count(self):
+        return BASE
+
+class Few(Base):
+    COUNT = {}
+
+BASE = {}
+
+def measure():
+    '''{}'''
+    from . import nothing  # {}
+    return Few().count() + Few.COUNT
+"""
+
+
+def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_comments():
+    def made(*numbers):
+        text = CLASSES.format(*numbers)
+        space = {"__name__": "few", "__package__": "unknown"}
+        exec(text, space)
+        walk = Walk("measure")
+        walk.add(space["measure"])
+        return walk.reasons()
+
+    plain = made(2, 1, "words", "comment")
+    assert made(2, 1, "other words", "another comment") == plain
+    assert changes(plain, made(2, 3, "words", "comment")) == ["constant <string>:BASE"]
+    assert made(4, 1, "words", "comment") != plain
+
+
+def test_an_import_inside_a_function_counts_by_its_file_at_every_level():
+    space = {"__name__": "symtop.measure.made", "__package__": "symtop.measure"}
+    exec("def measure():\n    from . import errors\n    from ..methods.gauss import STILL\n    import symtop.run.guard", space)
+    walk = Walk("measure")
+    walk.add(space["measure"])
+    names = {"measure/errors.py", "methods/gauss.py", "run/guard.py"}
+    assert walk.files == {imports.PACKAGE / name for name in names}
+
+
 # ---- kernels ---------------------------------------------------------------------------------------------------------
 
 
