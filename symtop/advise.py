@@ -168,7 +168,9 @@ def _stored(file: Path) -> xr.Dataset:
     try:
         return datasets.read(file)
     except SymtopError as error:
-        raise SymtopError(f"{file} cannot be read ({error.__cause__}); run symtop study work_precision --fresh") from error
+        raise SymtopError(
+            f"{file} cannot be read ({error.__cause__}); run symtop study work_precision --fresh"
+        ) from error
 
 
 def _usable(quantity: str) -> dict[str, Integrator]:

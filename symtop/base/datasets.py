@@ -156,7 +156,9 @@ def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
         try:
             parts = {f"/{name}": _encoding(group) for name, group in groups(data).items()}
             with _one_thread:
-                data.to_netcdf(partial, engine="netcdf4", encoding=parts if isinstance(data, xr.DataTree) else parts["/"])
+                data.to_netcdf(
+                    partial, engine="netcdf4", encoding=parts if isinstance(data, xr.DataTree) else parts["/"]
+                )
         except RuntimeError as error:  # the netCDF library's own word for a disk that is full
             full = shutil.disk_usage(partial.parent).free < LITTLE
             raise OSError(None, f"no room is left in {partial.parent}" if full else str(error)) from error

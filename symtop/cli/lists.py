@@ -4,19 +4,40 @@ import contextlib
 import json
 import math
 import textwrap
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from symtop.base.validate import SymtopError
-from symtop.cli.common import completing, facts, json_option, load_plugins, plugin_option, table, terminal_width
+from symtop.cli.common import completing, facts, json_option, plugin_option, table, terminal_width
 
 if TYPE_CHECKING:
     from symtop.methods.registry import Integrator
     from symtop.model.scenes import Scene
 
+    Entry = TypeVar("Entry", Integrator, Scene)
+
 wide_option = click.option("--wide", is_flag=True, help="Every column, however wide the table becomes.")
 FLAGS = "e explicit, i implicit, s symplectic, t symmetric in time, - not so, ? not known"
+
+
+def _show(
+    entries: "Sequence[Entry]", name: str | None, *, wide: bool, as_json: bool, full: "Callable[[Entry], object]",
+    page: "Callable[[Entry, int], str]", short: "Callable[[Entry], dict[str, str]]", note: str,
+) -> None:  # fmt: skip
+    """Print the entry called `name` as a page, or all as a table of their `short` records; or whole, or as JSON."""
+    records = [entry.record() for entry in entries]
+    if as_json:
+        click.echo(json.dumps(records if name is None else [full(entries[0])], indent=1))
+    elif wide:
+        click.echo(table(list(records[0]), [list(record.values()) for record in records]))
+    elif name is not None:
+        click.echo(page(entries[0], terminal_width()))
+    else:
+        rows = [short(entry) for entry in entries]
+        click.echo(table(list(rows[0]), [list(row.values()) for row in rows], terminal_width()))
+        click.echo(textwrap.fill(note, terminal_width()))
 
 
 @click.command(short_help="List the integrators, or show one in full.")
@@ -25,7 +46,7 @@ FLAGS = "e explicit, i implicit, s symplectic, t symmetric in time, - not so, ? 
 @json_option
 @click.option("--markdown", is_flag=True, help="Print a Markdown table of every column.")
 @plugin_option
-def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, plugin_files: tuple[str, ...]) -> None:
+def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool) -> None:
     """List every integrator with what it claims about itself, or show the one called NAME in full.
 
     \b
@@ -35,23 +56,18 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, plu
     from symtop.methods import registry
     from symtop.report import markdown as markdown_
 
-    load_plugins(plugin_files)
     methods = [registry.integrator(name)] if name is not None else list(registry.integrators().values())
-    records = [method.record() for method in methods]
-    header, rows = list(records[0]), [list(record.values()) for record in records]
-    if as_json:
-        click.echo(json.dumps(records if name is None else [_described(methods[0])], indent=1))
-    elif markdown:
-        click.echo(markdown_.table(header, rows))
-    elif wide:
-        click.echo(table(header, rows))
-    elif name is not None:
-        click.echo(_integrator_page(methods[0], terminal_width()))
-    else:
-        short = [[record["name"], _order(method), _flags(method), record["summary"]]
-                 for method, record in zip(methods, records, strict=True)]  # fmt: skip
-        click.echo(table(["name", "order", "flags", "summary"], short, terminal_width()))
-        click.echo(textwrap.fill(f"flags: {FLAGS}. One in full: symtop integrators NAME.", terminal_width()))
+    if markdown and not as_json:
+        records = [method.record() for method in methods]
+        click.echo(markdown_.table(list(records[0]), [list(record.values()) for record in records]))
+        return
+    _show(
+        methods, name, wide=wide, as_json=as_json, full=_described, page=_integrator_page,
+        short=lambda method: {
+            "name": method.name, "order": _order(method), "flags": _flags(method), "summary": method.summary,
+        },
+        note=f"flags: {FLAGS}. One in full: symtop integrators NAME.",
+    )  # fmt: skip
 
 
 def _order(method: "Integrator") -> str:
@@ -70,9 +86,7 @@ def _described(method: "Integrator") -> dict[str, str]:
         described["default tolerance"] = f"{method.default_tolerance:g}"
     if method.least_tolerance > 0.0:
         described["least tolerance"] = f"{method.least_tolerance:.3g}"
-    described["source"] = method.reference or "none named"
-    about = getattr(method, "about", "")
-    return {**described, **({"about": about} if about else {})}
+    return described | {"source": method.reference or "none named"} | ({"about": method.about} if method.about else {})
 
 
 def _integrator_page(method: "Integrator", width: int) -> str:
@@ -92,7 +106,7 @@ def _integrator_page(method: "Integrator", width: int) -> str:
 @wide_option
 @json_option
 @plugin_option
-def scenes(name: str | None, wide: bool, as_json: bool, plugin_files: tuple[str, ...]) -> None:
+def scenes(name: str | None, wide: bool, as_json: bool) -> None:
     """List every scene with its purpose, or show the one called NAME: its top, start, horizon and motion.
 
     \b
@@ -101,23 +115,15 @@ def scenes(name: str | None, wide: bool, as_json: bool, plugin_files: tuple[str,
     """
     from symtop.model import scenes as catalogue
 
-    load_plugins(plugin_files)
-    chosen = [catalogue.scene(name)] if name is not None else list(catalogue.scenes().values())
-    records = [scene.record() for scene in chosen]
-    if as_json:
-        click.echo(json.dumps(records if name is None else [_numbers(chosen[0])], indent=1))
-    elif name is not None and not wide:
-        click.echo(_scene_page(chosen[0], terminal_width()))
-    elif wide:
-        click.echo(table(list(records[0]), [list(record.values()) for record in records]))
-    else:
-        short = [[record["name"], record["horizon (s)"], record["nutation period (s)"], record["purpose"]]
-                 for record in records]  # fmt: skip
-        click.echo(table(["name", "horizon", "nutation", "purpose"], short, terminal_width()))
-        click.echo(textwrap.fill(
-            "horizon: the time a run covers; nutation: one period of it. One in full: symtop scenes NAME.",
-            terminal_width(),
-        ))  # fmt: skip
+    def short(scene: "Scene") -> dict[str, str]:
+        names = {"name": "name", "horizon": "horizon (s)", "nutation": "nutation period (s)", "purpose": "purpose"}
+        return {column: scene.record()[key] for column, key in names.items()}
+
+    _show(
+        [catalogue.scene(name)] if name is not None else list(catalogue.scenes().values()), name, wide=wide,
+        as_json=as_json, full=_numbers, page=_scene_page, short=short,
+        note="horizon: the time a run covers; nutation: one period of it. One in full: symtop scenes NAME.",
+    )  # fmt: skip
 
 
 def _numbers(scene: "Scene") -> dict[str, Any]:

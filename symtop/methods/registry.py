@@ -19,8 +19,8 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.base.walk import by_name
 from symtop.base.validate import SymtopError, SymtopWarning, finite, label, one_of, positive, whole
+from symtop.base.walk import by_name
 from symtop.methods.about import paragraphs
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View

@@ -11,7 +11,7 @@ import contextlib
 import importlib
 import importlib.util
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -57,10 +57,7 @@ def loading(what: str) -> Iterator[None]:
 
 
 def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
-    """A module of that name from a file, or a package if its `places` are given; imported once."""
-    module = sys.modules.get(name)
-    if module is not None and getattr(module, "__file__", None) == str(file):
-        return module
+    """A module of that name from a file, or a package if its `places` are given."""
     for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
         del sys.modules[stale]  # of another folder with the same name
     spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=places)
@@ -76,15 +73,20 @@ def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleTyp
     return module
 
 
-def _package(name: str, place: Path, scripts: list[Path]) -> ModuleType:
+def _once(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
+    module = sys.modules.get(name)
+    return module if module is not None and module.__file__ == str(file) else execute(name, file, places)
+
+
+def _package(name: str, place: Path, scripts: Iterable[Path]) -> ModuleType:
     imports.add_root(name, place)
     walk.by_code.update(scripts)
-    return execute(name, place / "__init__.py", [str(place)])
+    return _once(name, place / "__init__.py", [str(place)])
 
 
 def install() -> ModuleType:
     """Make ``import symtop_studies`` work, wherever the studies lie."""
-    return _package(STUDIES, folder(), list(folder().glob("*/study.py")))
+    return _package(STUDIES, folder(), folder().glob("*/study.py"))
 
 
 def names() -> list[str]:
@@ -107,7 +109,7 @@ def _module(file: Path) -> ModuleType:
     if (file.parent / "__init__.py").is_file():
         package = _package(f"symtop_study_{file.parent.name}", file.parent, [file])
         return importlib.import_module(f"{package.__name__}.{file.stem}")
-    return execute(f"symtop_study_{file.stem}", file)
+    return _once(f"symtop_study_{file.stem}", file)
 
 
 def load(name: str) -> Study:

@@ -167,7 +167,10 @@ def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_co
 
 def test_an_import_inside_a_function_counts_by_its_file_at_every_level():
     space = {"__name__": "symtop.measure.made", "__package__": "symtop.measure"}
-    exec("def measure():\n    from . import errors\n    from ..methods.gauss import STILL\n    import symtop.run.guard", space)
+    exec(
+        "def measure():\n    from . import errors\n    from ..methods.gauss import STILL\n    import symtop.run.guard",
+        space,
+    )
     walk = Walk("measure")
     walk.add(space["measure"])
     names = {"measure/errors.py", "methods/gauss.py", "run/guard.py"}

@@ -270,7 +270,11 @@ def test_a_users_package_is_drawn_again_when_what_stands_beside_its_script_is_ed
     folder = tmp_path / "mine"
     folder.mkdir()
     (folder / "__init__.py").touch()
-    text = PROBE.read_text().replace('STUDY = Study("probe"', 'STUDY = Study("mine"').replace("samples=51", "samples=count()")
+    text = (
+        PROBE.read_text()
+        .replace('STUDY = Study("probe"', 'STUDY = Study("mine"')
+        .replace("samples=51", "samples=count()")
+    )
     (folder / "study.py").write_text(f"from .words import said\nfrom .tables import count\n{text}")
     (folder / "words.py").write_text("def said():\n    return 'nothing'\n")
     (folder / "tables.py").write_text("def count():\n    return 51\n")
