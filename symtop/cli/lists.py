@@ -4,8 +4,8 @@ import contextlib
 import json
 import math
 import textwrap
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,28 +16,27 @@ if TYPE_CHECKING:
     from symtop.methods.registry import Integrator
     from symtop.model.scenes import Scene
 
-    Entry = TypeVar("Entry", Integrator, Scene)
-
 wide_option = click.option("--wide", is_flag=True, help="Every column, however wide the table becomes.")
+Record = dict[str, Any]  # what is shown of one entry, by column
 FLAGS = "e explicit, i implicit, s symplectic, t symmetric in time, - not so, ? not known"
 
 
-def _show(
-    entries: "Sequence[Entry]", name: str | None, *, wide: bool, as_json: bool, full: "Callable[[Entry], object]",
-    page: "Callable[[Entry, int], str]", short: "Callable[[Entry], dict[str, str]]", note: str,
-) -> None:  # fmt: skip
-    """Print the entry called `name` as a page, or all as a table of their `short` records; or whole, or as JSON."""
-    records = [entry.record() for entry in entries]
+def _show(records: list[Record], short: list[Record], chosen: Record | None, page: Callable[[Record, int], str],
+          note: str, wide: bool, as_json: bool) -> None:  # fmt: skip
+    """Print the chosen record as a page, or all of them as a table of the `short` ones; or all columns, or JSON."""
     if as_json:
-        click.echo(json.dumps(records if name is None else [full(entries[0])], indent=1))
+        click.echo(json.dumps(records if chosen is None else [chosen], indent=1))
     elif wide:
-        click.echo(table(list(records[0]), [list(record.values()) for record in records]))
-    elif name is not None:
-        click.echo(page(entries[0], terminal_width()))
+        click.echo(table(*_columns(records)))
+    elif chosen is not None:
+        click.echo(page(chosen, terminal_width()))
     else:
-        rows = [short(entry) for entry in entries]
-        click.echo(table(list(rows[0]), [list(row.values()) for row in rows], terminal_width()))
+        click.echo(table(*_columns(short), terminal_width()))
         click.echo(textwrap.fill(note, terminal_width()))
+
+
+def _columns(records: list[Record]) -> tuple[list[str], list[list[str]]]:
+    return list(records[0]), [list(record.values()) for record in records]
 
 
 @click.command(short_help="List the integrators, or show one in full.")
@@ -57,21 +56,17 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool) -> 
     from symtop.report import markdown as markdown_
 
     methods = [registry.integrator(name)] if name is not None else list(registry.integrators().values())
+    records: list[Record] = [method.record() for method in methods]
     if markdown and not as_json:
-        records = [method.record() for method in methods]
-        click.echo(markdown_.table(list(records[0]), [list(record.values()) for record in records]))
+        click.echo(markdown_.table(*_columns(records)))
         return
-    _show(
-        methods, name, wide=wide, as_json=as_json, full=_described, page=_integrator_page,
-        short=lambda method: {
-            "name": method.name, "order": _order(method), "flags": _flags(method), "summary": method.summary,
-        },
-        note=f"flags: {FLAGS}. One in full: symtop integrators NAME.",
-    )  # fmt: skip
-
-
-def _order(method: "Integrator") -> str:
-    return "?" if method.order is None else str(method.order)
+    short: list[Record] = [
+        {"name": method.name, "order": str(method.order or "?"), "flags": _flags(method), "summary": method.summary}
+        for method in methods
+    ]
+    chosen = None if name is None else _described(methods[0])
+    note = f"flags: {FLAGS}. One in full: symtop integrators NAME."
+    _show(records, short, chosen, _integrator_page, note, wide, as_json)
 
 
 def _flags(method: "Integrator") -> str:
@@ -79,9 +74,9 @@ def _flags(method: "Integrator") -> str:
     return "".join("?" if claim is None else yes if claim else no for claim, yes, no in letters)
 
 
-def _described(method: "Integrator") -> dict[str, str]:
+def _described(method: "Integrator") -> Record:
     """The record of an integrator, its paragraph, its tolerances and its source."""
-    described = method.record()
+    described: Record = {**method.record()}
     if method.default_tolerance is not None:
         described["default tolerance"] = f"{method.default_tolerance:g}"
     if method.least_tolerance > 0.0:
@@ -89,15 +84,14 @@ def _described(method: "Integrator") -> dict[str, str]:
     return described | {"source": method.reference or "none named"} | ({"about": method.about} if method.about else {})
 
 
-def _integrator_page(method: "Integrator", width: int) -> str:
+def _integrator_page(described: Record, width: int) -> str:
     from symtop.methods.citations import citation
 
-    described = _described(method)
-    parts = [textwrap.fill(f"{described.pop('name')}: {described.pop('summary')}", width)]
-    parts += [textwrap.fill(about, width) for about in described.pop("about", "").split("\n\n") if about]
-    parts.append(facts(described, width))
+    lines = {key: value for key, value in described.items() if key not in ("name", "summary", "about")}
+    paragraphs = [f"{described['name']}: {described['summary']}", *described.get("about", "").split("\n\n")]
+    parts = [*(textwrap.fill(text, width) for text in paragraphs if text), facts(lines, width)]
     with contextlib.suppress(SymtopError):  # a method of the user's own may name a source that is not known here
-        parts.append(citation(method))
+        parts.append(citation(described["name"]))
     return "\n\n".join(parts)
 
 
@@ -115,18 +109,15 @@ def scenes(name: str | None, wide: bool, as_json: bool) -> None:
     """
     from symtop.model import scenes as catalogue
 
-    def short(scene: "Scene") -> dict[str, str]:
-        names = {"name": "name", "horizon": "horizon (s)", "nutation": "nutation period (s)", "purpose": "purpose"}
-        return {column: scene.record()[key] for column, key in names.items()}
-
-    _show(
-        [catalogue.scene(name)] if name is not None else list(catalogue.scenes().values()), name, wide=wide,
-        as_json=as_json, full=_numbers, page=_scene_page, short=short,
-        note="horizon: the time a run covers; nutation: one period of it. One in full: symtop scenes NAME.",
-    )  # fmt: skip
+    chosen = [catalogue.scene(name)] if name is not None else list(catalogue.scenes().values())
+    records: list[Record] = [scene.record() for scene in chosen]
+    keys = {"name": "name", "horizon": "horizon (s)", "nutation": "nutation period (s)", "purpose": "purpose"}
+    short: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]
+    note = "horizon: the time a run covers; nutation: one period of it. One in full: symtop scenes NAME."
+    _show(records, short, None if name is None else _numbers(chosen[0]), _scene_page, note, wide, as_json)
 
 
-def _numbers(scene: "Scene") -> dict[str, Any]:
+def _numbers(scene: "Scene") -> Record:
     """The record of a scene with every number of its top and its start."""
     top, start = scene.top, scene.start
     momenta = top.momenta(start)
@@ -141,15 +132,13 @@ def _numbers(scene: "Scene") -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _scene_page(scene: "Scene", width: int) -> str:
-    numbers = _numbers(scene)
+def _scene_page(numbers: Record, width: int) -> str:
     low, high = numbers["theta"]
-    lines = {name: _listed(numbers[name]) for name in ("top", "start", "momenta")}
+    lines = {
+        name: ", ".join(f"{key}={value:.10g}" for key, value in numbers[name].items())
+        for name in ("top", "start", "momenta")
+    }
     lines["theta"] = f"from {low:.6g} to {high:.6g} rad ({math.degrees(low):.4g} to {math.degrees(high):.4g} degrees)"
-    lines |= {name: value for name, value in scene.record().items() if name not in ("name", "purpose")}
-    title = f"{scene.name}: {scene.purpose}" if scene.purpose else scene.name
+    lines |= {name: value for name, value in numbers.items() if name not in ("name", "purpose", *lines)}
+    title = f"{numbers['name']}: {numbers['purpose']}" if numbers["purpose"] else numbers["name"]
     return f"{textwrap.fill(title, width)}\n\n{facts(lines, width)}"
-
-
-def _listed(numbers: dict[str, float]) -> str:
-    return ", ".join(f"{name}={value:.10g}" for name, value in numbers.items())
