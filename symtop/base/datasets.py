@@ -17,7 +17,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import xarray as xr
@@ -182,7 +182,7 @@ def content_hash(data: xr.Dataset) -> str:
 def _read(opening: Callable[..., Tree], path: str | os.PathLike[str]) -> Tree:
     try:
         with _one_thread, opening(path, engine="netcdf4") as data:
-            return data.load()
+            return cast("Tree", data.load())
     except (OSError, ValueError, RuntimeError) as error:
         raise SymtopError(f"cannot read {path} as netCDF: {error}") from error
 

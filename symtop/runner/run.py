@@ -72,14 +72,14 @@ class Round:
         unseen = quiet or sys.stderr is None or not sys.stderr.isatty() or not tasks
         with tqdm(total=len(tasks), desc=self.study.name, unit="case", disable=unseen, leave=False) as bar:
 
-            def heard(_: Task, result: Result) -> None:
+            def on_result(_: Task, result: Result) -> None:
                 if result.state == "failed":
                     self.failures.append(result.message)
                     bar.set_postfix_str(f"{len(self.failures)} failed", refresh=False)
                 self.computed += result.state == "computed"
                 bar.update()
 
-            execute(self.study, tasks, workers, heard)
+            execute(self.study, tasks, workers, on_result)
         self._look(missing)
 
     def in_order(self) -> list[tuple[Case, xr.Dataset]]:
@@ -151,7 +151,7 @@ def run(study: Study, results: Path, *, quick: bool = False, full: bool = False,
         if study.follow_up is not None:
             later = cases.add(study.follow_up(cases.combined()), fresh=fresh)
             cases.compute(later, hired, seconds, fresh=fresh, quiet=quiet)
-    with store.claim(results / f"{study.name}.nc", wait=True):
+    with store.locked(results / f"{study.name}.nc", wait=True):
         findings = _conclude(cases, stamp, save, quick=quick)
     return {**findings, "computed": cases.computed, "seconds": time.monotonic() - began}
 

@@ -125,16 +125,8 @@ def failure_path(path: Path) -> Path:
 
 def save_failure(path: Path, case: Case, message: str, trace: str) -> None:
     """Record how a case failed; a file that an earlier run may have left is no longer its result."""
-    write_json(
-        failure_path(path),
-        {
-            "scene": case.scene,
-            "integrator": case.integrator,
-            "settings": dict(case.settings),
-            "message": message,
-            "traceback": trace.splitlines(),
-        },
-    )
+    question = {"scene": case.scene, "integrator": case.integrator, "settings": dict(case.settings)}
+    write_json(failure_path(path), {**question, "message": message, "traceback": trace.splitlines()})
     path.unlink(missing_ok=True)
 
 
@@ -149,7 +141,7 @@ def lock_path(path: Path) -> Path:
 
 
 @contextlib.contextmanager
-def claim(path: Path, *, wait: bool) -> Iterator[bool]:
+def locked(path: Path, *, wait: bool) -> Iterator[bool]:
     """Hold a file's lock, so that nobody else computes it; yields False if somebody else holds it and `wait` is false.
 
     The lock's file is there while it is held, and afterwards if its holder was killed (see `was_begun`).
@@ -161,39 +153,29 @@ def claim(path: Path, *, wait: bool) -> Iterator[bool]:
     while True:
         try:
             lock.parent.mkdir(parents=True, exist_ok=True)
-            handle = os.open(lock, os.O_CREAT | os.O_RDWR, 0o644)
+            file = lock.open("a")
         except OSError as error:
             raise SymtopError(f"cannot write {lock}: {error.strerror or error}") from error
-        try:
+        with file:
             try:
-                fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+                fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
             except BlockingIOError:
                 yield False
                 return
-            if not _is_file(handle, lock):  # its holder removed it while we waited
+            if os.fstat(file.fileno()).st_nlink == 0:  # its holder removed it while we waited
                 continue
-            os.utime(handle)  # since when it is held
             try:
                 yield True
             finally:
                 lock.unlink(missing_ok=True)
             return
-        finally:
-            os.close(handle)
-
-
-def _is_file(handle: int, path: Path) -> bool:
-    try:
-        return os.fstat(handle).st_ino == path.stat().st_ino
-    except FileNotFoundError:
-        return False
 
 
 def was_begun(path: Path) -> bool:
     """Did somebody begin to compute a case, and end before it was done?"""
     if fcntl is None or not lock_path(path).is_file():
         return False
-    with claim(path, wait=False) as ours:
+    with locked(path, wait=False) as ours:
         return ours
 
 
@@ -309,7 +291,7 @@ def tidy(results: Path, study: Study) -> None:
     """Remove what processes that were killed have left beside the cases of a study, and nobody holds any more."""
     for lock in (results / "cases" / study.name).glob(".*.lock"):
         path = lock.with_name(f"{lock.stem[1:]}.nc")
-        with claim(path, wait=False) as ours:
+        with locked(path, wait=False) as ours:
             if ours:
                 datasets.sweep(path)
                 trace_path(path).unlink(missing_ok=True)

@@ -211,12 +211,12 @@ def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
     order = []
 
     def wait():
-        with store.claim(path, wait=True) as ours:
+        with store.locked(path, wait=True) as ours:
             order.append(ours)
 
-    with store.claim(path, wait=False) as ours:
+    with store.locked(path, wait=False) as ours:
         assert ours
-        with store.claim(path, wait=False) as second:
+        with store.locked(path, wait=False) as second:
             assert not second
         waiting = threading.Thread(target=wait)
         waiting.start()
@@ -228,7 +228,7 @@ def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
     assert not list(tmp_path.iterdir())
     store.lock_path(path).touch()  # what a killed process leaves
     assert store.was_begun(path)
-    with store.claim(path, wait=False) as ours:
+    with store.locked(path, wait=False) as ours:
         assert ours
 
 
@@ -462,5 +462,5 @@ def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
     other = path.with_name(path.name.replace(store.digest_of(path), "0" * 20))
     with pytest.raises(SymtopError, match="not those that the study was started with"):
         work.compute(task._replace(path=str(other)))
-    with store.claim(path, wait=False):
+    with store.locked(path, wait=False):
         assert work.compute(task).state == "busy"
