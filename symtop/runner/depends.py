@@ -47,8 +47,8 @@ def _asks_for(file: Path) -> set[str]:
 def _may_run_any(file: Path) -> bool:
     """Does a file ask the registry for integrators of its own choice?
 
-    It does if it imports all of them, or uses `integrator` otherwise than on a literal name (which is found as a string)
-    or on an argument of the function around it (which its caller chooses).
+    It does if it imports all of them, or calls `integrator` on anything but a literal name, which is found as a string,
+    and an argument of the function around it, which its caller chooses.
     """
     names = _asks_for(file)
     if names & {"integrators", "registry"}:

@@ -75,26 +75,27 @@ def _run_until_done(
                     "the worker processes end before they begin; try --jobs 1 or look at the memory that is left"
                 ) from None
             for task in begun:
-                _judge(task, settle, suspects, alone=task is suspect)
+                result = _settled(task, alone=task is suspect)
+                if result is None:
+                    suspects.append(task)
+                else:
+                    settle(task, result)
 
 
-def _judge(task: Task, settle: OnResult, suspects: list[Task], *, alone: bool) -> None:
-    """Settle a case whose process has ended: it hung, it ended its process, or it is put down to be tried alone."""
+def _settled(task: Task, *, alone: bool) -> Result | None:
+    """How a case failed whose process has ended: it hung, or it ended its process; None if that is not known yet."""
     trace = store.trace_path(Path(task.path))
     traceback = trace.read_text() if trace.is_file() else ""
     trace.unlink(missing_ok=True)
     if traceback:
-        _fail(task, f"it was not done after {task.limit:g} s and did not answer", traceback, settle)
-    elif alone:
-        _fail(task, "its process was ended, by the system (memory) or by the method itself", "", settle)
-    else:
-        suspects.append(task)
+        return _failed(task, f"it was not done after {task.limit:g} s and did not answer", traceback)
+    return _failed(task, "its process was ended, by the system (memory) or by the method itself") if alone else None
 
 
-def _fail(task: Task, reason: str, trace: str, settle: OnResult) -> None:
+def _failed(task: Task, reason: str, trace: str = "") -> Result:
     message = work.sentence(task.case, reason)
     store.save_failure(Path(task.path), task.case, message, trace)
-    settle(task, Result("failed", message))
+    return Result("failed", message)
 
 
 def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, settle: OnResult, *, timed: bool) -> None:
@@ -116,16 +117,16 @@ def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, settle:
             futures[pool.submit(work.compute, task, given, wait=patient)] = task
         for future in wait(futures, return_when=FIRST_COMPLETED).done:
             task = futures.pop(future)
-            result = _result(future, task, workers, settle)
+            result = _result(future, task, workers)
             ready.extend(followers.pop(task.case.integrator, ()))
-            if result is not None and result.state == "busy":
+            if result.state == "busy":
                 elsewhere.append(task)
-            elif result is not None:
+            else:
                 settle(task, result)
 
 
-def _result(future: "Future[Result]", task: Task, workers: Workers, settle: OnResult) -> Result | None:
-    """The result that a worker returned; None if the cluster gave the case up, which is recorded as a failure."""
+def _result(future: "Future[Result]", task: Task, workers: Workers) -> Result:
+    """The result that a worker returned; a case that the cluster gave up has failed."""
     try:
         return future.result()
     except (SymtopError, BrokenExecutor):
@@ -135,5 +136,4 @@ def _result(future: "Future[Result]", task: Task, workers: Workers, settle: OnRe
     except Exception as error:
         if not workers.scheduler:
             raise
-        _fail(task, f"the cluster gave it up: {type(error).__name__}: {error}", "", settle)
-        return None
+        return _failed(task, f"the cluster gave it up: {type(error).__name__}: {error}")

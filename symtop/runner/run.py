@@ -9,7 +9,7 @@ written to a file is the caller's choice (`Save`): this room knows no style.
 import contextlib
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -82,16 +82,12 @@ class Round:
             execute(self.study, tasks, workers, on_result)
         self._look(missing)
 
-    def in_order(self) -> list[tuple[Case, xr.Dataset]]:
-        """Cases and what they measured, in the order of the grid."""
-        return [self.done[path] for path in self.paths if path in self.done]
-
     def combined(self) -> Combined:
         """One dataset of all that was measured, or a tree of one for each group of cases."""
         if not self.done:
             why = self.failures[0] if self.failures else "the grid is empty"
             raise SymtopError(f"study {self.study.name}: no case could be measured; {why}")
-        return store.combine(self.in_order())
+        return store.combine([self.done[path] for path in self.paths if path in self.done])
 
 
 def _stamp(study: Study, digests: Iterable[str], save: Save | None) -> str:
@@ -110,20 +106,6 @@ def _drawn(study: Study, results: Path, stamp: str) -> dict[str, Any] | None:
     except (KeyError, TypeError):
         return None
     return before if all(file.is_file() for file in [*pictures, results / f"{study.name}.nc"]) else None
-
-
-@contextlib.contextmanager
-def _hired(workers: Workers | None, jobs: int | None, results: Path, study: Study) -> Iterator[Workers]:
-    """Those workers, or new ones that are closed at the end; after an early end no partial file is left."""
-    hired = workers or Workers(jobs)
-    try:
-        yield hired
-    except BaseException:
-        hired.close()
-        store.tidy(results, study)
-        raise
-    if workers is None:
-        hired.close()
 
 
 def run(study: Study, results: Path, *, quick: bool = False, full: bool = False, fresh: bool = False,
@@ -146,11 +128,16 @@ def run(study: Study, results: Path, *, quick: bool = False, full: bool = False,
     before = _drawn(study, results, stamp)
     if before is not None and not missing:
         return {**before, "computed": 0, "seconds": time.monotonic() - began}
-    with _hired(workers, jobs, results, study) as hired:
-        cases.compute(missing, hired, seconds, fresh=fresh, quiet=quiet)
-        if study.follow_up is not None:
-            later = cases.add(study.follow_up(cases.combined()), fresh=fresh)
-            cases.compute(later, hired, seconds, fresh=fresh, quiet=quiet)
+    with Workers(jobs) if workers is None else contextlib.nullcontext(workers) as hired:
+        try:
+            cases.compute(missing, hired, seconds, fresh=fresh, quiet=quiet)
+            if study.follow_up is not None:
+                later = cases.add(study.follow_up(cases.combined()), fresh=fresh)
+                cases.compute(later, hired, seconds, fresh=fresh, quiet=quiet)
+        except BaseException:
+            hired.close()  # before what its processes have left is removed
+            store.tidy(results, study)
+            raise
     with store.locked(results / f"{study.name}.nc", wait=True):
         findings = _conclude(cases, stamp, save, quick=quick)
     return {**findings, "computed": cases.computed, "seconds": time.monotonic() - began}
