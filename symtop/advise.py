@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from symtop.base import datasets
 from symtop.base.numbers import TINY
 from symtop.base.validate import SymtopError, one_of, positive
 from symtop.measure import meet, ranking
@@ -165,24 +166,21 @@ def _stored(file: Path) -> xr.Dataset:
     if not file.is_file():
         raise SymtopError(f"results holds no {file.name}: {str(file.parent)!r}; run symtop study work_precision first")
     try:
-        with xr.open_dataset(file) as data:
-            return data.load()
-    except (OSError, ValueError) as error:
-        raise SymtopError(f"{file} cannot be read ({error}); run symtop study work_precision --fresh") from error
+        return datasets.read(file)
+    except SymtopError as error:
+        raise SymtopError(
+            f"{file} cannot be read ({error.__cause__}); run symtop study work_precision --fresh"
+        ) from error
 
 
 def _usable(quantity: str) -> dict[str, Integrator]:
     """Methods that can be recommended: compiled, with a step or tolerance, and able to show the quantity."""
-    needed = meet.observed(quantity)
+    charts = {"angles", "attitude"} | ({"axis"} if meet.observed(quantity) == "axis" else set())
     return {
         name: method
         for name, method in integrators().items()
-        if method.knob is not None and method.tier == "compiled" and (needed == "axis" or _shows_attitude(method))
+        if method.knob is not None and method.tier == "compiled" and charts & method.solvers.keys()
     }
-
-
-def _shows_attitude(method: Integrator) -> bool:
-    return bool({"angles", "attitude"} & set(method.solvers))
 
 
 def _candidates(
@@ -275,23 +273,12 @@ def _advice(
         nothing: dict[str, Any] = {"integrator": None, "step_size": None, "tolerance": None, "confidence": "none"}
         return Advice(**question, **nothing, expected_error=math.nan, seconds=math.nan, reason=reason, fails=fails)
     best = ranked[0]
-    reason = (
-        f"{best.words()} meets {goal}: error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
-    )
-    reason += f"; {source}."
-    runner = ""
-    if len(ranked) > 1:
-        runner = f"{ranked[1].words()}, {ranked[1].seconds / best.seconds:.2g} times the time."
+    worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
+    runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
     step = best.met.integrator.knob == "step_size"
     return Advice(
-        **question,
-        integrator=best.name,
-        step_size=best.met.setting if step else None,
-        tolerance=None if step else best.met.setting,
-        expected_error=best.error,
-        seconds=best.seconds,
-        confidence=best.confidence,
-        reason=reason,
-        runner_up=runner,
-        fails=fails,
-    )
+        **question, integrator=best.name, step_size=best.met.setting if step else None,
+        tolerance=None if step else best.met.setting, expected_error=best.error, seconds=best.seconds,
+        confidence=best.confidence, reason=f"{best.words()} meets {goal}: {worth}; {source}.",
+        runner_up="".join(runners), fails=fails,
+    )  # fmt: skip

@@ -49,9 +49,7 @@ def prune(folder: Path, most_bytes: int) -> None:
 def by_last_use(folder: Path) -> list[Path]:
     """The entries of a folder, the one used last first; partial files, whose names begin with a dot, are none."""
     times = {}
-    with contextlib.suppress(OSError):
-        for entry in folder.iterdir():
-            with contextlib.suppress(OSError):
-                if not entry.name.startswith("."):
-                    times[entry] = entry.stat().st_mtime
+    for entry in folder.glob("[!.]*"):
+        with contextlib.suppress(OSError):
+            times[entry] = entry.stat().st_mtime
     return sorted(times, key=lambda entry: -times[entry])

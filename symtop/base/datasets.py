@@ -15,9 +15,9 @@ import shutil
 import subprocess
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import xarray as xr
@@ -44,7 +44,7 @@ VARIABLES: dict[str, tuple[str, ...]] = {
 
 Tree = TypeVar("Tree", bound=xr.Dataset | xr.DataTree)
 
-LITTLE = 1_000_000  # bytes of a disk that count as none
+LITTLE = 1_000_000  # with fewer free bytes a write error is reported as a full disk
 _DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")  # told in every file
 
 
@@ -52,47 +52,34 @@ def _git(*words: str) -> str:
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return ""
+    command = ["git", "-C", str(root), *words]
     try:
-        done = subprocess.run(  # noqa: S603
-            ["git", "-C", str(root), *words],  # noqa: S607
-            capture_output=True,
-            text=True,
-            timeout=10,
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired):
+        return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()  # noqa: S603
+    except (OSError, subprocess.SubprocessError):
         return ""
-    return done.stdout.strip() if done.returncode == 0 else ""
 
 
 def _processor() -> str:
-    try:
+    with contextlib.suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
-    except OSError:
-        pass
     return platform.processor() or platform.machine()
 
 
-@functools.lru_cache(maxsize=1)
-def _provenance() -> tuple[tuple[str, str], ...]:
-    versions = {package: version(package) for package in _DEPENDENCIES}
-    revision = _git("rev-parse", "--short=12", "HEAD") or "unknown"
-    dirty = bool(_git("status", "--porcelain", "--", "symtop", "studies"))
-    return (
-        ("symtop_version", __version__),
-        ("symtop_revision", revision + ("+changes" if dirty else "")),
-        ("python_version", platform.python_version()),
-        ("dependencies", json.dumps(versions, sort_keys=True)),
-        ("platform", f"{platform.system()} {platform.machine()}"),
-        ("processor", _processor()),
-    )
-
-
+@functools.cache
 def provenance() -> dict[str, str]:
     """What made a dataset: versions, revision, machine. Flat strings, as netCDF wants them."""
-    return dict(_provenance())
+    revision = _git("rev-parse", "--short=12", "HEAD") or "unknown"
+    dirty = bool(_git("status", "--porcelain", "--", "symtop", "studies"))
+    return {
+        "symtop_version": __version__,
+        "symtop_revision": revision + ("+changes" if dirty else ""),
+        "python_version": platform.python_version(),
+        "dependencies": json.dumps({package: version(package) for package in _DEPENDENCIES}, sort_keys=True),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "processor": _processor(),
+    }
 
 
 def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
@@ -152,38 +139,30 @@ def replacing(path: str | os.PathLike[str], suffix: str = "") -> Iterator[Path]:
 
 
 def sweep(path: Path) -> None:
-    """Remove what writers that were killed have left of a file; for one who knows that nobody else is writing it."""
+    """Remove the partial files of writers that were killed; call it only while nobody else writes the file."""
     for left in path.parent.glob(f".{glob.escape(path.name)}.*.part*"):
         left.unlink(missing_ok=True)
 
 
 def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
     """No fill value in coordinates; bytes compressed."""
-    plain: dict[Any, dict[str, Any]] = {
-        name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"
-    }
-    return plain | {name: {"zlib": True} for name, values in data.data_vars.items() if values.dtype.kind == "u"}
+    bare = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}
+    return bare | {name: {"zlib": True} for name, values in data.data_vars.items() if values.dtype.kind == "u"}
 
 
 def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
     """Write a netCDF file so that it is whole or not there, whatever happens meanwhile; a tree as netCDF groups."""
     with replacing(path) as partial:
         try:
+            parts = {f"/{name}": _encoding(group) for name, group in groups(data).items()}
             with _one_thread:
-                if isinstance(data, xr.Dataset):
-                    data.to_netcdf(partial, engine="netcdf4", encoding=_encoding(data))
-                else:
-                    parts = {f"/{name}": _encoding(group) for name, group in groups(data).items()}
-                    data.to_netcdf(partial, engine="netcdf4", encoding=parts)
+                data.to_netcdf(
+                    partial, engine="netcdf4", encoding=parts if isinstance(data, xr.DataTree) else parts["/"]
+                )
         except RuntimeError as error:  # the netCDF library's own word for a disk that is full
-            raise OSError(None, _room(partial.parent) or str(error)) from error
+            full = shutil.disk_usage(partial.parent).free < LITTLE
+            raise OSError(None, f"no room is left in {partial.parent}" if full else str(error)) from error
     return Path(path)
-
-
-def _room(folder: Path) -> str:
-    """A sentence if there is no room left in a folder; empty if there is."""
-    free = shutil.disk_usage(folder).free
-    return f"no room is left in {folder}" if free < LITTLE else ""
 
 
 def content_hash(data: xr.Dataset) -> str:
@@ -200,29 +179,20 @@ def content_hash(data: xr.Dataset) -> str:
     return digest.hexdigest()
 
 
-def read(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Load a netCDF file completely into memory and close it."""
+def _read(opening: Callable[..., Tree], path: str | os.PathLike[str]) -> Tree:
     try:
-        with _one_thread, xr.open_dataset(path, engine="netcdf4") as data:
-            return data.load()
+        with _one_thread, opening(path, engine="netcdf4") as data:
+            return cast("Tree", data.load())
     except (OSError, ValueError, RuntimeError) as error:
         raise SymtopError(f"cannot read {path} as netCDF: {error}") from error
 
 
-def attributes(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The attributes of a netCDF file; none if it cannot be read."""
-    try:
-        with _one_thread, xr.open_dataset(path, engine="netcdf4") as data:
-            return dict(data.attrs)
-    except (OSError, ValueError, RuntimeError):
-        return {}
+def read(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Load a netCDF file completely into memory and close it."""
+    return _read(xr.open_dataset, path)
 
 
 def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:
     """Load a netCDF file completely into memory and close it: a tree if it has groups, otherwise a dataset."""
-    try:
-        with _one_thread, xr.open_datatree(path, engine="netcdf4") as tree:
-            tree.load()
-    except (OSError, ValueError, RuntimeError) as error:
-        raise SymtopError(f"cannot read {path} as netCDF: {error}") from error
+    tree = _read(xr.open_datatree, path)
     return tree if tree.children else tree.to_dataset()

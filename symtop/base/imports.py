@@ -14,9 +14,10 @@ from pathlib import Path
 PACKAGE = Path(__file__).resolve().parent.parent
 PLUMBING = frozenset(
     Path(__file__).resolve().with_name(f"{name}.py")
-    for name in ("cache", "code", "datasets", "fingerprint", "imports", "signals", "validate")
+    for name in ("cache", "datasets", "fingerprint", "imports", "signals", "validate", "walk")
 )
 roots: dict[str, Path] = {PACKAGE.name: PACKAGE}  # name of a package: its folder
+Imported = tuple[str, tuple[str, ...]]  # module, names
 
 # parsing whole files takes 3 ms each, their import statements alone 0.1 ms
 _STATEMENT = re.compile(
@@ -24,6 +25,15 @@ _STATEMENT = re.compile(
 )
 
 
+def add_root(name: str, folder: Path) -> None:
+    """Make a package known."""
+    if roots.get(name) != folder.resolve():
+        roots[name] = folder.resolve()
+        for cached in (root_of, imported, imports_of):
+            cached.cache_clear()
+
+
+@functools.cache
 def root_of(file: Path) -> str:
     """The name of the known package that a file belongs to; empty if it belongs to none."""
     return next((name for name, folder in roots.items() if folder in file.parents), "")
@@ -38,21 +48,15 @@ def module_file(name: str) -> Path | None:
     return next((path for path in (place.with_suffix(".py"), place / "__init__.py") if path.is_file()), None)
 
 
-def imported(file: Path) -> list[tuple[str, tuple[str, ...]]]:
-    """(module, names) of every import statement of a file."""
-    return list(_imported(file, root_of(file)))
-
-
 @functools.cache
-def _imported(file: Path, root: str) -> list[tuple[str, tuple[str, ...]]]:
-    return list(_statements(file.read_bytes(), _package(file, root)))
+def imported(file: Path) -> list[Imported]:
+    """(module, names) of every import statement of a file."""
+    root = root_of(file)
+    package = [root, *file.relative_to(roots[root]).parent.parts] if root else []
+    return list(_statements(file.read_bytes(), package))
 
 
-def _package(file: Path, root: str) -> list[str]:
-    return [root, *file.relative_to(roots[root]).parent.parts] if root else []
-
-
-def _statements(source: bytes, package: list[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
+def _statements(source: bytes, package: list[str]) -> Iterator[Imported]:
     for statement in _STATEMENT.findall(source):
         try:
             (node,) = ast.parse(statement.strip()).body
@@ -66,25 +70,17 @@ def _statements(source: bytes, package: list[str]) -> Iterator[tuple[str, tuple[
             yield module, tuple(alias.name for alias in node.names)
 
 
-def imports_of(file: Path) -> frozenset[Path]:
-    """The files of known packages that a file imports, without the plumbing."""
-    return _imports_of(file, tuple(roots))
+def files_of(statements: Iterable[Imported]) -> Iterator[Path]:
+    """The files of known packages that import statements lead to, without the plumbing."""
+    for module, names in statements:
+        places = [module_file(name) for name in (module, *(f"{module}.{name}" for name in names))]
+        yield from (place for place in places if place is not None and not is_plumbing(place))
 
 
 @functools.cache
-def _imports_of(file: Path, _: tuple[str, ...]) -> frozenset[Path]:
-    return frozenset(path for path in _files(imported(file)) if not is_plumbing(path))
-
-
-def imports_in(text: str, file: Path) -> set[Path]:
-    """The files of known packages that part of a file's text imports."""
-    return set(_files(_statements(text.encode(), _package(file, root_of(file)))))
-
-
-def _files(statements: Iterable[tuple[str, tuple[str, ...]]]) -> Iterator[Path]:
-    for module, names in statements:
-        places = [module_file(name) for name in (module, *(f"{module}.{name}" for name in names))]
-        yield from (place for place in places if place is not None)
+def imports_of(file: Path) -> frozenset[Path]:
+    """The files of known packages that a file imports, without the plumbing."""
+    return frozenset(files_of(imported(file)))
 
 
 def is_plumbing(file: Path) -> bool:
@@ -92,7 +88,7 @@ def is_plumbing(file: Path) -> bool:
     return file.name == "__init__.py" or file in PLUMBING
 
 
-def closure(files: frozenset[Path], stops: frozenset[Path] = frozenset()) -> frozenset[Path]:
+def closure(files: Iterable[Path], stops: frozenset[Path] = frozenset()) -> frozenset[Path]:
     """Those files, the files they import, and so on, without the plumbing; what `stops` import is left out."""
     reached: set[Path] = set()
     ahead = {file for file in files if not is_plumbing(file)}

@@ -10,21 +10,24 @@ import click
 
 from symtop.base.validate import SymtopError
 
+
+def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]) -> None:
+    if files and not ctx.resilient_parsing:  # as shell completion parses
+        from symtop.runner import plugins
+
+        for file in files:
+            plugins.load(file)
+
+
 plugin_option = click.option(
-    "--plugin",
-    "plugin_files",
-    multiple=True,
-    metavar="FILE",
+    "--plugin", multiple=True, metavar="FILE", callback=_load_plugins, expose_value=False, is_eager=True,
     help="A Python file that registers integrators or scenes.",
-)
+)  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 results_option = click.option(
-    "--results",
-    type=click.Path(file_okay=False),
-    default="results",
-    show_default=True,
+    "--results", type=click.Path(file_okay=False), default="results", show_default=True,
     help="The folder of the datasets, figures and findings.",
-)
+)  # fmt: skip
 
 Completion = Callable[[click.Context, click.Parameter, str], list[str]]
 
@@ -54,14 +57,6 @@ class Group(click.Group):
             sentence = re.sub(r"(?<![\w'-])step_size(?![\w'])", "--step-size", str(error))
             click.echo(f"symtop: {sentence}", err=True)
             ctx.exit(2)
-
-
-def load_plugins(files: tuple[str, ...]) -> None:
-    """Load the files given by ``--plugin``."""
-    from symtop.runner import plugins
-
-    for file in files:
-        plugins.load(file)
 
 
 def warn(sentence: str) -> None:

@@ -38,15 +38,15 @@ class Finding(NamedTuple):
 def examine(results: Path) -> list[Finding]:
     """Run every check; one that raises becomes a finding that is not healthy."""
     checks: list[Callable[[], list[Finding]]] = [
-        _python, _packages, _heyoka, _caches, lambda: _results(results), _studies, _tools, _self_check,
+        _python, _packages, _heyoka, _caches, lambda: _results(results), _tools, _self_check,
     ]  # fmt: skip
     findings = []
     for check in checks:
         try:
             findings += check()
         except Exception as error:  # noqa: BLE001  (one check that fails must not hide the others)
-            topic = getattr(check, "__name__", "check").strip("_").replace("_", " ")
-            findings.append(Finding(topic, _sentence(error), healthy=False, advice="report this with all of this page"))
+            topic = check.__name__.strip("_").replace("_", " ")
+            findings.append(Finding(topic, _sentence(error), False, "report this with all of this page"))
     return findings
 
 
@@ -77,22 +77,20 @@ def _packages() -> list[Finding]:
 
     extras = importlib.metadata.metadata("symtop").get_all("Provides-Extra") or []
     findings = []
-    for text in importlib.metadata.requires("symtop") or []:
-        requirement = Requirement(text)
-        marker = requirement.marker
-        required = marker is None or marker.evaluate({"extra": ""})
-        if not required and not (marker and any(marker.evaluate({"extra": extra}) for extra in extras)):
+    for requirement in map(Requirement, importlib.metadata.requires("symtop") or []):
+        marker, requirement.marker = requirement.marker, None
+        applies = [marker is None or marker.evaluate({"extra": extra}) for extra in ("", *extras)]
+        if not any(applies):
             continue  # for another system or another Python
-        requirement.marker = None
+        required = applies[0]
         try:
-            version = importlib.metadata.version(requirement.name)
+            result = importlib.metadata.version(requirement.name)
+            healthy = requirement.specifier.contains(result, prereleases=True)
+            advice = f"needs {requirement.specifier}: pip install --upgrade '{requirement}'"
         except importlib.metadata.PackageNotFoundError:
-            result = "absent" if required else "absent, an extra"
-            findings.append(Finding(requirement.name, result, not required, f"pip install '{requirement}'"))
-            continue
-        good = requirement.specifier.contains(version, prereleases=True)
-        advice = f"needs {requirement.specifier}: pip install --upgrade '{requirement}'"
-        findings.append(Finding(requirement.name, version, good, advice))
+            result, healthy = "absent" if required else "absent, an extra", not required
+            advice = f"pip install '{requirement}'"
+        findings.append(Finding(requirement.name, result, healthy, advice))
     return findings
 
 
@@ -100,22 +98,20 @@ def _heyoka() -> list[Finding]:
     """The precisions that this build of heyoka has."""
     if importlib.util.find_spec("heyoka") is None:
         advice = "heyoka has wheels for Linux only; elsewhere try conda-forge. The closed form works without it"
-        return [Finding("precisions", "no Taylor series: heyoka is absent", healthy=False, advice=advice)]
+        return [Finding("precisions", "no Taylor series: heyoka is absent", False, advice)]
     from symtop.methods.taylor import arithmetic, stepper
 
     findings = []
     for precision in ("double", "longdouble", "quad"):
         try:
-            working = arithmetic(precision)
-            stepper("axis", precision, 100.0 * working.epsilon)
+            epsilon = arithmetic(precision).epsilon
+            stepper("axis", precision, 100.0 * epsilon)
+            result, healthy = f"{-math.log10(epsilon):.1f} digits", precision != "longdouble" or epsilon < 1e-16
+            advice = "long double is double on this machine: use precision='quad' where it matters"
         except Exception as error:  # noqa: BLE001
+            result, healthy = _sentence(error), False
             advice = f"this build of heyoka has no {precision}; the truth study leaves it out"
-            findings.append(Finding(f"heyoka {precision}", _sentence(error), healthy=False, advice=advice))
-            continue
-        digits = -math.log10(working.epsilon)
-        wide = precision != "longdouble" or working.epsilon < 1e-16
-        advice = "long double is double on this machine: use precision='quad' where it matters"
-        findings.append(Finding(f"heyoka {precision}", f"{digits:.1f} digits", wide, advice))
+        findings.append(Finding(f"heyoka {precision}", result, healthy, advice))
     return findings
 
 
@@ -124,23 +120,21 @@ def _caches() -> list[Finding]:
 
     root, yesterday = cache_root(), time.time() - DAY
     findings = [_writable("cache", root, "set SYMTOP_CACHE to a folder that can be written")]
-    for name, remedy in (("kernels", "compiled again"), ("reference", "computed again")):
-        folder = root / name
-        entries = by_last_use(folder)
-        size = sum(size_of(entry) for entry in entries)
+    for name, kind, remedy in (("kernels", "kernels", "compiled again"), ("reference", "files", "computed again")):
+        entries = by_last_use(root / name)
+        size = sum(map(size_of, entries))
         recent = sum(entry.stat().st_mtime >= yesterday for entry in entries)
-        result = f"{len(entries)} {'kernels' if name == 'kernels' else 'files'}, {_bytes(size)}"
+        result = f"{len(entries)} {kind}, {_bytes(size)}"
         result += f", {recent} of them used or made within a day" if entries else ""
-        advice = f"{folder} may be deleted at any time; what is needed is {remedy}"
+        advice = f"{root / name} may be deleted at any time; what is needed is {remedy}"
         findings.append(Finding(f"{name} cache", result, size < LARGE_CACHE, advice))
     return findings
 
 
 def _results(results: Path) -> list[Finding]:
     writable = _writable("results", results, "name another folder with --results")
-    stored = list(results.glob("**/cases/*/*.nc")) if results.is_dir() else []
-    size = sum(path.stat().st_size for path in stored)
-    return [writable, Finding("stored cases", f"{len(stored)} in {results}, {_bytes(size)}")]
+    sizes = [path.stat().st_size for path in results.glob("**/cases/*/*.nc")]
+    return [writable, Finding("stored cases", f"{len(sizes)} in {results}, {_bytes(sum(sizes))}")]
 
 
 def _writable(topic: str, folder: Path, advice: str) -> Finding:
@@ -150,21 +144,17 @@ def _writable(topic: str, folder: Path, advice: str) -> Finding:
         with tempfile.TemporaryFile(dir=place):
             free = shutil.disk_usage(place).free
     except OSError as error:
-        return Finding(topic, f"{folder}: {error.strerror or error}", healthy=False, advice=advice)
+        return Finding(topic, f"{folder}: {error.strerror or error}", False, advice)
     return Finding(topic, f"{folder}, {_bytes(free)} free", free > LEAST_SPACE, f"make room, or {advice}")
 
 
-def _studies() -> list[Finding]:
+def _tools() -> list[Finding]:
     from symtop.runner import scripts
 
-    return [Finding("studies", f"{', '.join(scripts.names())} in {scripts.folder()}")]
-
-
-def _tools() -> list[Finding]:
-    compiler = shutil.which("gcc")
     return [
+        Finding("studies", f"{', '.join(scripts.names())} in {scripts.folder()}"),
         Finding("cores", f"{os.cpu_count()}"),
-        Finding("gcc", compiler or "absent; only the benchmarks of a checkout (make bench) need it"),
+        Finding("gcc", shutil.which("gcc") or "absent; only the benchmarks of a checkout (make bench) need it"),
     ]
 
 

@@ -4,19 +4,39 @@ import contextlib
 import json
 import math
 import textwrap
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from symtop.base.validate import SymtopError
-from symtop.cli.common import completing, facts, json_option, load_plugins, plugin_option, table, terminal_width
+from symtop.cli.common import completing, facts, json_option, plugin_option, table, terminal_width
 
 if TYPE_CHECKING:
     from symtop.methods.registry import Integrator
     from symtop.model.scenes import Scene
 
 wide_option = click.option("--wide", is_flag=True, help="Every column, however wide the table becomes.")
+Record = dict[str, Any]  # what is shown of one entry, by column
 FLAGS = "e explicit, i implicit, s symplectic, t symmetric in time, - not so, ? not known"
+
+
+def _show(records: list[Record], short: list[Record], chosen: Record | None, page: Callable[[Record, int], str],
+          note: str, wide: bool, as_json: bool) -> None:  # fmt: skip
+    """Print the chosen record as a page, or all of them as a table of the `short` ones; or all columns, or JSON."""
+    if as_json:
+        click.echo(json.dumps(records if chosen is None else [chosen], indent=1))
+    elif wide:
+        click.echo(table(*_columns(records)))
+    elif chosen is not None:
+        click.echo(page(chosen, terminal_width()))
+    else:
+        click.echo(table(*_columns(short), terminal_width()))
+        click.echo(textwrap.fill(note, terminal_width()))
+
+
+def _columns(records: list[Record]) -> tuple[list[str], list[list[str]]]:
+    return list(records[0]), [list(record.values()) for record in records]
 
 
 @click.command(short_help="List the integrators, or show one in full.")
@@ -25,7 +45,7 @@ FLAGS = "e explicit, i implicit, s symplectic, t symmetric in time, - not so, ? 
 @json_option
 @click.option("--markdown", is_flag=True, help="Print a Markdown table of every column.")
 @plugin_option
-def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, plugin_files: tuple[str, ...]) -> None:
+def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool) -> None:
     """List every integrator with what it claims about itself, or show the one called NAME in full.
 
     \b
@@ -35,27 +55,18 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, plu
     from symtop.methods import registry
     from symtop.report import markdown as markdown_
 
-    load_plugins(plugin_files)
     methods = [registry.integrator(name)] if name is not None else list(registry.integrators().values())
-    records = [method.record() for method in methods]
-    header, rows = list(records[0]), [list(record.values()) for record in records]
-    if as_json:
-        click.echo(json.dumps(records if name is None else [_described(methods[0])], indent=1))
-    elif markdown:
-        click.echo(markdown_.table(header, rows))
-    elif wide:
-        click.echo(table(header, rows))
-    elif name is not None:
-        click.echo(_integrator_page(methods[0], terminal_width()))
-    else:
-        short = [[record["name"], _order(method), _flags(method), record["summary"]]
-                 for method, record in zip(methods, records, strict=True)]  # fmt: skip
-        click.echo(table(["name", "order", "flags", "summary"], short, terminal_width()))
-        click.echo(textwrap.fill(f"flags: {FLAGS}. One in full: symtop integrators NAME.", terminal_width()))
-
-
-def _order(method: "Integrator") -> str:
-    return "?" if method.order is None else str(method.order)
+    records: list[Record] = [method.record() for method in methods]
+    if markdown and not as_json:
+        click.echo(markdown_.table(*_columns(records)))
+        return
+    short: list[Record] = [
+        {"name": method.name, "order": str(method.order or "?"), "flags": _flags(method), "summary": method.summary}
+        for method in methods
+    ]
+    chosen = None if name is None else _described(methods[0])
+    note = f"flags: {FLAGS}. One in full: symtop integrators NAME."
+    _show(records, short, chosen, _integrator_page, note, wide, as_json)
 
 
 def _flags(method: "Integrator") -> str:
@@ -63,27 +74,24 @@ def _flags(method: "Integrator") -> str:
     return "".join("?" if claim is None else yes if claim else no for claim, yes, no in letters)
 
 
-def _described(method: "Integrator") -> dict[str, str]:
+def _described(method: "Integrator") -> Record:
     """The record of an integrator, its paragraph, its tolerances and its source."""
-    described = method.record()
+    described: Record = {**method.record()}
     if method.default_tolerance is not None:
         described["default tolerance"] = f"{method.default_tolerance:g}"
     if method.least_tolerance > 0.0:
         described["least tolerance"] = f"{method.least_tolerance:.3g}"
-    described["source"] = method.reference or "none named"
-    about = getattr(method, "about", "")
-    return {**described, **({"about": about} if about else {})}
+    return described | {"source": method.reference or "none named"} | ({"about": method.about} if method.about else {})
 
 
-def _integrator_page(method: "Integrator", width: int) -> str:
+def _integrator_page(described: Record, width: int) -> str:
     from symtop.methods.citations import citation
 
-    described = _described(method)
-    parts = [textwrap.fill(f"{described.pop('name')}: {described.pop('summary')}", width)]
-    parts += [textwrap.fill(about, width) for about in described.pop("about", "").split("\n\n") if about]
-    parts.append(facts(described, width))
+    lines = {key: value for key, value in described.items() if key not in ("name", "summary", "about")}
+    paragraphs = [f"{described['name']}: {described['summary']}", *described.get("about", "").split("\n\n")]
+    parts = [*(textwrap.fill(text, width) for text in paragraphs if text), facts(lines, width)]
     with contextlib.suppress(SymtopError):  # a method of the user's own may name a source that is not known here
-        parts.append(citation(method))
+        parts.append(citation(described["name"]))
     return "\n\n".join(parts)
 
 
@@ -92,7 +100,7 @@ def _integrator_page(method: "Integrator", width: int) -> str:
 @wide_option
 @json_option
 @plugin_option
-def scenes(name: str | None, wide: bool, as_json: bool, plugin_files: tuple[str, ...]) -> None:
+def scenes(name: str | None, wide: bool, as_json: bool) -> None:
     """List every scene with its purpose, or show the one called NAME: its top, start, horizon and motion.
 
     \b
@@ -101,26 +109,15 @@ def scenes(name: str | None, wide: bool, as_json: bool, plugin_files: tuple[str,
     """
     from symtop.model import scenes as catalogue
 
-    load_plugins(plugin_files)
     chosen = [catalogue.scene(name)] if name is not None else list(catalogue.scenes().values())
-    records = [scene.record() for scene in chosen]
-    if as_json:
-        click.echo(json.dumps(records if name is None else [_numbers(chosen[0])], indent=1))
-    elif name is not None and not wide:
-        click.echo(_scene_page(chosen[0], terminal_width()))
-    elif wide:
-        click.echo(table(list(records[0]), [list(record.values()) for record in records]))
-    else:
-        short = [[record["name"], record["horizon (s)"], record["nutation period (s)"], record["purpose"]]
-                 for record in records]  # fmt: skip
-        click.echo(table(["name", "horizon", "nutation", "purpose"], short, terminal_width()))
-        click.echo(textwrap.fill(
-            "horizon: the time a run covers; nutation: one period of it. One in full: symtop scenes NAME.",
-            terminal_width(),
-        ))  # fmt: skip
+    records: list[Record] = [scene.record() for scene in chosen]
+    keys = {"name": "name", "horizon": "horizon (s)", "nutation": "nutation period (s)", "purpose": "purpose"}
+    short: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]
+    note = "horizon: the time a run covers; nutation: one period of it. One in full: symtop scenes NAME."
+    _show(records, short, None if name is None else _numbers(chosen[0]), _scene_page, note, wide, as_json)
 
 
-def _numbers(scene: "Scene") -> dict[str, Any]:
+def _numbers(scene: "Scene") -> Record:
     """The record of a scene with every number of its top and its start."""
     top, start = scene.top, scene.start
     momenta = top.momenta(start)
@@ -135,15 +132,13 @@ def _numbers(scene: "Scene") -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _scene_page(scene: "Scene", width: int) -> str:
-    numbers = _numbers(scene)
+def _scene_page(numbers: Record, width: int) -> str:
     low, high = numbers["theta"]
-    lines = {name: _listed(numbers[name]) for name in ("top", "start", "momenta")}
+    lines = {
+        name: ", ".join(f"{key}={value:.10g}" for key, value in numbers[name].items())
+        for name in ("top", "start", "momenta")
+    }
     lines["theta"] = f"from {low:.6g} to {high:.6g} rad ({math.degrees(low):.4g} to {math.degrees(high):.4g} degrees)"
-    lines |= {name: value for name, value in scene.record().items() if name not in ("name", "purpose")}
-    title = f"{scene.name}: {scene.purpose}" if scene.purpose else scene.name
+    lines |= {name: value for name, value in numbers.items() if name not in ("name", "purpose", *lines)}
+    title = f"{numbers['name']}: {numbers['purpose']}" if numbers["purpose"] else numbers["name"]
     return f"{textwrap.fill(title, width)}\n\n{facts(lines, width)}"
-
-
-def _listed(numbers: dict[str, float]) -> str:
-    return ", ".join(f"{name}={value:.10g}" for name, value in numbers.items())

@@ -13,7 +13,7 @@ import click
 from symtop import __version__
 from symtop.base.validate import SymtopError, positive
 from symtop.cli import lists, runs, tools
-from symtop.cli.common import Group, completing, json_option, load_plugins, plugin_option, results_option, warn
+from symtop.cli.common import Group, completing, json_option, plugin_option, results_option, warn
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -42,25 +42,18 @@ for command in (
 )
 @click.option("--full", is_flag=True, help="The longest grid, for the studies that have one.")
 @click.option("--fresh", is_flag=True, help="Compute every case again; with --check, compare every case.")
-@click.option("--status", "only_status", is_flag=True, help="Print the state of every case; compute nothing.")
+@click.option("--status", is_flag=True, help="Print the state of every case; compute nothing.")
 @click.option("--why", is_flag=True, help="With --status: what has changed, one line for all cases with that reason.")
-@click.option(
-    "--check", "only_check", is_flag=True, help="Compute some stored cases again, in another folder, and compare."
-)
-@click.option(
-    "--jobs", type=click.IntRange(1), help="Worker processes for cases that are not timed; one a core by default."
-)
-@click.option(
-    "--scheduler", metavar="ADDRESS", help="Compute cases that are not timed on the dask cluster of this scheduler."
-)
+@click.option("--check", is_flag=True, help="Compute some stored cases again, in another folder, and compare.")
+@click.option("--jobs", type=click.IntRange(1), help="Processes for cases that are not timed; one a core by default.")
+@click.option("--scheduler", metavar="ADDRESS", help="Compute cases that are not timed on this dask cluster.")
 @click.option("--limit", type=float, metavar="SECONDS", help="Longest time of one case; an hour by default.")
 @results_option
 @json_option
 @plugin_option
 def study(
-    names: tuple[str, ...], every: bool, quick: bool, full: bool, fresh: bool, only_status: bool, why: bool,
-    only_check: bool, jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool,
-    plugin_files: tuple[str, ...],
+    names: tuple[str, ...], every: bool, quick: bool, full: bool, fresh: bool, status: bool, why: bool, check: bool,
+    jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool,
 ) -> None:  # fmt: skip
     """Run studies by NAME: datasets, figures and findings into the results folder.
 
@@ -78,20 +71,16 @@ def study(
     """
     from symtop.cli import study as command
 
-    load_plugins(plugin_files)
-    if why and not only_status:
+    if why and not status:
         raise SymtopError("why must be given together with status")
     if quick and full:
         raise SymtopError("quick and full must not be given together")
     if limit is not None:
         positive("limit", limit)
     folder = Path(results) / "quick" if quick else Path(results)
-    chosen = command.choose(names, every=every)
-    options = command.Options(folder, quick, full, fresh, jobs, scheduler, limit, as_json, why)
-    if only_status:
-        code = command.show_status(chosen, options)
-    else:
-        code = command.conduct(command.check_all if only_check else command.run_all, chosen, options)
+    job = command.Job(command.choose(names, every=every), folder, quick, full, fresh, limit, as_json, why)
+    task = None if status else command.check_all if check else command.run_all
+    code = command.show_status(job) if task is None else command.conduct(task, job, jobs, scheduler)
     if code:
         sys.exit(code)
 
@@ -99,14 +88,13 @@ def study(
 @main.command(short_help="Gather the findings of all studies into one page.")
 @results_option
 @plugin_option
-def report(results: str, plugin_files: tuple[str, ...]) -> None:
+def report(results: str) -> None:
     """Gather the findings of all studies into one self-contained page.
 
     If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``.
     """
     from symtop.report import page
 
-    load_plugins(plugin_files)
     folder = Path(results)
     if not any(folder.glob("*.json")) and any((folder / "quick").glob("*.json")):
         warn(f"{folder} holds no findings; the report is made of those in {folder / 'quick'}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from symtop.base.validate import SymtopError
-from symtop.cli.common import completing, json_option, load_plugins, plugin_option, warn
+from symtop.cli.common import completing, json_option, plugin_option, warn
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 @json_option
 def run(
     scene: str, integrator: str, step_size: float | None, tolerance: float | None, horizon: float | None, samples: int,
-    observe: str | None, budget: float | None, guard: bool, output: str | None, figure: str | None,
-    plugin_files: tuple[str, ...], as_json: bool,
+    observe: str | None, budget: float | None, guard: bool, output: str | None, figure: str | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Run one INTEGRATOR on one SCENE and compare it with the exact motion.
 
@@ -49,7 +48,6 @@ def run(
     from symtop.run.reference import reference
     from symtop.run.simulation import simulate
 
-    load_plugins(plugin_files)
     if figure is not None and Path(figure).suffix != ".png":
         raise SymtopError(f"figure must be a file that ends in .png, not {figure!r}")
     data = simulate(
@@ -102,15 +100,12 @@ def _run_text(data: "xr.Dataset", verdict: "Judgement", series: "dict[str, np.nd
 @click.argument("integrator", shell_complete=completing("integrators"))
 @click.option("--steps", type=float, default=1e9, show_default=True, help="Number of steps.")
 @click.option("--step-size", type=float, help="Step; a thousandth of a nutation period by default.")
-@click.option(
-    "--checkpoint", type=click.Path(dir_okay=False), help="File to resume from; in symtop's cache by default."
-)
+@click.option("--checkpoint", type=click.Path(dir_okay=False), help="File to resume from; symtop's own by default.")
 @click.option("--output", type=click.Path(), help="Write the windows to this netCDF file.")
 @plugin_option
 def long(
-    scene: str, integrator: str, steps: float, step_size: float | None, checkpoint: str | None, output: str | None,
-    plugin_files: tuple[str, ...],
-) -> None:  # fmt: skip
+    scene: str, integrator: str, steps: float, step_size: float | None, checkpoint: str | None, output: str | None
+) -> None:
     """Run one INTEGRATOR on one SCENE for very many steps, in little memory.
 
     The run is cut into windows, and the output holds the least, largest and mean change of the energy and the momenta
@@ -124,7 +119,6 @@ def long(
     from symtop.model import scenes
     from symtop.run.long_run import PER_NUTATION, long_run
 
-    load_plugins(plugin_files)
     h = scenes.scene(scene).nutation_period / PER_NUTATION if step_size is None else step_size
     count = whole("steps", steps, 1)
     try:
@@ -151,7 +145,7 @@ def long(
 @click.option("--quick", is_flag=True, help="Shorter runs, one chart.")
 @plugin_option
 @json_option
-def claims(names: tuple[str, ...], scene: str, quick: bool, plugin_files: tuple[str, ...], as_json: bool) -> None:
+def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> None:
     """Measure every claim of each INTEGRATOR: order, symplecticity, symmetry, conserved quantities, cost.
 
     The exit code is 1 if a claim is refuted. Without a name: the integrators of the plug-in, or all.
@@ -164,16 +158,17 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, plugin_files: tuple[
     from symtop.methods import registry
     from symtop.model import scenes
 
-    before = set(registry.integrators())
-    load_plugins(plugin_files)
-    added = [name for name in registry.integrators() if name not in before]
     chosen = scenes.scene(scene)
+    added = [name for name in registry.integrators() if not registry.is_built_in(name)]
+    ledgers = (
+        judge(registry.integrator(name), chosen, quick=quick) for name in names or added or registry.integrators()
+    )
     refuted, entries = False, []
-    for name in names or added or registry.integrators():
-        ledger = judge(registry.integrator(name), chosen, quick=quick)
+    for ledger in ledgers:
         refuted |= any(finding.verdict == "refuted" for finding in ledger.findings)
         if as_json:
-            entries += [{"integrator": name, "scene": chosen.name, **finding.plain()} for finding in ledger.findings]
+            about = {"integrator": ledger.integrator, "scene": chosen.name}
+            entries += [{**about, **finding.plain()} for finding in ledger.findings]
         else:
             click.echo("\n".join(ledger.sentences()))
     if as_json:

@@ -10,23 +10,22 @@ import click
 
 from symtop.base.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
 from symtop.base.validate import SymtopError
-from symtop.runner import check, run, scripts
-from symtop.runner import status as status_
+from symtop.cli.common import warn
+from symtop.runner import check, run, scripts, status
 from symtop.runner.pools import Workers
 from symtop.runner.study import Study
 
 MOST_NAMED = 8  # integrators and scenes in a line of the status
 
 
-class Options(NamedTuple):
-    """Options of the command."""
+class Job(NamedTuple):
+    """Studies and the options of the command."""
 
+    studies: list[Study]
     results: Path
     quick: bool = False
     full: bool = False
     fresh: bool = False
-    jobs: int | None = None
-    scheduler: str | None = None
     limit: float | None = None
     as_json: bool = False
     why: bool = False
@@ -40,64 +39,60 @@ def choose(names: Sequence[str], *, every: bool) -> list[Study]:
     return [scripts.load(name) for name in chosen]
 
 
-def conduct(task: Callable[[list[Study], Options, Workers], int], studies: list[Study], options: Options) -> int:
+def conduct(task: Callable[[Job, Workers], int], job: Job, jobs: int | None, scheduler: str | None) -> int:
     """Do a task with workers; returns the exit code."""
     try:
-        with ending_on_sigterm(), Workers(options.jobs, options.scheduler) as workers:
-            return task(studies, options, workers)
+        with ending_on_sigterm(), Workers(jobs, scheduler) as workers:
+            return task(job, workers)
     except (KeyboardInterrupt, TerminatedError) as stop:
-        code = INTERRUPTED if isinstance(stop, KeyboardInterrupt) else TERMINATED
-        word = "interrupted" if code == INTERRUPTED else "terminated"
-        click.echo(f"symtop: {word}; what was computed is kept, and the same command goes on from there", err=True)
+        word, code = ("interrupted", INTERRUPTED) if isinstance(stop, KeyboardInterrupt) else ("terminated", TERMINATED)
+        warn(f"{word}; what was computed is kept, and the same command goes on from there")
         return code
 
 
-def run_all(studies: list[Study], options: Options, workers: Workers) -> int:
+def run_all(job: Job, workers: Workers) -> int:
     """Bring studies up to date; 1 if cases failed."""
     from symtop.report import style
 
     summaries: list[dict[str, Any]] = []
-    for study in studies:
+    for study in job.studies:
         findings = run.run(
-            study, options.results, quick=options.quick, full=options.full, fresh=options.fresh, workers=workers,
-            limit=options.limit, save=style.save,
+            study, job.results, quick=job.quick, full=job.full, fresh=job.fresh, workers=workers, limit=job.limit,
+            save=style.save,
         )  # fmt: skip
         summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
-        summaries.append({**summary, "figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)})
-        if not options.as_json:
-            click.echo(
-                f"{study.name}: {findings['computed']} of {findings['cases']} cases computed, "
-                f"{len(findings['pictures'])} figures"
-            )
+        summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
+        summaries.append(summary)
+        if not job.as_json:
+            click.echo("{study}: {computed} of {cases} cases computed, {figures} figures".format(**summary))
         for failure in findings["failures"]:
             click.echo(f"  {failure}", err=True)
-    if options.as_json:
+    if job.as_json:
         click.echo(json.dumps(summaries, indent=1))
     return 1 if any(summary["failures"] for summary in summaries) else 0
 
 
-def show_status(studies: list[Study], options: Options) -> int:
+def show_status(job: Job) -> int:
     """Show the state of every case, and with `why` the reason; 1 if some have failed."""
     states = {
-        study.name: status_.status(study, options.results, quick=options.quick, full=options.full, why=options.why)
-        for study in studies
+        study.name: status.status(study, job.results, quick=job.quick, full=job.full, why=job.why)
+        for study in job.studies
     }
-    if options.as_json:
+    if job.as_json:
         click.echo(json.dumps(states, indent=1))
-    for name, rows in {} if options.as_json else states.items():
+    for name, rows in {} if job.as_json else states.items():
         counts = Counter(row["state"] for row in rows)
-        click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in status_.STATES if counts[state]))
-        for line in _grouped(rows) if options.why else _one_by_one(rows):
+        click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in status.STATES if counts[state]))
+        open_rows = [row for row in rows if row["state"] != status.DONE]
+        for line in _grouped(open_rows) if job.why else _one_by_one(open_rows):
             click.echo(f"  {line}")
-    return 1 if any(row["state"] == status_.FAILED for rows in states.values() for row in rows) else 0
+    return 1 if any(row["state"] == status.FAILED for rows in states.values() for row in rows) else 0
 
 
 def _one_by_one(rows: list[dict[str, Any]]) -> list[str]:
-    """A line for each case that is not done."""
     return [
         f"{row['state']:<8} {row['integrator']} on {row['scene']}" + (f": {row['message']}" if row["message"] else "")
         for row in rows
-        if row["state"] != status_.DONE
     ]
 
 
@@ -105,8 +100,7 @@ def _grouped(rows: list[dict[str, Any]]) -> list[str]:
     """A line for all cases that share a state and its reasons."""
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in rows:
-        if row["state"] != status_.DONE:
-            groups.setdefault((row["state"], row["message"] or ", ".join(row["why"])), []).append(row)
+        groups.setdefault((row["state"], row["message"] or ", ".join(row["why"])), []).append(row)
     return [
         f"{len(group)} {state}: {reason}: {_names(group, 'integrator')} on {_names(group, 'scene')}"
         for (state, reason), group in groups.items()
@@ -119,19 +113,18 @@ def _names(rows: list[dict[str, Any]], key: str) -> str:
     return ", ".join(names[:MOST_NAMED]) + more
 
 
-def check_all(studies: list[Study], options: Options, workers: Workers) -> int:
+def check_all(job: Job, workers: Workers) -> int:
     """Compute stored cases again and compare; 1 if anything is different."""
     checks = [
-        check.check(study, options.results, workers, quick=options.quick, full=options.full, everything=options.fresh)
-        for study in studies
+        check.check(study, job.results, workers, quick=job.quick, full=job.full, everything=job.fresh)
+        for study in job.studies
     ]
     if not any(entry.stored for entry in checks):
-        raise SymtopError(
-            f"no case of {', '.join(study.name for study in studies)} is up to date in {options.results}; run it first"
-        )
-    if options.as_json:
+        names = ", ".join(study.name for study in job.studies)
+        raise SymtopError(f"no case of {names} is up to date in {job.results}; run it first")
+    if job.as_json:
         click.echo(json.dumps([entry._asdict() for entry in checks], indent=1))
-    for entry in [] if options.as_json else checks:
+    for entry in [] if job.as_json else checks:
         click.echo(f"{entry.study}: {entry.compared} of {entry.stored} cases computed again, {entry.verdict()}")
         for difference in entry.differences:
             click.echo(f"  {difference}", err=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from symtop.cli.common import completing, json_option, load_plugins, plugin_option, results_option
+from symtop.cli.common import completing, json_option, plugin_option, results_option
 
 
 @click.command(short_help="Find the cheapest integrator for an accuracy.")
@@ -14,17 +14,12 @@ from symtop.cli.common import completing, json_option, load_plugins, plugin_opti
 @click.option("--accuracy", type=float, required=True, help="The largest error you accept, for example 1e-6.")
 @click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
-@click.option(
-    "--results",
-    type=click.Path(file_okay=False),
-    help="Folder with a stored work-precision study; results, if it holds one, by default.",
-)
+@click.option("--results", type=click.Path(file_okay=False), help="Folder of a stored study; results by default.")
 @plugin_option
 @json_option
 def recommend(
-    scene: str, accuracy: float, quantity: str, horizon: float | None, results: str | None,
-    plugin_files: tuple[str, ...], as_json: bool,
-) -> None:  # fmt: skip
+    scene: str, accuracy: float, quantity: str, horizon: float | None, results: str | None, as_json: bool
+) -> None:
     """Find the cheapest integrator and step that meet an accuracy on a SCENE.
 
     The exit code is 1 if none does.
@@ -38,7 +33,6 @@ def recommend(
 
     from symtop import advise
 
-    load_plugins(plugin_files)
     if results is None and (Path("results") / advise.STORED_STUDY).is_file():
         results = "results"
     advice = advise.recommend(scene, accuracy=accuracy, quantity=quantity, horizon=horizon, results=results)
@@ -70,14 +64,13 @@ def doctor(results: str, as_json: bool) -> None:
 @click.option("--port", type=int, default=0, help="Port to listen on; a free one by default.")
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
 @plugin_option
-def explore(port: int, no_browser: bool, plugin_files: tuple[str, ...]) -> None:
+def explore(port: int, no_browser: bool) -> None:
     """Show one run beside the exact motion in a browser, with sliders for the top, the start and the step."""
     import webbrowser
 
     from symtop.base.signals import TerminatedError, ending_on_sigterm
     from symtop.explore.server import address, serve
 
-    load_plugins(plugin_files)
     with ending_on_sigterm(), serve(port) as server:
         click.echo(f"symtop explore: {address(server)} (Ctrl-C ends it)")
         if not no_browser:

@@ -2,7 +2,7 @@
 
 numba stamps a cached kernel with the file of the function itself and does not see edits in the files it calls, so that
 an old kernel can return old numbers in silence; and it compiles again what only moved down by a line. Here the folder
-of a kernel is named after a hash of everything it is compiled from (`symtop.base.code`): instructions, constants and
+of a kernel is named after a hash of everything it is compiled from (`symtop.base.walk`): instructions, constants and
 values of its functions, wherever they stand, and the versions of Python and numba. A kernel found on disk loads in a
 few milliseconds; a cold one compiles in about half a second.
 
@@ -25,8 +25,8 @@ from numba.cpython.unsafe.tuple import tuple_setitem
 from numba.extending import register_jitable as _register
 
 from symtop.base.cache import cache_root, prune, touch
-from symtop.base.code import CodeWalk
-from symtop.base.fingerprint import by_name, digest
+from symtop.base.fingerprint import digest
+from symtop.base.walk import Walk, by_name
 
 __all__ = ["code_of", "compile_kernel", "register_jitable", "set_item"]
 
@@ -63,9 +63,9 @@ def _overloads(function: FunctionType) -> Iterator[object]:
         yield getattr(template, "_jit_options", None)
 
 
-def code_of(thing: object) -> CodeWalk:
+def code_of(thing: object) -> Walk:
     """What a kernel, or anything that holds kernels, is compiled from."""
-    walk = CodeWalk("kernel", also=_overloads)
+    walk = Walk("kernel", whole=False, also=_overloads)
     walk.add((thing, OPTIONS, sys.version_info[:2], numba.__version__))
     return walk
 

@@ -9,6 +9,7 @@ know of a method is a field of its record.
 import importlib
 import importlib.metadata
 import math
+import threading
 import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
@@ -18,8 +19,8 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.base.fingerprint import by_name
 from symtop.base.validate import SymtopError, SymtopWarning, finite, label, one_of, positive, whole
+from symtop.base.walk import by_name
 from symtop.methods.about import paragraphs
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View
@@ -221,19 +222,21 @@ _registry: dict[str, Integrator] = {}
 _loaded: list[str] = []
 _announced: list[str] = []
 _shipped: set[str] = set()  # by symtop or an installed package: every process has them
+_loading = threading.RLock()  # the first call of one thread loads; a package that is being loaded may register
 
 
 def _load() -> None:
-    while len(_loaded) < len(_BUILT_IN):
-        module = importlib.import_module(f"symtop.methods.{_BUILT_IN[len(_loaded)]}")
-        _loaded.append(module.__name__)
-        for entry in module.built_in():
-            told = replace(entry, about=entry.about or paragraphs().get(entry.name, ""))
-            _registry.setdefault(entry.name, told)
-            _shipped.add(entry.name)
-    if not _announced:
-        _announced.append(ENTRY_POINTS)
-        _load_packages()
+    with _loading:
+        while len(_loaded) < len(_BUILT_IN):
+            module = importlib.import_module(f"symtop.methods.{_BUILT_IN[len(_loaded)]}")
+            _loaded.append(module.__name__)
+            for entry in module.built_in():
+                told = replace(entry, about=entry.about or paragraphs().get(entry.name, ""))
+                _registry.setdefault(entry.name, told)
+                _shipped.add(entry.name)
+        if not _announced:
+            _announced.append(ENTRY_POINTS)
+            _load_packages()
 
 
 def _load_packages() -> None:

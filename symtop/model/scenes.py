@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from symtop.base.fingerprint import by_name
 from symtop.base.numbers import TINY
 from symtop.base.validate import SymtopError, finite, label, one_of, positive
+from symtop.base.walk import by_name
 from symtop.model.top import Angles, SymmetricTop
 
 if TYPE_CHECKING:

@@ -192,7 +192,7 @@ def _summary(values: dict[str, Array]) -> list[float]:
 def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
     """A hash of all that decides the bits of a run; one name may stand for other coefficients or code next time.
 
-    Code counts as it is compiled (`symtop.base.code`), so that a checkpoint outlives a comment.
+    Code counts as it is compiled (`symtop.base.walk`), so that a checkpoint outlives a comment.
     """
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (scene.top, scene.start)]
     made = code_of((method, watch, windows, scattered, _summary))

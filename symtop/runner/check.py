@@ -12,17 +12,13 @@ import numpy as np
 import xarray as xr
 
 from symtop.base import datasets
-from symtop.runner import plugins, store
-from symtop.runner.execute import execute
+from symtop.runner import store
 from symtop.runner.pools import Workers
 from symtop.runner.run import Round
-from symtop.runner.scripts import file_of
-from symtop.runner.study import Case, Combined, Study
-from symtop.runner.work import Result, Task
+from symtop.runner.study import Combined, Study
 
 SAMPLE = 5  # cases of each study
-# in the name of a variable that holds measured times
-CLOCKED = ("seconds", "reliable", "spread", "first_call", "foreseen")
+CLOCKED = ("seconds", "reliable", "spread", "first_call", "foreseen")  # in the names of variables of measured times
 
 
 class Checked(NamedTuple):
@@ -94,36 +90,20 @@ def check(
     study: Study, results: Path, workers: Workers, *, quick: bool = False, full: bool = False, everything: bool = False
 ) -> Checked:
     """Compute `SAMPLE` stored cases again, or every one, and compare; likewise the dataset that they make together."""
-    cases = Round(study, results.resolve())
-    if not cases.add(study.grid(quick=quick, full=full), fresh=False) and study.follow_up is not None:
-        cases.add(study.follow_up(cases.combined()), fresh=False)
-    stored = dict(
-        sorted(cases.done.items(), key=lambda item: store.digest_of(item[0]))
-    )  # by digest: a sample of all parts of the grid
-    chosen = dict(list(stored.items())[: None if everything else SAMPLE])
+    cases = Round.stored(study, results, quick=quick, full=full)
+    # in the order of their digests, so that a sample is one of all parts of the grid
+    stored = sorted(cases.done.items(), key=lambda item: store.digest_of(item[0]))
+    chosen = {path.name: case for path, case in stored[: None if everything else SAMPLE]}
     with tempfile.TemporaryDirectory(prefix="symtop-check-") as elsewhere:
-        again = {Path(elsewhere) / path.name: (path, case) for path, (case, _) in chosen.items()}
-        differing = _recompute(study, {path: case for path, (_, case) in again.items()}, workers)
-        for path, (original, case) in again.items():
-            data = store.load_case(path)
-            if data is not None:
-                label = f"{case.integrator} on {case.scene}"
-                differing += [f"{label}: {text}" for text in differences(chosen[original][1], data)]
+        again = Round(study, Path(elsewhere).resolve())
+        missing = again.add([case for case, _ in chosen.values()], fresh=True)
+        again.compute(missing, workers, study.limit, fresh=False, quiet=True)
+    differing = again.failures
+    for path, (case, data) in again.done.items():
+        label = f"{case.integrator} on {case.scene}"
+        differing += [f"{label}: {text}" for text in differences(chosen[path.name][1], data)]
     whole = results / f"{study.name}.nc"
     if whole.is_file() and len(stored) == len(cases.paths):
         kept, made = _bare(datasets.read_any(whole)), _bare(cases.combined())
         differing += [f"{whole.name}: {text}" for text in differences(kept, made)]
     return Checked(study.name, len(stored), len(chosen), differing)
-
-
-def _recompute(study: Study, cases: dict[Path, Case], workers: Workers) -> list[str]:
-    script = str(file_of(study.name))
-    tasks = [Task(script, case, str(path), tuple(plugins.loaded()), study.limit) for path, case in cases.items()]
-    failures: list[str] = []
-
-    def heard(_: Task, result: Result) -> None:
-        if result.state == "failed":
-            failures.append(result.message)
-
-    execute(study, tasks, workers, heard)
-    return failures

@@ -14,12 +14,13 @@ is reached only through them (the guard, which runs pieces of a method) makes a 
 import ast
 import functools
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from symtop.base import datasets, fingerprint, imports
-from symtop.base.fingerprint import Reasons, Walk
+from symtop.base.fingerprint import Reasons
+from symtop.base.walk import Walk
 from symtop.methods import registry
 from symtop.methods.registry import Integrator, integrators
 from symtop.model.scenes import scenes
@@ -29,9 +30,6 @@ from symtop.runner.study import Case, Study
 
 EVERY = "*"  # in place of an integrator's or a scene's name: all of them
 ASKING = {"integrator", "integrators", "registry", "simulate"}  # names whose import means that a file may run a method
-
-
-# they look up what they are given
 RESOLVERS = frozenset(Path(str(module.__file__)).resolve() for module in (simulation, registry))
 
 
@@ -40,49 +38,42 @@ def _tree(file: Path) -> ast.Module:
     return ast.parse(file.read_bytes())
 
 
-def _strings(trees: Iterable[ast.Module]) -> set[str]:
-    return {
-        node.value
-        for tree in trees
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-    }
-
-
 def _asks_for(file: Path) -> set[str]:
-    """Names by which a file imports integrators, the registry or runs from this package."""
-    return {
-        name for module, names in imports.imported(file) if module.partition(".")[0] in imports.roots for name in names
-    } & ASKING
+    """Names by which a file imports integrators, the registry or runs from a known package."""
+    statements = imports.imported(file)
+    return {name for module, names in statements if module.split(".")[0] in imports.roots for name in names} & ASKING
 
 
-def _looks_up(file: Path) -> bool:
+def _may_run_any(file: Path) -> bool:
     """Does a file ask the registry for integrators of its own choice?
 
-    What it is given as an argument is its caller's choice, and a name that it spells out is found by that name.
+    It does if it imports all of them, or calls `integrator` on anything but a literal name, which is found as a string,
+    and an argument of the function around it, which its caller chooses.
     """
     names = _asks_for(file)
-    return bool(names & {"integrators", "registry"}) or ("integrator" in names and _chooses(_tree(file)))
-
-
-def _chooses(tree: ast.Module) -> bool:
-    """Is `integrator` used otherwise than on a literal name or on an argument of the function around it?"""
+    if names & {"integrators", "registry"}:
+        return True
+    tree = _tree(file)
     imported = [alias for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names]
     aliases = {alias.asname or alias.name for alias in imported if alias.name == "integrator"}
-    harmless: set[int] = set()
+    harmless: set[ast.AST] = set()
     for function in ast.walk(tree):
         if isinstance(function, ast.FunctionDef):
             given = {argument.arg for argument in ast.walk(function.args) if isinstance(argument, ast.arg)}
             for node in ast.walk(function):
                 if isinstance(node, ast.Name) and node.id in given:  # not what was imported under that name
-                    harmless.add(id(node))
-                if isinstance(node, ast.Call) and len(node.args) == 1:
-                    what = node.args[0]
-                    if isinstance(what, ast.Constant) or (isinstance(what, ast.Name) and what.id in given):
-                        harmless.add(id(node.func))
-    return any(
-        isinstance(node, ast.Name) and node.id in aliases and id(node) not in harmless for node in ast.walk(tree)
-    )
+                    harmless.add(node)
+                elif isinstance(node, ast.Call) and len(node.args) == 1:
+                    (chosen,) = node.args
+                    if isinstance(chosen, ast.Constant) or (isinstance(chosen, ast.Name) and chosen.id in given):
+                        harmless.add(node.func)
+    uses = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id in aliases]
+    return any(node not in harmless for node in uses)
+
+
+def _strings(file: Path) -> set[str]:
+    nodes = ast.walk(_tree(file))
+    return {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
 
 
 class Basis(NamedTuple):
@@ -90,20 +81,19 @@ class Basis(NamedTuple):
 
     values: Reasons
     files: frozenset[Path]
-    names: frozenset[str]  # integrators that it names
-    every: bool  # it asks the registry, so that it may run any
+    names: frozenset[str]  # integrators that it names, or EVERY if it may run any
 
 
 @functools.cache
 def basis(measure: Callable[..., Any]) -> Basis:
-    """The basis of a study's measure."""
+    """What a study's measure depends on."""
     walk = Walk("measure")
     walk.add(measure)
-    files = walk.closure()
-    asking = [file for file in imports.closure(frozenset(walk.files), RESOLVERS) - RESOLVERS if _asks_for(file)]
-    spelled = _strings(_tree(file) for file in asking) | walk.strings
-    every = integrators in walk.functions or any(_looks_up(file) for file in asking)
-    return Basis(walk.values(), files, frozenset(spelled & set(integrators())), every)
+    asking = [file for file in imports.closure(walk.files, RESOLVERS) - RESOLVERS if _asks_for(file)]
+    names = walk.strings.union(*map(_strings, asking)) & integrators().keys()
+    if integrators in walk.functions or any(map(_may_run_any, asking)):
+        names.add(EVERY)
+    return Basis(walk.values(), walk.closure(), frozenset(names))
 
 
 _walked: dict[int, tuple[Integrator, Reasons, frozenset[Path]]] = {}
@@ -120,13 +110,12 @@ def _of_integrator(entry: Integrator) -> tuple[Reasons, frozenset[Path]]:
 
 def used(study: Study, case: Case) -> list[str]:
     """Names of the integrators that a case runs: what the study declares, or everything that it might run."""
-    methods = integrators()
     if study.uses is not None:
         names = set(study.uses(case))
     else:
-        base = basis(study.measure)
-        names = {case.integrator, *case.settings.get("integrators", ()), *base.names, *([EVERY] if base.every else [])}
-    return sorted(methods) if EVERY in names else sorted(names & set(methods))
+        names = {case.integrator, *case.settings.get("integrators", ()), *basis(study.measure).names}
+    known = integrators().keys()
+    return sorted(known if EVERY in names else names & known)
 
 
 def settings_key(study: Study, case: Case) -> str:
@@ -166,7 +155,6 @@ def digest(study: Study, case: Case) -> str:
 
 def script_digest(script: Path, *drawing: object) -> str:
     """Hash of what makes a study's pictures, tables and verdict: its script, all that it imports, and `drawing`."""
-    walk = Walk("drawing", files=set(imports.imports_of(script)))
+    walk = Walk("drawing", files={script})
     walk.add(drawing)
-    script_itself = {"script": fingerprint.file_hash(script), **fingerprint.packages("matplotlib")}
-    return fingerprint.digest(script_itself | walk.values() | _hashes(walk.closure()))
+    return fingerprint.digest(fingerprint.packages("matplotlib") | walk.values() | _hashes(walk.closure()))

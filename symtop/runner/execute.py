@@ -20,11 +20,11 @@ from symtop.runner.work import Result, Task
 WORTH_A_POOL = 8  # cases; starting a worker costs two seconds
 MOST_FRUITLESS = 3  # pools that may break without having begun anything
 
-Heard = Callable[[Task, Result], None]
+OnResult = Callable[[Task, Result], None]
 
 
-def execute(study: Study, tasks: Iterable[Task], workers: Workers, heard: Heard) -> None:
-    """Compute all tasks and call `heard` with each as it ends, in any order; timed ones last, one at a time.
+def execute(study: Study, tasks: Iterable[Task], workers: Workers, on_result: OnResult) -> None:
+    """Compute all tasks and call `on_result` with each as it ends, in any order; timed ones last, one at a time.
 
     Raises SymtopError if the results cannot be written or the workers cannot work.
     """
@@ -32,7 +32,7 @@ def execute(study: Study, tasks: Iterable[Task], workers: Workers, heard: Heard)
     for timed in (False, True):
         group = [task for task in chosen if study.is_timed(task.case) == timed]
         if group:
-            _see_through(study, group, workers, size_for(group, workers, timed=timed), heard, timed=timed)
+            _run_until_done(study, group, workers, size_for(group, workers, timed=timed), on_result, timed=timed)
 
 
 def size_for(tasks: list[Task], workers: Workers, *, timed: bool) -> int:
@@ -47,23 +47,25 @@ def size_for(tasks: list[Task], workers: Workers, *, timed: bool) -> int:
         return CLUSTER
     if len(tasks) < WORTH_A_POOL:
         return HERE
-    return workers.hired() or 1 if timed else min(workers.jobs, len(tasks))
+    return workers.open_size() or 1 if timed else min(workers.jobs, len(tasks))
 
 
-def _see_through(study: Study, tasks: list[Task], workers: Workers, size: int, heard: Heard, *, timed: bool) -> None:
+def _run_until_done(
+    study: Study, tasks: list[Task], workers: Workers, size: int, on_result: OnResult, *, timed: bool
+) -> None:
     left = {task.path: task for task in tasks}
-    doubted: list[Task] = []
+    suspects: list[Task] = []
     fruitless = 0
 
-    def note(task: Task, result: Result) -> None:
+    def settle(task: Task, result: Result) -> None:
         left.pop(task.path)
-        heard(task, result)
+        on_result(task, result)
 
     while left:
-        suspect = next((task for task in doubted if task.path in left), None)
+        suspect = next((task for task in suspects if task.path in left), None)
         now = size if suspect is None else 1
         try:
-            _drain(study, list(left.values()) if suspect is None else [suspect], workers, now, note, timed=timed)
+            _drain(study, list(left.values()) if suspect is None else [suspect], workers, now, settle, timed=timed)
         except BrokenExecutor:
             workers.drop(now)
             begun = [task for task in left.values() if store.was_begun(Path(task.path))]
@@ -73,29 +75,30 @@ def _see_through(study: Study, tasks: list[Task], workers: Workers, size: int, h
                     "the worker processes end before they begin; try --jobs 1 or look at the memory that is left"
                 ) from None
             for task in begun:
-                _judge(task, note, doubted, alone=task is suspect)
+                result = _settled(task, alone=task is suspect)
+                if result is None:
+                    suspects.append(task)
+                else:
+                    settle(task, result)
 
 
-def _judge(task: Task, note: Heard, doubted: list[Task], *, alone: bool) -> None:
-    """Settle a case whose process has ended: it hung, it ended its process, or it is put down to be tried alone."""
-    trace = work.trace_path(Path(task.path))
+def _settled(task: Task, *, alone: bool) -> Result | None:
+    """How a case failed whose process has ended: it hung, or it ended its process; None if that is not known yet."""
+    trace = store.trace_path(Path(task.path))
     traceback = trace.read_text() if trace.is_file() else ""
     trace.unlink(missing_ok=True)
     if traceback:
-        _fail(task, f"it was not done after {task.limit:g} s and did not answer", traceback, note)
-    elif alone:
-        _fail(task, "its process was ended, by the system (memory) or by the method itself", "", note)
-    else:
-        doubted.append(task)
+        return _failed(task, f"it was not done after {task.limit:g} s and did not answer", traceback)
+    return _failed(task, "its process was ended, by the system (memory) or by the method itself") if alone else None
 
 
-def _fail(task: Task, reason: str, trace: str, note: Heard) -> None:
+def _failed(task: Task, reason: str, trace: str = "") -> Result:
     message = work.sentence(task.case, reason)
     store.save_failure(Path(task.path), task.case, message, trace)
-    note(task, Result("failed", message))
+    return Result("failed", message)
 
 
-def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, note: Heard, *, timed: bool) -> None:
+def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, settle: OnResult, *, timed: bool) -> None:
     """Hand over all tasks, the first of each integrator before its others."""
     pool, width = workers.pool(size), 1 if timed else workers.width(size)
     given = study if size == HERE else None  # other processes load it by name
@@ -114,16 +117,16 @@ def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, note: H
             futures[pool.submit(work.compute, task, given, wait=patient)] = task
         for future in wait(futures, return_when=FIRST_COMPLETED).done:
             task = futures.pop(future)
-            result = _result(future, task, workers, note)
+            result = _result(future, task, workers)
             ready.extend(followers.pop(task.case.integrator, ()))
-            if result is not None and result.state == "busy":
+            if result.state == "busy":
                 elsewhere.append(task)
-            elif result is not None:
-                note(task, result)
+            else:
+                settle(task, result)
 
 
-def _result(future: "Future[Result]", task: Task, workers: Workers, note: Heard) -> Result | None:
-    """The result that a worker returned; None if the cluster gave the case up, which is recorded as a failure."""
+def _result(future: "Future[Result]", task: Task, workers: Workers) -> Result:
+    """The result that a worker returned; a case that the cluster gave up has failed."""
     try:
         return future.result()
     except (SymtopError, BrokenExecutor):
@@ -133,5 +136,4 @@ def _result(future: "Future[Result]", task: Task, workers: Workers, note: Heard)
     except Exception as error:
         if not workers.scheduler:
             raise
-        _fail(task, f"the cluster gave it up: {type(error).__name__}: {error}", "", note)
-        return None
+        return _failed(task, f"the cluster gave it up: {type(error).__name__}: {error}")

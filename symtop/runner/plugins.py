@@ -1,15 +1,12 @@
 """Plug-ins: a user's Python file that registers integrators and scenes of its own."""
 
-import importlib.util
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
 from symtop.base import fingerprint
-from symtop.base.signals import TerminatedError
-from symtop.base.validate import SymtopError
 from symtop.methods.registry import integrators, is_built_in
 from symtop.model.scenes import added_scenes, scenes
+from symtop.runner import scripts
 
 MOST_NEIGHBOURS = 100  # files beside a plug-in that count, because it may import them
 _loaded: dict[Path, str] = {}  # files of plug-ins in use, and their hashes
@@ -18,33 +15,16 @@ _owners: dict[str, tuple[str, str]] = {}  # of an integrator or a scene: the lab
 
 def load(path: str | Path) -> None:
     """Run a plug-in file once; what it registers is then known to every study and command."""
-    file = Path(path).absolute()
-    try:
-        file = file.resolve()
-        exists = file.is_file()
-    except (OSError, ValueError):  # a name that is too long, or holds a null character
-        exists = False
+    file = scripts.python_file(path, "plugin must be a Python file")
     if file in _loaded:
         return
-    if not exists:
-        raise SymtopError(f"plugin must be a Python file, not {str(path)!r}")
-    before = set(integrators()) | set(scenes())
-    name = f"symtop_plugin_{file.stem}"
-    spec = importlib.util.spec_from_file_location(name, file)
-    if spec is None or spec.loader is None:
-        raise SymtopError(f"plugin must be a Python file, not {str(path)!r}")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # kernels are cached under the name of their module
-    try:
-        spec.loader.exec_module(module)
-    except (SymtopError, TerminatedError):
-        raise
-    except (Exception, SystemExit) as error:
-        raise SymtopError(f"plugin {file.name} failed: {type(error).__name__}: {error}") from error
+    before = {*integrators(), *scenes()}
+    with scripts.loading(f"plugin {file.name}"):
+        scripts.execute(f"symtop_plugin_{file.stem}", file)
     beside = [file, *sorted(file.parent.glob("*.py"))[:MOST_NEIGHBOURS]]
     _loaded[file] = fingerprint.hashed(*(fingerprint.file_hash(path) for path in beside))
     made_of = f"plug-in {file.name}", _loaded[file]
-    _owners.update(dict.fromkeys((set(integrators()) | set(scenes())) - before, made_of))
+    _owners.update(dict.fromkeys({*integrators(), *scenes()} - before, made_of))
 
 
 def loaded() -> list[str]:

@@ -11,8 +11,7 @@ import os
 import warnings
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from symtop.base.validate import SymtopError
 from symtop.runner import work
@@ -34,7 +33,7 @@ class InProcess(Executor):
         return future
 
 
-class Workers:
+class Workers(contextlib.AbstractContextManager["Workers"]):
     """Pools of processes by their size, and the cluster if there is one; `jobs` is how many untimed cases may take."""
 
     def __init__(self, jobs: int | None = None, scheduler: str | None = None) -> None:
@@ -50,15 +49,15 @@ class Workers:
             import distributed
         except ImportError:
             raise SymtopError("scheduler needs the package distributed: pip install 'symtop[distributed]'") from None
-        failure = None
+        failure = ""
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # other versions there; the digest of every case is compared anyway
                 self._client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
                 self._client.wait_for_workers(1, timeout=PATIENCE)
         except (OSError, ValueError, RuntimeError) as error:
-            failure = _short(error)
-        if failure is not None:  # out of the handler, so that nothing holds on to what was half made
+            failure = " ".join((str(error) or type(error).__name__).split())[:120]
+        if failure:  # out of the handler, so that nothing holds on to what was half made
             self._leave()
             gc.collect()  # a client that never connected closes itself here, and not under a lock of the next one
             must = "the address of a dask scheduler that answers and has workers"
@@ -69,10 +68,10 @@ class Workers:
         """The executor of so many processes, of HERE or of the CLUSTER."""
         if size not in self._pools:
             context = multiprocessing.get_context("spawn")
-            self._pools[size] = ProcessPoolExecutor(size, context, work.obey, (os.getpid(),))
+            self._pools[size] = ProcessPoolExecutor(size, context, work.begin_worker, (os.getpid(),))
         return self._pools[size]
 
-    def hired(self) -> int:
+    def open_size(self) -> int:
         """The size of the largest pool of processes that is open, or 0."""
         return max(self._pools, default=HERE)
 
@@ -103,12 +102,7 @@ class Workers:
                 self._client.close(timeout=PATIENCE)
             self._client = None
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -126,10 +120,6 @@ def _kill(pool: ProcessPoolExecutor) -> None:
         process.terminate()
     for process in processes:
         process.join(2.0)
-        if process.is_alive():  # deaf in compiled code
+        if process.is_alive():  # in compiled code, which hears no signal
             process.kill()
     pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _short(error: BaseException) -> str:
-    return " ".join((str(error) or type(error).__name__).split())[:120]

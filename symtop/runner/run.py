@@ -7,18 +7,17 @@ written to a file is the caller's choice (`Save`): this room knows no style.
 """
 
 import contextlib
-import hashlib
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import xarray as xr
 from tqdm import tqdm
 
-from symtop.base import datasets
+from symtop.base import datasets, fingerprint
 from symtop.base.validate import SymtopError, positive
 from symtop.runner import depends, plugins, store
 from symtop.runner.execute import execute
@@ -46,6 +45,14 @@ class Round:
     failures: list[str] = field(default_factory=list)
     computed: int = 0
 
+    @classmethod
+    def stored(cls, study: Study, results: Path, *, quick: bool, full: bool) -> Self:
+        """The cases of a study with what is stored of them; of the second round only if the first one is done."""
+        cases = cls(study, results.resolve())
+        if not cases.add(study.grid(quick=quick, full=full), fresh=False) and study.follow_up is not None:
+            cases.add(study.follow_up(cases.combined()), fresh=False)
+        return cases
+
     def add(self, cases: Iterable[Case], *, fresh: bool) -> dict[Path, Case]:
         """Take cases in; returns those that have to be computed."""
         new = {store.case_path(self.results, self.study, case): case for case in cases}
@@ -54,50 +61,39 @@ class Round:
             self._look(new)
         return {path: case for path, case in new.items() if path not in self.done}
 
-    def _look(self, paths: dict[Path, Case]) -> None:
+    def _look(self, paths: Iterable[Path]) -> None:
         loaded = {path: data for path in paths if (data := store.load_case(path)) is not None}
-        self.done |= {path: (paths[path], data) for path, data in loaded.items()}
+        self.done |= {path: (self.paths[path], data) for path, data in loaded.items()}
 
     def compute(self, missing: dict[Path, Case], workers: Workers, limit: float, *, fresh: bool, quiet: bool) -> None:
         """Have cases computed, with a progress bar where somebody is watching."""
         script = str(file_of(self.study.name))
         tasks = [Task(script, case, str(path), tuple(plugins.loaded()), limit, fresh) for path, case in missing.items()]
-        with _bar(self.study.name, len(tasks), quiet=quiet) as bar:
+        unseen = quiet or sys.stderr is None or not sys.stderr.isatty() or not tasks
+        with tqdm(total=len(tasks), desc=self.study.name, unit="case", disable=unseen, leave=False) as bar:
 
-            def heard(_: Task, result: Result) -> None:
+            def on_result(_: Task, result: Result) -> None:
                 if result.state == "failed":
                     self.failures.append(result.message)
                     bar.set_postfix_str(f"{len(self.failures)} failed", refresh=False)
                 self.computed += result.state == "computed"
                 bar.update()
 
-            execute(self.study, tasks, workers, heard)
+            execute(self.study, tasks, workers, on_result)
         self._look(missing)
-
-    def in_order(self) -> list[tuple[Case, xr.Dataset]]:
-        """Cases and what they measured, in the order of the grid."""
-        return [self.done[path] for path in self.paths if path in self.done]
 
     def combined(self) -> Combined:
         """One dataset of all that was measured, or a tree of one for each group of cases."""
         if not self.done:
             why = self.failures[0] if self.failures else "the grid is empty"
             raise SymtopError(f"study {self.study.name}: no case could be measured; {why}")
-        return store.combine(self.in_order())
-
-
-def _bar(name: str, total: int, *, quiet: bool) -> Any:
-    unseen = quiet or sys.stderr is None or not sys.stderr.isatty() or total == 0
-    return tqdm(total=total, desc=name, unit="case", disable=unseen, leave=False)
+        return store.combine([self.done[path] for path in self.paths if path in self.done])
 
 
 def _stamp(study: Study, digests: Iterable[str], save: Save | None) -> str:
     """Hash of what the findings depend on: the cases, the script and the code that combines, draws and judges."""
-    digest = hashlib.sha256("".join(digests).encode())
-    if study.follow_up is not None:  # its cases are timed
-        digest.update(datasets.provenance()["processor"].encode())
-    digest.update(depends.script_digest(file_of(study.name), store, save).encode())
-    return digest.hexdigest()[:20]
+    processor = "" if study.follow_up is None else datasets.provenance()["processor"]  # the second round is timed
+    return fingerprint.hashed(*digests, processor, depends.script_digest(file_of(study.name), store, save))
 
 
 def _drawn(study: Study, results: Path, stamp: str) -> dict[str, Any] | None:
@@ -110,20 +106,6 @@ def _drawn(study: Study, results: Path, stamp: str) -> dict[str, Any] | None:
     except (KeyError, TypeError):
         return None
     return before if all(file.is_file() for file in [*pictures, results / f"{study.name}.nc"]) else None
-
-
-@contextlib.contextmanager
-def _hired(workers: Workers | None, jobs: int | None, results: Path, study: Study) -> Iterator[Workers]:
-    """Those workers, or new ones that are closed at the end; after an early end no partial file is left."""
-    hired = workers or Workers(jobs)
-    try:
-        yield hired
-    except BaseException:
-        hired.close()
-        store.tidy(results, study)
-        raise
-    if workers is None:
-        hired.close()
 
 
 def run(study: Study, results: Path, *, quick: bool = False, full: bool = False, fresh: bool = False,
@@ -146,12 +128,17 @@ def run(study: Study, results: Path, *, quick: bool = False, full: bool = False,
     before = _drawn(study, results, stamp)
     if before is not None and not missing:
         return {**before, "computed": 0, "seconds": time.monotonic() - began}
-    with _hired(workers, jobs, results, study) as hired:
-        cases.compute(missing, hired, seconds, fresh=fresh, quiet=quiet)
-        if study.follow_up is not None:
-            later = cases.add(study.follow_up(cases.combined()), fresh=fresh)
-            cases.compute(later, hired, seconds, fresh=fresh, quiet=quiet)
-    with store.claim(results / f"{study.name}.nc", wait=True):
+    with Workers(jobs) if workers is None else contextlib.nullcontext(workers) as hired:
+        try:
+            cases.compute(missing, hired, seconds, fresh=fresh, quiet=quiet)
+            if study.follow_up is not None:
+                later = cases.add(study.follow_up(cases.combined()), fresh=fresh)
+                cases.compute(later, hired, seconds, fresh=fresh, quiet=quiet)
+        except BaseException:
+            hired.close()  # before what its processes have left is removed
+            store.tidy(results, study)
+            raise
+    with store.locked(results / f"{study.name}.nc", wait=True):
         findings = _conclude(cases, stamp, save, quick=quick)
     return {**findings, "computed": cases.computed, "seconds": time.monotonic() - began}
 

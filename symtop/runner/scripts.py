@@ -1,18 +1,21 @@
-"""The scripts of the studies: where they are, their names, and how one is loaded.
+"""The scripts of the studies: where they are, their names, and how a Python file is loaded.
 
 A study that ships with symtop is a package of its own, ``symtop_studies.NAME``, whose module ``study`` defines
 ``STUDY``. Its folder lies beside the package: `studies` in a checkout, `symtop_studies` in an installed wheel; both are
 imported under the second name, in the same way. Any other study is a Python file that the user names, alone or in a
-package of its own (a folder with an ``__init__.py``), so that it may import what stands beside it.
+package of its own (a folder with an ``__init__.py``), so that it may import what stands beside it. Files of both kinds
+of packages count as wholes in a fingerprint, but for the scripts: a new caption measures nothing again.
 """
 
+import contextlib
 import importlib
 import importlib.util
 import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import ModuleType
 
-from symtop.base import fingerprint
+from symtop.base import imports, walk
 from symtop.base.signals import TerminatedError
 from symtop.base.validate import SymtopError, one_of
 from symtop.runner.study import Study
@@ -31,23 +34,37 @@ def folder() -> Path:
     raise SymtopError(f"no studies lie beside the package in {beside}; install symtop again")
 
 
-def _package(name: str, place: Path) -> ModuleType:
-    """The package of that name in that folder; imported once."""
-    file = place / "__init__.py"
-    module = sys.modules.get(name)
-    if module is None or getattr(module, "__file__", None) != str(file):
-        for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
-            del sys.modules[stale]  # of another folder with the same name
-        module = _executed(name, file, [str(place)])
-    return module
+def python_file(path: str | Path, wanted: str) -> Path:
+    """A file by its path; SymtopError with the sentence `wanted` if it is not there."""
+    try:
+        file = Path(path).resolve()
+        if file.is_file():
+            return file
+    except (OSError, ValueError):  # a name that is too long, or holds a null character
+        pass
+    raise SymtopError(f"{wanted}, not {str(path)!r}")
 
 
-def _executed(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
+@contextlib.contextmanager
+def loading(what: str) -> Iterator[None]:
+    """Whatever the code of a user's file raises becomes a SymtopError that names the file."""
+    try:
+        yield
+    except (SymtopError, TerminatedError):
+        raise
+    except (Exception, SystemExit) as error:
+        raise SymtopError(f"{what} failed: {type(error).__name__}: {error}") from error
+
+
+def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
+    """A module of that name from a file, or a package if its `places` are given."""
+    for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
+        del sys.modules[stale]  # of another folder with the same name
     spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=places)
     if spec is None or spec.loader is None:
-        raise SymtopError(f"study {str(file)!r} cannot be loaded")
+        raise SymtopError(f"{str(file)!r} cannot be loaded: its name must end in .py")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
+    sys.modules[name] = module  # also because kernels are cached under the name of their module
     try:
         spec.loader.exec_module(module)
     except BaseException:
@@ -56,13 +73,20 @@ def _executed(name: str, file: Path, places: list[str] | None = None) -> ModuleT
     return module
 
 
-def install() -> ModuleType:
-    """Make ``import symtop_studies`` work, wherever the studies lie.
+def _once(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
+    module = sys.modules.get(name)
+    return module if module is not None and module.__file__ == str(file) else execute(name, file, places)
 
-    Their files count as wholes in a fingerprint, but for the scripts: a new caption measures nothing again.
-    """
-    fingerprint.add_root(STUDIES, folder(), by_text=["study.py"])
-    return _package(STUDIES, folder())
+
+def _package(name: str, place: Path, scripts: Iterable[Path]) -> ModuleType:
+    imports.add_root(name, place)
+    walk.by_code.update(scripts)
+    return _once(name, place / "__init__.py", [str(place)])
+
+
+def install() -> ModuleType:
+    """Make ``import symtop_studies`` work, wherever the studies lie."""
+    return _package(STUDIES, folder(), folder().glob("*/study.py"))
 
 
 def names() -> list[str]:
@@ -74,41 +98,25 @@ def names() -> list[str]:
 
 def file_of(name: str) -> Path:
     """The script of a study: a shipped one by its name, or any by its path, which ends in .py."""
-    if not name.endswith(".py"):
-        return _elsewhere.get(name) or folder() / one_of("study", name, names()) / "study.py"
-    try:
-        path = Path(name).resolve()
-        is_there = path.is_file()
-    except (OSError, ValueError):  # a name that is too long, or holds a null character
-        is_there = False
-    if not is_there:
-        raise SymtopError(f"study must be a name or a Python file that is there, not {name!r}")
-    return path
+    if name.endswith(".py"):
+        return python_file(name, "study must be a name or a Python file that is there")
+    return _elsewhere.get(name) or folder() / one_of("study", name, names()) / "study.py"
 
 
 def _module(file: Path) -> ModuleType:
-    """The module of a script, imported once."""
     if file.parent.parent == folder():
-        install()
-        return importlib.import_module(f"{STUDIES}.{file.parent.name}.{file.stem}")
+        return importlib.import_module(f"{install().__name__}.{file.parent.name}.{file.stem}")
     if (file.parent / "__init__.py").is_file():
-        package = _package(f"symtop_study_{file.parent.name}", file.parent)
+        package = _package(f"symtop_study_{file.parent.name}", file.parent, [file])
         return importlib.import_module(f"{package.__name__}.{file.stem}")
-    name = f"symtop_study_{file.stem}"
-    module = sys.modules.get(name)
-    return module if module is not None and module.__file__ == str(file) else _executed(name, file)
+    return _once(f"symtop_study_{file.stem}", file)
 
 
 def load(name: str) -> Study:
     """The study of that name or in that file."""
     file = file_of(name)
-    try:
-        module = _module(file)
-    except (SymtopError, TerminatedError):
-        raise
-    except (Exception, SystemExit) as error:
-        raise SymtopError(f"study {file.name} failed: {type(error).__name__}: {error}") from error
-    study = getattr(module, "STUDY", None)
+    with loading(f"study {file.name}"):
+        study = getattr(_module(file), "STUDY", None)
     if not isinstance(study, Study):
         raise SymtopError(f"study {file.name} must define STUDY, a Study, not {study!r}")
     if file.parent.parent != folder():

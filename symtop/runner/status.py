@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from symtop.base import datasets, fingerprint
+from symtop.base.validate import SymtopError
 from symtop.runner import depends, store
 from symtop.runner.run import Round
 from symtop.runner.study import Case, Study
@@ -28,10 +29,7 @@ def status(
 
     The second round of a study is known only when its first is done.
     """
-    cases = Round(study, results.resolve())
-    missing = cases.add(study.grid(quick=quick, full=full), fresh=False)
-    if study.follow_up is not None and not missing:
-        cases.add(study.follow_up(cases.combined()), fresh=False)
+    cases = Round.stored(study, results, quick=quick, full=full)
     stored = store.stored(cases.results, study)
     older = store.superseded(stored, cases.paths)
     rows = []
@@ -55,7 +53,7 @@ def status(
 
 def changed(study: Study, case: Case, path: Path) -> list[str]:
     """What a case depends on that is not what it was when a file was computed: labels of a fingerprint."""
-    before = _json(datasets.attributes(path).get("made_of"))
+    before = _attribute(path, "made_of")
     if not before:
         return ["its file does not say what it was made of"]
     return fingerprint.changes(before, store.short(depends.reasons(study, case)))
@@ -63,7 +61,7 @@ def changed(study: Study, case: Case, path: Path) -> list[str]:
 
 def other_settings(case: Case, stored: list[Path]) -> list[str]:
     """How the settings of a case differ from the nearest that were computed on its scene with its integrator."""
-    settings = [_json(datasets.attributes(path).get("settings")) for path in stored if store.is_labelled(path, case)]
+    settings = [_attribute(path, "settings") for path in stored if store.is_labelled(path, case)]
     wanted = json.loads(json.dumps(dict(case.settings)))
     differing = [
         sorted(name for name in {*old, *wanted} if old.get(name, "") != wanted.get(name, "")) for old in settings
@@ -71,9 +69,10 @@ def other_settings(case: Case, stored: list[Path]) -> list[str]:
     return [f"setting {name}" for name in min(differing, key=len, default=[])] if settings else ["never computed"]
 
 
-def _json(text: object) -> Mapping[str, Any]:
+def _attribute(path: Path, name: str) -> Mapping[str, Any]:
+    """A mapping that a case's file holds as JSON; empty if the file is damaged or another program's."""
     try:
-        content = json.loads(str(text))
-    except ValueError:
+        content = json.loads(datasets.read(path).attrs[name])
+    except (SymtopError, KeyError, TypeError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}

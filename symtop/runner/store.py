@@ -10,8 +10,9 @@ results/figures/STUDY-NAME.png
 SETTINGS is a hash of what the case was asked to do, DIGEST one of everything that its numbers depend on. Its file holds
 the settings and the reasons that make up the digest, and a hash of its values: a truncated, damaged or foreign file
 counts as none. A file is removed only when a case with the same SETTINGS and another DIGEST takes its place; what was
-computed for another grid stays. The lock is the operating system's, so that it ends with the process that holds it,
-however that ends.
+computed for another grid stays, until a user deletes it: remove ``cases/STUDY`` and run the study again, which computes
+its grid, or remove single files, of which nothing depends on any. The lock is the operating system's, so that it ends
+with the process that holds it, however that ends.
 """
 
 import contextlib
@@ -119,31 +120,28 @@ def load_case(path: Path) -> xr.Dataset | None:
 
 def failure_path(path: Path) -> Path:
     """Where the failure of a case is recorded."""
-    return path.with_name(f"{path.name.removesuffix('.nc')}.failed.json")
+    return path.with_name(f"{path.stem}.failed.json")
 
 
 def save_failure(path: Path, case: Case, message: str, trace: str) -> None:
     """Record how a case failed; a file that an earlier run may have left is no longer its result."""
-    write_json(
-        failure_path(path),
-        {
-            "scene": case.scene,
-            "integrator": case.integrator,
-            "settings": dict(case.settings),
-            "message": message,
-            "traceback": trace.splitlines(),
-        },
-    )
+    question = {"scene": case.scene, "integrator": case.integrator, "settings": dict(case.settings)}
+    write_json(failure_path(path), {**question, "message": message, "traceback": trace.splitlines()})
     path.unlink(missing_ok=True)
+
+
+def trace_path(path: Path) -> Path:
+    """Where a worker that hangs in compiled code writes its traceback before it ends."""
+    return path.with_name(f".{path.stem}.trace")
 
 
 def lock_path(path: Path) -> Path:
     """The lock of a case, or of a study's dataset."""
-    return path.with_name(f".{path.name.removesuffix('.nc')}.lock")
+    return path.with_name(f".{path.stem}.lock")
 
 
 @contextlib.contextmanager
-def claim(path: Path, *, wait: bool) -> Iterator[bool]:
+def locked(path: Path, *, wait: bool) -> Iterator[bool]:
     """Hold a file's lock, so that nobody else computes it; yields False if somebody else holds it and `wait` is false.
 
     The lock's file is there while it is held, and afterwards if its holder was killed (see `was_begun`).
@@ -155,39 +153,29 @@ def claim(path: Path, *, wait: bool) -> Iterator[bool]:
     while True:
         try:
             lock.parent.mkdir(parents=True, exist_ok=True)
-            handle = os.open(lock, os.O_CREAT | os.O_RDWR, 0o644)
+            file = lock.open("a")
         except OSError as error:
             raise SymtopError(f"cannot write {lock}: {error.strerror or error}") from error
-        try:
+        with file:
             try:
-                fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+                fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
             except BlockingIOError:
                 yield False
                 return
-            if not _is_file(handle, lock):  # its holder removed it while we waited
+            if os.fstat(file.fileno()).st_nlink == 0:  # its holder removed it while we waited
                 continue
-            os.utime(handle)  # since when it is held
             try:
                 yield True
             finally:
                 lock.unlink(missing_ok=True)
             return
-        finally:
-            os.close(handle)
-
-
-def _is_file(handle: int, path: Path) -> bool:
-    try:
-        return os.fstat(handle).st_ino == path.stat().st_ino
-    except FileNotFoundError:
-        return False
 
 
 def was_begun(path: Path) -> bool:
     """Did somebody begin to compute a case, and end before it was done?"""
     if fcntl is None or not lock_path(path).is_file():
         return False
-    with claim(path, wait=False) as ours:
+    with locked(path, wait=False) as ours:
         return ours
 
 
@@ -302,8 +290,8 @@ def forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
 def tidy(results: Path, study: Study) -> None:
     """Remove what processes that were killed have left beside the cases of a study, and nobody holds any more."""
     for lock in (results / "cases" / study.name).glob(".*.lock"):
-        path = lock.with_name(f"{lock.name[1:].removesuffix('.lock')}.nc")
-        with claim(path, wait=False) as ours:
+        path = lock.with_name(f"{lock.stem[1:]}.nc")
+        with locked(path, wait=False) as ours:
             if ours:
                 datasets.sweep(path)
-                path.with_name(f".{path.name.removesuffix('.nc')}.trace").unlink(missing_ok=True)
+                trace_path(path).unlink(missing_ok=True)

@@ -26,7 +26,7 @@ from symtop.runner.study import Case, Study
 
 GRACE = 5.0  # seconds between asking a case to end and ending its process
 _loading = threading.Lock()  # a file that two threads load at once would be executed twice
-_expendable: list[bool] = []  # not empty in a process that may be ended when a case hangs
+_expendable: list[bool] = []  # not empty in workers: only they may be ended when a case hangs
 
 
 class Task(NamedTuple):
@@ -66,7 +66,7 @@ def compute(task: Task, study: Study | None = None, *, wait: bool = False) -> Re
             f"the sources or dependencies of {case.integrator} on {case.scene} are not those that the study was "
             "started with; if a file was edited meanwhile, run the study again"
         )
-    with store.claim(path, wait=wait) as ours:
+    with store.locked(path, wait=wait) as ours:
         if not ours:
             return Result("busy")
         if not task.fresh and store.load_case(path) is not None:
@@ -76,9 +76,9 @@ def compute(task: Task, study: Study | None = None, *, wait: bool = False) -> Re
 
 def _compute(study: Study, task: Task, path: Path) -> Result:
     datasets.sweep(path)
-    trace_path(path).unlink(missing_ok=True)  # of a worker that was killed
+    store.trace_path(path).unlink(missing_ok=True)  # of a worker that was killed
     try:
-        with limited(task.limit, trace_path(path)):
+        with limited(task.limit, store.trace_path(path)):
             data = study.measure(task.case)
         if not isinstance(data, xr.Dataset):
             raise SymtopError(f"the measure of a study must return a Dataset, not {type(data).__name__}")  # noqa: TRY301
@@ -97,14 +97,9 @@ def sentence(case: Case, error: BaseException | str) -> str:
     return f"{case.integrator} on {case.scene} failed: {' '.join(str(error).split())}"
 
 
-def trace_path(path: Path) -> Path:
-    """Where a worker that hangs in compiled code says what it was doing."""
-    return path.with_name(f".{path.name.removesuffix('.nc')}.trace")
-
-
 @contextlib.contextmanager
 def limited(seconds: float, trace: Path) -> Iterator[None]:
-    """Raise OverdueError after so many seconds; if that is not heard, end a process that may be ended.
+    """Raise OverdueError after so many seconds; if the code does not hear it, end a process that may be ended.
 
     Measured by the kernel's interval timer, which a change of the clock does not touch. Compiled code is deaf to it, so
     a worker ends itself `GRACE` seconds later, its traceback left in `trace`. In a thread there is no limit.
@@ -139,8 +134,8 @@ def _last_resort(seconds: float, trace: Path) -> Iterator[None]:
         trace.unlink(missing_ok=True)
 
 
-def obey(parent: int) -> None:
-    """In a worker of a pool: leave interrupts to the parent, and end with it however it ends."""
+def begin_worker(parent: int) -> None:
+    """Initialise a worker of a pool: ignore interrupts, and exit when the parent process has ended."""
     _expendable.append(True)
     tqdm.set_lock(threading.RLock())  # its own would be a semaphore of the system, left behind when a worker is ended
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -14,7 +14,8 @@ import pytest
 
 import symtop
 from symtop.base import cache, fingerprint, imports, signals
-from symtop.base.fingerprint import Walk, changes, digest, merged
+from symtop.base.fingerprint import changes, digest, merged
+from symtop.base.walk import Walk
 from symtop.methods import compiled
 from symtop.runner import depends
 
@@ -132,6 +133,50 @@ def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again()
     assert digests[0] == depends.digest(study, case)
 
 
+CLASSES = """
+class Base:
+    def count(self):
+        return BASE
+
+class Few(Base):
+    COUNT = {}
+
+BASE = {}
+
+def measure():
+    '''{}'''
+    from . import nothing  # {}
+    return Few().count() + Few.COUNT
+"""
+
+
+def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_comments():
+    def made(*numbers):
+        text = CLASSES.format(*numbers)
+        space = {"__name__": "few", "__package__": "unknown"}
+        exec(text, space)
+        walk = Walk("measure")
+        walk.add(space["measure"])
+        return walk.reasons()
+
+    plain = made(2, 1, "words", "comment")
+    assert made(2, 1, "other words", "another comment") == plain
+    assert changes(plain, made(2, 3, "words", "comment")) == ["constant <string>:BASE"]
+    assert made(4, 1, "words", "comment") != plain
+
+
+def test_an_import_inside_a_function_counts_by_its_file_at_every_level():
+    space = {"__name__": "symtop.measure.made", "__package__": "symtop.measure"}
+    exec(
+        "def measure():\n    from . import errors\n    from ..methods.gauss import STILL\n    import symtop.run.guard",
+        space,
+    )
+    walk = Walk("measure")
+    walk.add(space["measure"])
+    names = {"measure/errors.py", "methods/gauss.py", "run/guard.py"}
+    assert walk.files == {imports.PACKAGE / name for name in names}
+
+
 # ---- kernels ---------------------------------------------------------------------------------------------------------
 
 
@@ -159,7 +204,7 @@ def test_an_edited_callee_makes_a_new_kernel_and_a_comment_makes_none(tmp_path):
     before = kernels_of(tmp_path, tmp_path / "cache")
     assert before["files"]
     for name in ("measure/errors.py", "measure/modified_energy.py", "explore/answers.py", "methods/gauss.py",
-                 "methods/loop.py", "methods/compiled.py", "base/code.py"):  # fmt: skip
+                 "methods/loop.py", "methods/compiled.py", "base/walk.py"):  # fmt: skip
         file = tmp_path / "symtop" / name
         text = file.read_text()
         assert "\nfrom " in text
@@ -208,7 +253,7 @@ def test_what_numba_compiles_in_place_of_a_function_counts():
 
     names = {part.__qualname__ for part in compiled.code_of(lambda a: fused.fused(a, a, a)).functions}
     assert names  # the control: the walk went somewhere
-    walk = compiled.CodeWalk("kernel", also=compiled._overloads)
+    walk = Walk("kernel", whole=False, also=compiled._overloads)
     walk.add(fused.fused)
     reached = {part.__name__ for part in walk.functions}
     assert {"fused", "_fused", "_fma"} <= reached
@@ -272,3 +317,4 @@ def test_versions_of_packages_are_reasons():
         "package numpy": importlib.metadata.version("numpy"),
         "package no-such-package": "absent",
     }
+    assert fingerprint.packages()["package python"] == ".".join(map(str, sys.version_info[:2]))

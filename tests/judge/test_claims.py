@@ -22,6 +22,7 @@ from symtop.measure.growth import behaviour
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.methods.registry import Integrator, Run
 from symtop.model import charts
+from symtop.report import style
 from symtop.runner import plugins
 from symtop.runner import run as runner
 from tests.conftest import random_scenes
@@ -382,7 +383,7 @@ def test_the_study_shows_a_refuted_claim(tmp_path, clean_registry, monkeypatch):
     mine = dataclasses.replace(
         study, cases=lambda quick: [case for case in study.cases(quick) if case.integrator in ("symplectic-rk4", "rk4")]
     )
-    found = runner.run(mine, tmp_path, quick=True, jobs=1, quiet=True)
+    found = runner.run(mine, tmp_path, quick=True, jobs=1, quiet=True, save=style.save)
     assert found["failures"] == []
     assert any("symplectic-rk4, symplectic: claims yes; refuted" in line for line in found["verdict"])
     cells = next(row for row in found["tables"][0]["rows"] if row[0] == "symplectic-rk4")

@@ -211,12 +211,12 @@ def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
     order = []
 
     def wait():
-        with store.claim(path, wait=True) as ours:
+        with store.locked(path, wait=True) as ours:
             order.append(ours)
 
-    with store.claim(path, wait=False) as ours:
+    with store.locked(path, wait=False) as ours:
         assert ours
-        with store.claim(path, wait=False) as second:
+        with store.locked(path, wait=False) as second:
             assert not second
         waiting = threading.Thread(target=wait)
         waiting.start()
@@ -228,7 +228,7 @@ def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
     assert not list(tmp_path.iterdir())
     store.lock_path(path).touch()  # what a killed process leaves
     assert store.was_begun(path)
-    with store.claim(path, wait=False) as ours:
+    with store.locked(path, wait=False) as ours:
         assert ours
 
 
@@ -257,7 +257,7 @@ def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(t
     assert code == 0, output
     (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.nc")
     case.unlink()
-    for name in (work.trace_path(case), store.lock_path(case), case.with_name(f".{case.name}.x.part.nc")):
+    for name in (store.trace_path(case), store.lock_path(case), case.with_name(f".{case.name}.x.part.nc")):
         name.touch()
     code, output = probe(tmp_path)
     assert "1 of 4 cases computed" in output
@@ -462,5 +462,5 @@ def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
     other = path.with_name(path.name.replace(store.digest_of(path), "0" * 20))
     with pytest.raises(SymtopError, match="not those that the study was started with"):
         work.compute(task._replace(path=str(other)))
-    with store.claim(path, wait=False):
+    with store.locked(path, wait=False):
         assert work.compute(task).state == "busy"

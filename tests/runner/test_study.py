@@ -265,6 +265,36 @@ def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
     assert len(digests) == 9  # the caption alone changes nothing
 
 
+def test_a_users_package_is_drawn_again_when_what_stands_beside_its_script_is_edited(tmp_path, monkeypatch):
+    """Its cases depend on the file that measures, and its figures on every file that it imports."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    text = (
+        PROBE.read_text()
+        .replace('STUDY = Study("probe"', 'STUDY = Study("mine"')
+        .replace("samples=51", "samples=count()")
+    )
+    (folder / "study.py").write_text(f"from .words import said\nfrom .tables import count\n{text}")
+    (folder / "words.py").write_text("def said():\n    return 'nothing'\n")
+    (folder / "tables.py").write_text("def count():\n    return 51\n")
+    study = runner.load(str(folder / "study.py"))
+    case = study.cases(True)[0]
+
+    def made():
+        return depends.digest(study, case), runner._stamp(study, ["case"], style.save)
+
+    before = made()
+    for name, measured_again in (("words.py", False), ("tables.py", True)):
+        pretend_edited(monkeypatch, folder / name)
+        after = made()
+        monkeypatch.undo()
+        depends._hashes.cache_clear()
+        assert (after[0] != before[0]) is measured_again, name
+        assert after[1] != before[1], name
+    assert made() == before
+
+
 @pytest.mark.slow
 def test_a_copy_of_the_package_with_one_kernel_edited(tmp_path):
     """Through the command line: an edit, the status, and a run that computes what is stale and nothing else."""
