@@ -36,7 +36,7 @@ import numpy as np
 
 from symtop.methods.angles import chart_outcome, reduced
 from symtop.methods.compiled import register_jitable
-from symtop.methods.fixed_step import fixed_step, inside
+from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.loop import driver
 from symtop.methods.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton
 from symtop.methods.outcomes import NOT_CONVERGED
@@ -263,7 +263,7 @@ def built_in() -> list[Integrator]:
             name="galerkin-simpson",
             family="discrete-lagrangian",
             summary="Galerkin discrete Lagrangian, parabola in time and Simpson's rule",
-            solvers={"angles": fixed_step(march, Iteration(), reduced, 2, implicit=True, each_step=1)},
+            solvers={"angles": FixedStep(march, Iteration(), reduced, 2, implicit=True, each_step=1)},
             order=4,
             explicit=False,
             symplectic=True,
@@ -276,6 +276,5 @@ def built_in() -> list[Integrator]:
 
 def is_galerkin(method: Integrator) -> bool:
     """Is it this integrator, whatever its name?"""
-    solver = method.solvers.get("angles")
-    loop = None if solver is None else inside(solver)
-    return loop is not None and isinstance(loop.rule, Iteration)
+    solver = inside(method.solvers.get("angles"))
+    return solver is not None and solver.loop is march

@@ -17,11 +17,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from symtop.base.validate import SymtopError, finite, one_of, row
-from symtop.methods import coefficients as tables
 from symtop.methods import splitting_angles, splitting_space
 from symtop.methods.angles import reduced
-from symtop.methods.coefficients import Table
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.coefficients import METHODS
+from symtop.methods.fixed_step import FixedStep
 from symtop.methods.registry import Integrator, ModifiedEnergy
 from symtop.methods.space import on_attitude, on_axis
 from symtop.methods.splitting_loop import Composition, closed
@@ -69,11 +68,11 @@ def composition(
     if space:
         stages = partial(splitting_space.stages, rule, rotation, boost)
         solvers = {
-            chart: fixed_step(march, stages, prepare, 1, implicit=False) for chart, (march, prepare) in _SPACE.items()
+            chart: FixedStep(march, stages, prepare, 1, implicit=False) for chart, (march, prepare) in _SPACE.items()
         }
     else:
         stages = partial(splitting_angles.stages, rule)
-        solvers = {"angles": fixed_step(splitting_angles.march, stages, reduced, 1, implicit=False)}
+        solvers = {"angles": FixedStep(splitting_angles.march, stages, reduced, 1, implicit=False)}
     return Integrator(
         name=name,
         family="splitting",
@@ -122,81 +121,12 @@ def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[f
     return closed(drifts, kicks, slopes)
 
 
-def _on_space(name: str, numbers: Table, reference: str, summary: str) -> Integrator:
-    return composition(
-        name, *numbers[1:], chart="space", order=numbers.order, reference=reference, summary=f"free top and {summary}"
-    )
-
-
-def _on_angles(name: str, numbers: Table, reference: str, summary: str) -> Integrator:
-    return composition(name, numbers.drift, numbers.kick, order=numbers.order, reference=reference, summary=summary)
-
-
 def built_in() -> list[Integrator]:
     """The compositions that ship with symtop."""
-    ABA = "blanes-casas-farres-laskar-makazaga-murua-2013"
-    strang = tables.STRANG
     return [
-        _on_angles(
-            "stormer-verlet",
-            strang,
-            "hairer-lubich-wanner-2003",
-            "kick-drift-kick splitting of the reduced Hamiltonian",
-        ),
-        _on_angles("stormer-verlet-yoshida-4", tables.YOSHIDA_4, "yoshida-1990", "three Stormer-Verlet steps"),
-        _on_angles("stormer-verlet-suzuki-4", tables.SUZUKI_4, "suzuki-1990", "five Stormer-Verlet steps"),
-        _on_angles(
-            "stormer-verlet-blanes-moan-6",
-            tables.SRKN_11_6,  # up to five times more accurate here than the 14 forces of the other one
-            "blanes-moan-2002",
-            "Runge-Kutta-Nystrom splitting of the reduced Hamiltonian, 11 forces",
-        ),
-        _on_space("strang", strang, "touma-wisdom-1994", "gravity kicks, one force"),
         composition(
-            "cayley",
-            strang.drift,
-            strang.kick,
-            chart="space",
-            rotation="cayley",
-            order=2,
-            summary="Cayley rotation and gravity kicks, an integrable map, one force",
-            reference="bobenko-suris-1999",
-        ),
-        composition(
-            "cayley-tuned",
-            strang.drift,
-            strang.kick,
-            chart="space",
-            rotation="cayley-tuned",
-            order=2,
-            summary="Cayley rotation by the right mean angle and gravity kicks, an integrable map, one force",
-            reference="bobenko-suris-1999",
-        ),
-        composition(
-            "takahashi-imada",
-            *tables.TAKAHASHI_IMADA[1:],
-            chart="space",
-            processor=tables.TAKAHASHI_IMADA_PROCESSOR,
-            order=4,
-            summary="free top and kicks with a force gradient, processed, one force",
-            reference="takahashi-imada-1984",
-        ),
-        _on_space("chin-4a", tables.CHIN_4A, "chin-1997", "positive kicks with a force gradient, two forces"),
-        _on_space("yoshida-4", tables.YOSHIDA_4, "yoshida-1990", "gravity kicks, three Strang steps"),
-        _on_space("suzuki-4", tables.SUZUKI_4, "suzuki-1990", "gravity kicks, five Strang steps"),
-        _on_space("srkn-6-4", tables.SRKN_6_4, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 6 forces"),
-        _on_space("srkn-11-6", tables.SRKN_11_6, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 11 forces"),
-        _on_space("srkn-14-6", tables.SRKN_14_6, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 14 forces"),
-        _on_space("kahan-li-6", tables.KAHAN_LI_6, "kahan-li-1997", "gravity kicks, 9 Strang steps"),
-        _on_space("suzuki-umeno-8", tables.SUZUKI_UMENO_8, "suzuki-umeno-1993", "gravity kicks, 15 Strang steps"),
-        _on_space("kahan-li-8", tables.KAHAN_LI_8, "kahan-li-1997", "gravity kicks, 17 Strang steps"),
-        _on_space(
-            "sofroniou-spaletta-10",
-            tables.SOFRONIOU_SPALETTA_10,
-            "sofroniou-spaletta-2005",
-            "gravity kicks, 35 Strang steps",
-        ),
-        _on_space("aba-8-6-4", tables.ABA_8_6_4, ABA, "gravity kicks, generalised order (8, 6, 4), 7 forces"),
-        _on_space("aba-10-6-4", tables.ABA_10_6_4, ABA, "gravity kicks, generalised order (10, 6, 4), 8 forces"),
-        _on_space("aba-10-4", tables.ABA_10_4, ABA, "gravity kicks, generalised order (10, 4), 7 forces"),
-    ]
+            name, *method.table[1:], chart=method.chart, rotation=method.rotation, processor=method.processor,
+            order=method.table.order, summary=method.summary, reference=method.reference,
+        )
+        for name, method in METHODS.items()
+    ]  # fmt: skip

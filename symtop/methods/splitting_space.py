@@ -44,7 +44,7 @@ from symtop.base.numbers import sign_changes
 from symtop.methods.compiled import register_jitable
 from symtop.methods.loop import driver
 from symtop.methods.registry import Array
-from symtop.methods.space import finite_outcome, observe_attitude, observe_axis
+from symtop.methods.space import axis_of, finite_outcome, observe_attitude, observe_axis
 from symtop.methods.splitting_loop import Composition, Stages, compose
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View, space_energy
@@ -189,12 +189,6 @@ def present_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
 
 
 # ---- the attitude ----------------------------------------------------------------------------------------------------
-
-
-@register_jitable
-def axis_of(w: float, x: float, y: float, z: float) -> Any:
-    """The axis of a quaternion."""
-    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z
 
 
 @register_jitable
