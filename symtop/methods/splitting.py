@@ -26,7 +26,16 @@ from symtop.methods.space import on_attitude, on_axis
 from symtop.methods.splitting_loop import Composition, closed
 from symtop.methods.splitting_space import ROTATIONS
 
-_SPACE = {"axis": (splitting_space.march_axis, on_axis), "attitude": (splitting_space.march_attitude, on_attitude)}
+_KERNELS = {
+    "angles": {"angles": (splitting_angles.march, reduced)},
+    "space": {"axis": (splitting_space.march_axis, on_axis), "attitude": (splitting_space.march_attitude, on_attitude)},
+}
+# the modified energy and the sleeping threshold of kick-drift-kick, by chart and rotation
+_KICK_DRIFT_KICK: dict[tuple[str, str], tuple[ModifiedEnergy, Callable[[float], float] | None]] = {
+    ("angles", "exact"): (splitting_angles.verlet_energy, None),
+    ("space", "exact"): (splitting_space.strang_energy, splitting_space.strang_sleeps_from),
+    ("space", "cayley"): (splitting_space.cayley_correction, splitting_space.cayley_sleeps_from),
+}
 
 
 def composition(
@@ -55,54 +64,38 @@ def composition(
 
     Raises SymtopError for tables that do not fit together or do not sum to 1.
     """
-    space = one_of("chart", chart, ("angles", "space")) == "space"
+    one_of("chart", chart, _KERNELS)
     one_of("rotation", rotation, ROTATIONS)
     rule, boost = _checked(drift, kick, gradient), finite("processor", processor)
-    if not space and (any(rule.gradient) or rotation != "exact" or boost):
+    bare = not any(rule.gradient) and not boost
+    if chart == "angles" and not (bare and rotation == "exact"):
         raise SymtopError(
             f"chart must be 'space' for a composition with a gradient, a rotation or a processor, not {chart!r}"
         )
-    reads_same = all(row == row[::-1] for row in rule[:3])
-    integrable = rotation != "exact" and rule.drift == (1.0,) and not any(rule.gradient) and not boost
-    modified, sleeps = _closed_forms(rule, rotation, boost, space=space)
-    if space:
-        stages = partial(splitting_space.stages, rule, rotation, boost)
-        solvers = {
-            chart: FixedStep(march, stages, prepare, 1, implicit=False) for chart, (march, prepare) in _SPACE.items()
-        }
-    else:
+    if chart == "angles":
         stages = partial(splitting_angles.stages, rule)
-        solvers = {"angles": FixedStep(splitting_angles.march, stages, reduced, 1, implicit=False)}
+    else:
+        stages = partial(splitting_space.stages, rule, rotation, boost)
+    one_drift = bare and rule.drift == (1.0,)
+    closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if one_drift and rule.kick == (0.5, 0.5) else None
+    modified, sleeps = closed_forms or (None, None)
     return Integrator(
         name=name,
         family="splitting",
         summary=summary or f"splitting with {len(rule.drift)} drifts and {rule.forces} forces a step",
-        solvers=solvers,
+        solvers={
+            shown: FixedStep(march, stages, prepare, 1, implicit=False)
+            for shown, (march, prepare) in _KERNELS[chart].items()
+        },
         order=order,
         explicit=True,
         symplectic=True,
-        symmetric=reads_same,
-        conserves=frozenset({"p_phi", "p_psi"} | ({"cayley_energy"} if integrable else set())),
+        symmetric=all(numbers == numbers[::-1] for numbers in rule[:3]),
+        conserves=frozenset({"p_phi", "p_psi"} | ({"cayley_energy"} if one_drift and rotation != "exact" else set())),
         reference=reference,
         modified_energy=modified,
         sleeps_from=sleeps,
     )
-
-
-_CLOSED_FORMS: dict[str, tuple[ModifiedEnergy, Callable[[float], float]]] = {
-    "exact": (splitting_space.strang_energy, splitting_space.strang_sleeps_from),
-    "cayley": (splitting_space.cayley_correction, splitting_space.cayley_sleeps_from),
-}  # of kick-drift-kick in the space frame, by the rotation of a drift
-
-
-def _closed_forms(
-    rule: Composition, rotation: str, processor: float, *, space: bool
-) -> tuple[ModifiedEnergy | None, Callable[[float], float] | None]:
-    """The modified energy and the sleeping threshold that are known of a composition."""
-    plain = rule.drift == (1.0,) and rule.kick == (0.5, 0.5) and not any(rule.gradient) and not processor
-    if plain and space:
-        return _CLOSED_FORMS.get(rotation, (None, None))
-    return (splitting_angles.verlet_energy if plain else None), None
 
 
 def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] | None) -> Composition:

@@ -159,10 +159,7 @@ def _separatrix() -> Scene:
 def _goldstein(name: str, theta_dot: float, purpose: str) -> Scene:
     """a = p_psi/I1 = 2.5, b = p_phi/I1 = 1.7: phi' = (b - a u)/(1 - u^2), psi' = a I1/I3 - phi' u, u = cos 43 deg."""
     start = Angles(
-        theta=math.radians(43.0),
-        theta_dot=theta_dot,
-        phi_dot=-0.2760228916930134,
-        psi_dot=5.201870363571313,
+        theta=math.radians(43.0), theta_dot=theta_dot, phi_dot=-0.2760228916930134, psi_dot=5.201870363571313
     )
     return Scene(name, SymmetricTop(2.0, 1.0, 2.0), start, 70.0, purpose)
 

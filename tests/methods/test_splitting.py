@@ -131,7 +131,7 @@ def extended_error(table, scene, steps):
         step = (wide(0),) * 6
         for i, b in enumerate(table.kick):
             axis = space.force_axis(None, state, step)
-            step = space.kick_axis(None, axis, step, wide(b) * pull, wide(0))
+            step = space.kick_space(None, axis, step, wide(b) * pull, wide(0))
             if i < len(table.drift):
                 step = space.drift_axis(rule, state, step, wide(table.drift[i]) * half)
         state = tuple(a + b for a, b in zip(state, step, strict=True))
