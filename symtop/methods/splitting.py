@@ -20,13 +20,14 @@ from symtop.base.validate import SymtopError, finite, one_of, row
 from symtop.methods import splitting_angles, splitting_space
 from symtop.methods.angles import reduced
 from symtop.methods.coefficients import METHODS
-from symtop.methods.fixed_step import FixedStep
+from symtop.methods.fixed_step import FixedStep, Prepare
+from symtop.methods.loop import Loop
 from symtop.methods.registry import Integrator, ModifiedEnergy
 from symtop.methods.space import on_attitude, on_axis
 from symtop.methods.splitting_loop import Composition, closed
 from symtop.methods.splitting_space import ROTATIONS
 
-_KERNELS = {
+_KERNELS: dict[str, dict[str, tuple[Loop, Prepare]]] = {
     "angles": {"angles": (splitting_angles.march, reduced)},
     "space": {"axis": (splitting_space.march_axis, on_axis), "attitude": (splitting_space.march_attitude, on_attitude)},
 }

@@ -32,7 +32,7 @@ time, except that a time of 10^k periods costs k of the 30 guard digits.
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from symtop.base.validate import SymtopError, whole
 from symtop.model.exact_numbers import rational, rationals, real_roots
@@ -41,15 +41,18 @@ from symtop.model.top import Angles, SymmetricTop
 GUARD_DIGITS, MOST_DIGITS = 30, 20_000  # the latter resolves relative gaps between roots down to 1e-5000
 
 
-class PreciseMotion(NamedTuple):
-    """Angles (radians; phi and psi unwrapped) and their rates at one time, as `mpmath.mpf`."""
+Number = TypeVar("Number")
 
-    theta: Any
-    phi: Any
-    psi: Any
-    theta_dot: Any
-    phi_dot: Any
-    psi_dot: Any
+
+class Motion(NamedTuple, Generic[Number]):
+    """Euler angles (radians, theta in [0, pi], phi and psi unwrapped) and their rates: arrays or `mpmath.mpf`."""
+
+    theta: Number
+    phi: Number
+    psi: Number
+    theta_dot: Number
+    phi_dot: Number
+    psi_dot: Number
 
 
 class Pole(NamedTuple):
@@ -201,8 +204,8 @@ class PreciseForm:
         sn2, dn2 = crown.high / (self.m1 * crown.low), swing / crown.low
         return lower, ctx.sqrt(sn2) * ctx.elliprf(self.curve.beyond * dn2, dn2, 1)
 
-    def __call__(self, time: Any) -> PreciseMotion:
-        """Angles and rates at `time` (float, string, fraction or mpf)."""
+    def __call__(self, time: Any) -> Motion[Any]:
+        """Angles and rates at `time` (float, string, fraction or mpf), as `mpmath.mpf`."""
         down, up, total, difference, nod = self._state(time)
         phi, psi = (total + difference) / 2, self.facing * (total - difference) / 2
         halves = ((self.curve.floor.twist, down), (self.curve.crown.twist, up))
@@ -212,7 +215,7 @@ class PreciseForm:
         if (cosine < 0) != (sine < 0):
             phi, psi, nod = phi + self.ctx.pi, psi + (self.ctx.pi if cosine < 0 else -self.ctx.pi), -nod
         motion = (self._theta(abs(down), abs(up)), phi, psi, self.facing * nod, phi_dot, psi_dot)
-        return PreciseMotion(*map(_plain, motion))
+        return Motion(*map(_plain, motion))
 
     def axis(self, time: Any) -> tuple[Any, ...]:
         """Unit vector (x, y, z) along the top's axis."""
