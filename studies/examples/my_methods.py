@@ -10,7 +10,7 @@ import numpy as np
 
 import symtop
 from symtop.methods.angles import chart_outcome, reduced
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver
 from symtop.methods.splitting_angles import force_angles
 
@@ -51,7 +51,7 @@ def observe(par, rule, before, dstate, h):
     return par.I1 * precession * sine * sine + p_psi * cosine, p_psi
 
 
-solver = fixed_step(driver(begin, increment, observe), (0.0,), reduced, 1, implicit=False)
+solver = FixedStep(driver(begin, increment, observe), (0.0,), reduced, 1, implicit=False)
 symtop.register(
     symtop.Integrator(
         name="symplectic-euler", family="other", summary="kick then drift, order 1", solvers={"angles": solver},

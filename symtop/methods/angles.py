@@ -1,7 +1,7 @@
 """The angles chart for kernels: state (theta, p_theta, phi, psi), parameters with both momenta.
 
 The chart ends at theta = 0 and pi. p_phi and p_psi enter as parameters, so every kernel of this chart must
-show them again from the increments that it produced (`observe` in `drive`).
+show them again from the increments that it produced (`observe` in `loop`).
 """
 
 from typing import NamedTuple

@@ -25,21 +25,21 @@ poles. Source: Marsden and West, Discrete mechanics and variational integrators,
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.methods.angles import chart_outcome, reduced
 from symtop.methods.compiled import register_jitable
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.fused import fused
 from symtop.methods.loop import driver
 from symtop.methods.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton
 from symtop.methods.outcomes import NOT_CONVERGED
 from symtop.methods.quadrature import RULES, Quadrature, quadrature
-from symtop.methods.registry import Array, Integrator, Plan, Run, Solver
-from symtop.model.top import Angles, Momenta, SymmetricTop
+from symtop.methods.registry import Array, Integrator
+from symtop.model.top import Momenta
 from symtop.model.view import View
 
 
@@ -243,31 +243,16 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 march = driver(begin, increment, observe)
 
 
-@dataclass(frozen=True)
-class StraightLine:
-    """A solver that remembers its rule, so that other ways to step the same rule can be set beside it."""
-
-    rule: Quadrature
-    solve: Solver
-
-    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        """Run the reduced kernel."""
-        return self.solve(top, start, plan)
-
-
 def rule_of(method: Integrator) -> Quadrature | None:
     """The rule of an integrator that `discrete_lagrangian` made; None for any other."""
-    solver = method.solvers.get("angles")
-    return solver.rule if isinstance(solver, StraightLine) else None
-
-
-MIDPOINT = ((0.5,), (1.0,))
+    solver = inside(method.solvers.get("angles"))
+    return solver.rule if solver is not None and solver.loop is march else None
 
 
 def is_midpoint(method: Integrator) -> bool:
     """Is it the midpoint rule as `discrete_lagrangian` steps it, whatever its name?"""
     rule = rule_of(method)
-    return rule is not None and (rule.nodes, rule.weights) == MIDPOINT
+    return rule is not None and (rule.nodes, rule.weights) == RULES["midpoint"][:2]
 
 
 def midpoint_energy(seen: View, momenta: Momenta, h: float) -> Array:
@@ -279,24 +264,6 @@ def midpoint_energy(seen: View, momenta: Momenta, h: float) -> Array:
     slope = top.potential_slope(seen.theta, momenta)
     return np.asarray(
         -h * h / 24 * ((p / top.I1) ** 2 * top.potential_curvature(seen.theta, momenta) + slope**2 / top.I1)
-    )
-
-
-def record(
-    name: str, rule: Quadrature, solver: Solver, *, order: int | None, symmetric: bool, summary: str, reference: str
-) -> Integrator:
-    """The registry entry of a discrete Lagrangian on a straight line, whichever kernel steps it."""
-    return Integrator(
-        name=name,
-        family="discrete-lagrangian",
-        summary=summary or f"discrete Lagrangian with nodes {rule.nodes} and weights {rule.weights}",
-        solvers={"angles": solver},
-        order=order,
-        explicit=False,
-        symplectic=True,
-        symmetric=symmetric,
-        conserves=frozenset({"p_phi", "p_psi"}),
-        reference=reference,
     )
 
 
@@ -316,19 +283,23 @@ def discrete_lagrangian(
     rule, symmetric = quadrature(nodes, weights)
     at_start = sum(node == 0.0 for node in rule.nodes)  # evaluated once a step, not once an iteration
     fresh = len(rule.nodes) - at_start
-    solver = StraightLine(rule, fixed_step(march, rule, reduced, fresh, implicit=True, each_step=at_start))
-    entry = record(name, rule, solver, order=order, symmetric=symmetric, summary=summary, reference=reference)
-    return replace(entry, modified_energy=midpoint_energy) if is_midpoint(entry) else entry
+    method = Integrator(
+        name=name,
+        family="discrete-lagrangian",
+        summary=summary or f"discrete Lagrangian with nodes {rule.nodes} and weights {rule.weights}",
+        solvers={"angles": FixedStep(march, rule, reduced, fresh, implicit=True, each_step=at_start)},
+        order=order,
+        explicit=False,
+        symplectic=True,
+        symmetric=symmetric,
+        conserves=frozenset({"p_phi", "p_psi"}),
+        reference=reference,
+    )
+    return replace(method, modified_energy=midpoint_energy) if is_midpoint(method) else method
 
 
 def built_in() -> list[Integrator]:
     """The rules that ship with symtop."""
-    summaries = {
-        "midpoint": "discrete Lagrangian, midpoint rule",
-        "trapezoidal": "discrete Lagrangian, trapezoidal rule",
-        "simpson-linear": "discrete Lagrangian, Simpson's rule on a straight line (order 2: the line limits it)",
-    }
     return [
-        discrete_lagrangian(name, nodes, weights, order=order, summary=summaries[name])
-        for name, (nodes, weights, order) in RULES.items()
+        discrete_lagrangian(name, *rule[:2], order=rule.order, summary=rule.summary) for name, rule in RULES.items()
     ]

@@ -17,13 +17,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.methods.angles import chart_outcome
 from symtop.methods.compiled import compile_kernel, register_jitable, set_item
 from symtop.methods.euler_lagrange import LEAST_TOLERANCE, as_run, field_angles, with_rates
 from symtop.methods.outcomes import NOT_FINITE, OK, OUT_OF_BUDGET, OUTCOMES, STEP_TOO_SMALL
-from symtop.methods.registry import Array, Integrator, Plan, Run
+from symtop.methods.registry import Integrator, Plan, Run
 from symtop.methods.runge_kutta import later_stages, store, weighted
 from symtop.model.top import Angles, SymmetricTop
 
@@ -118,9 +117,9 @@ def _try_steps(
 
 
 def march(  # type: ignore[no-untyped-def]
-    par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, states, ends
+    par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, states
 ):
-    """Steps until the end, a failure or `budget` evaluations; fills `states` with samples, `ends` with step ends."""
+    """Steps until the end, a failure or `budget` evaluations; fills `states` with samples."""
     evaluations = 0
     outcome = OK
     while t < end and outcome == OK and evaluations < budget:
@@ -129,8 +128,6 @@ def march(  # type: ignore[no-untyped-def]
         evaluations += effort
         if outcome != OK:
             break
-        if steps < len(ends):
-            ends[steps] = t
         steps += 1
         while seen < len(times) and times[seen] <= t:
             store(
@@ -159,58 +156,23 @@ def first_step(par: Any, state: tuple[float, ...], end: float, tolerance: float)
     return float(min(100.0 * trial, guess, end))
 
 
-class AdaptiveRun(NamedTuple):
-    """What one adaptive run returns."""
-
-    states: Array  # (samples, 6), NaN after a failure
-    ends: NDArray[np.float64]  # times at the ends of the accepted steps, as many as were asked for
-    steps: int
-    evaluations: int
-    outcome: str
-    reached: float
-
-
-def adaptive_run(
-    top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_PRINCE, record: int = 0
-) -> AdaptiveRun:
-    """Integrate to the horizon; the ends of the first `record` steps are kept."""
+def solve(top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_PRINCE) -> Run:
+    """A solver of the registry."""
     par, state = with_rates(top, start)
-    states, ends = np.full((plan.times.size, len(state)), np.nan), np.full(record, np.nan)
-    slopes = np.empty((len(pair.error), len(state)))
+    states, slopes = np.full((plan.times.size, len(state)), np.nan), np.empty((len(pair.error), len(state)))
     slopes[0] = field_angles(par, state)
     t, step = 0.0, first_step(par, state, plan.horizon, plan.tolerance)
     steps, seen, evaluations, outcome = 0, 0, 2, OK
     budget = plan.most(EVALUATIONS)
     block = int(min(BLOCK, budget))
+    given = par, pair, plan.tolerance, plan.horizon, plan.times, block
     while t < plan.horizon and outcome == OK:
-        state, t, step, steps, seen, effort, outcome = march(
-            par,
-            pair,
-            plan.tolerance,
-            plan.horizon,
-            plan.times,
-            block,
-            state,
-            slopes,
-            t,
-            step,
-            steps,
-            seen,
-            states,
-            ends,
-        )
+        state, t, step, steps, seen, effort, outcome = march(*given, state, slopes, t, step, steps, seen, states)
         evaluations += effort
         if outcome == OK and t < plan.horizon and evaluations > budget:
             outcome = OUT_OF_BUDGET
-    return AdaptiveRun(
-        states, ends[:steps], steps, evaluations, OUTCOMES[outcome], plan.horizon if outcome == OK else t
-    )
-
-
-def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-    """A solver of the registry."""
-    done = adaptive_run(top, start, plan)
-    return as_run(top, plan.times, done.states, done.steps, done.evaluations, done.outcome, done.reached)
+    reached = plan.horizon if outcome == OK else t
+    return as_run(top, plan.times, states, steps, evaluations, OUTCOMES[outcome], reached)
 
 
 def built_in() -> list[Integrator]:

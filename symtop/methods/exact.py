@@ -1,6 +1,6 @@
 """The closed form as an integrator: no step, no tolerance, no growth of error. It is what the others are measured by.
 
-Source: Klein and Sommerfeld, Theory of the Top, chapter 6; see `symtop.exact`.
+Source: Klein and Sommerfeld, Theory of the Top, chapter 6; see `symtop.model.closed_form`.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """From a compiled loop to a solver of the registry."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from symtop.methods.loop import Loop, March
@@ -15,15 +15,21 @@ Present = Callable[[Any, Array, Array], Array]
 
 @dataclass(frozen=True)
 class FixedStep:
-    """A solver around a loop, and everything that a run in stretches needs to know of it."""
+    """A solver around a loop: `prepare` gives a kernel its parameters and state, `rule` the method's numbers.
+
+    A rule whose numbers depend on the run is a function of the top, the start and the step.
+    `evaluations` is how many force evaluations one unit of the kernel's counted work takes; for an implicit method
+    that unit is one iteration (of Newton or of a sweep), and `each_step` evaluations come on top of every step.
+    `present(par, times, states)` makes states of the chart from the kernel's, where they differ.
+    """
 
     loop: Loop | Callable[..., March]
     rule: Any
     prepare: Prepare
     evaluations: int
-    implicit: bool
-    each_step: int
-    present: Present | None
+    implicit: bool = field(kw_only=True)
+    each_step: int = 0
+    present: Present | None = None
 
     def setup(self, top: SymmetricTop, start: Angles, h: float) -> tuple[Any, Any, tuple[float, ...]]:
         """The numbers of the top and of the method, and the state that the kernel starts from."""
@@ -52,27 +58,7 @@ class FixedStep:
         return self.run(top, start, plan, par, self.loop(par, rule, state, plan.step_size, plan.marks))
 
 
-def fixed_step(
-    loop: Loop | Callable[..., March],
-    rule: Any,
-    prepare: Prepare,
-    evaluations: int,
-    *,
-    implicit: bool,
-    each_step: int = 0,
-    present: Present | None = None,
-) -> FixedStep:
-    """A solver around a loop: `prepare` gives a kernel its parameters and state, `rule` the method's numbers.
-
-    A rule whose numbers depend on the run is a function of the top, the start and the step.
-    `evaluations` is how many force evaluations one unit of the kernel's counted work takes; for an implicit method
-    that unit is one iteration (of Newton or of a sweep), and `each_step` evaluations come on top of every step.
-    `present(par, times, states)` makes states of the chart from the kernel's, where they differ.
-    """
-    return FixedStep(loop, rule, prepare, evaluations, implicit, each_step, present)
-
-
-def inside(solver: Solver) -> FixedStep | None:
+def inside(solver: Solver | None) -> FixedStep | None:
     """The fixed-step loop inside a solver, if it has one that can be run in stretches."""
     inner = getattr(solver, "solve", solver)
     return inner if isinstance(inner, FixedStep) and isinstance(inner.loop, Loop) else None

@@ -36,7 +36,7 @@ import numpy as np
 
 from symtop.methods.angles import chart_outcome, reduced
 from symtop.methods.compiled import register_jitable
-from symtop.methods.fixed_step import fixed_step, inside
+from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.loop import driver
 from symtop.methods.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton
 from symtop.methods.outcomes import NOT_CONVERGED
@@ -136,20 +136,12 @@ def _evaluate(par: Any, start: Any, theta_m: float, theta_1: float) -> Any:
             inner.stiffness - 0.5 * (inner.south * es_m + inner.north * en_m),
             -0.5 * (inner.south * es_1 + inner.north * en_1),
         ),
+        _Jet(last.slope, last.south * es_m + last.north * en_m, last.stiffness + last.south * es_1 + last.north * en_1),
         _Jet(
-            last.slope,
-            last.south * es_m + last.north * en_m,
-            last.stiffness + last.south * es_1 + last.north * en_1,
+            b_s * south - k * north, 2.0 * inner.south - 0.5 * (b_s * es_m - k * en_m), -0.5 * (b_s * es_1 - k * en_1)
         ),
         _Jet(
-            b_s * south - k * north,
-            2.0 * inner.south - 0.5 * (b_s * es_m - k * en_m),
-            -0.5 * (b_s * es_1 - k * en_1),
-        ),
-        _Jet(
-            b_n * north - k * south,
-            2.0 * inner.north - 0.5 * (b_n * en_m - k * es_m),
-            -0.5 * (b_n * en_1 - k * es_1),
+            b_n * north - k * south, 2.0 * inner.north - 0.5 * (b_n * en_m - k * es_m), -0.5 * (b_n * en_1 - k * es_1)
         ),
     )
 
@@ -229,10 +221,7 @@ def _momenta(par: Any, node: Any, plus: float, minus: float) -> Any:
     """South and north of given rates of phi + psi and phi - psi at a node: the inverse of B."""
     k = 0.5 * (1.0 / par.I3 - 1.0 / par.I1)
     inverse = 1.0 / (2.0 * k * (node.a + node.d) + 4.0 * node.a * node.d)
-    return (
-        ((k + 2.0 * node.a) * plus + k * minus) * inverse,
-        (k * plus + (k + 2.0 * node.d) * minus) * inverse,
-    )
+    return (((k + 2.0 * node.a) * plus + k * minus) * inverse, (k * plus + (k + 2.0 * node.d) * minus) * inverse)
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
@@ -263,19 +252,18 @@ def built_in() -> list[Integrator]:
             name="galerkin-simpson",
             family="discrete-lagrangian",
             summary="Galerkin discrete Lagrangian, parabola in time and Simpson's rule",
-            solvers={"angles": fixed_step(march, Iteration(), reduced, 2, implicit=True, each_step=1)},
+            solvers={"angles": FixedStep(march, Iteration(), reduced, 2, implicit=True, each_step=1)},
             order=4,
             explicit=False,
             symplectic=True,
             symmetric=True,
             conserves=frozenset({"p_phi", "p_psi"}),
             reference="marsden-west-2001",
-        ),
+        )
     ]
 
 
 def is_galerkin(method: Integrator) -> bool:
     """Is it this integrator, whatever its name?"""
-    solver = method.solvers.get("angles")
-    loop = None if solver is None else inside(solver)
-    return loop is not None and isinstance(loop.rule, Iteration)
+    solver = inside(method.solvers.get("angles"))
+    return solver is not None and solver.loop is march

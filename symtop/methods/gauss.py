@@ -29,7 +29,7 @@ import numpy as np
 
 from symtop.base.multiprecision import context
 from symtop.methods.compiled import register_jitable, set_item
-from symtop.methods.fixed_step import FixedStep, Prepare, Present, fixed_step
+from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import Loop, driver
 from symtop.methods.outcomes import NOT_CONVERGED, OK
 from symtop.methods.registry import Array, Integrator
@@ -176,50 +176,35 @@ def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C90
     return step, effort, outcome if np.isfinite(step[0]) else NOT_CONVERGED
 
 
-def begin_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """Working space on (e, L)."""
-    return working_space(field_axis, par, rule, state, h)
+def _loop(field: Any) -> Loop:
+    """The loop on states that move by `field`, with L in the components 3 to 5; the work counted is sweeps."""
+
+    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
+        return working_space(field, par, rule, state, h)
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        step, effort, outcome = gauss_step(field, par, state, carry)
+        return step, carry, effort, outcome
+
+    return driver(begin, increment, observe_axis)
 
 
-def begin_frame(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """Working space on (e, L, a)."""
-    return working_space(field_frame, par, rule, state, h)
-
-
-def increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (e, L); the work counted is the number of sweeps."""
-    step, effort, outcome = gauss_step(field_axis, par, state, carry)
-    return step, carry, effort, outcome
-
-
-def increment_frame(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (e, L, a); the work counted is the number of sweeps."""
-    step, effort, outcome = gauss_step(field_frame, par, state, carry)
-    return step, carry, effort, outcome
-
-
-march_axis = driver(begin_axis, increment_axis, observe_axis)
-march_frame = driver(begin_frame, increment_frame, observe_axis)
-
-
-def solver(stages: int, march: Loop, prepare: Prepare, present: Present | None = None) -> FixedStep:
-    """A solver of the registry; its coefficients are computed when it is first used."""
-
-    def rule(top: SymmetricTop, start: Angles, h: float) -> Any:
-        return gauss_rule(stages)
-
-    return fixed_step(march, rule, prepare, stages, implicit=True, present=present)
+march_axis, march_frame = _loop(field_axis), _loop(field_frame)
 
 
 def gauss(stages: int) -> Integrator:
-    """The Gauss method with 1 to 6 stages, named after its order."""
+    """The Gauss method with 1 to 6 stages, named after its order; its coefficients are computed at the first run."""
+
+    def rule(top: SymmetricTop, start: Angles, h: float) -> GaussRule:
+        return gauss_rule(stages)
+
     return Integrator(
         name=f"gauss-{2 * stages}",
         family="runge-kutta",
         summary=f"Gauss collocation with {stages} stage{'s' if stages > 1 else ''} on the space-frame equations",
         solvers={
-            "axis": solver(stages, march_axis, on_axis),
-            "attitude": solver(stages, march_frame, on_frame, frame_to_attitude),
+            "axis": FixedStep(march_axis, rule, on_axis, stages, implicit=True),
+            "attitude": FixedStep(march_frame, rule, on_frame, stages, implicit=True, present=frame_to_attitude),
         },
         order=2 * stages,
         explicit=False,

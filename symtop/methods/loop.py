@@ -173,9 +173,4 @@ def driver(  # noqa: C901  (one loop, read in one piece)
     def plain() -> Loop:
         return driver(begin, increment, observe, enter, present, accumulate_plainly)
 
-    return Loop(
-        begin,
-        compile_kernel(prepare),
-        compile_kernel(march),
-        plain,
-    )
+    return Loop(begin, compile_kernel(prepare), compile_kernel(march), plain)

@@ -20,12 +20,23 @@ class Quadrature(NamedTuple):
     iterations: int = 50
 
 
-# name: nodes, weights, order
-RULES: dict[str, tuple[tuple[float, ...], tuple[float, ...], int]] = {
-    "midpoint": ((0.5,), (1.0,), 2),
-    "trapezoidal": ((0.0, 1.0), (0.5, 0.5), 2),
-    "simpson-linear": ((0.0, 0.5, 1.0), (1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0), 2),
-}
+class Rule(NamedTuple):
+    """A built-in method: the arguments of `symtop.methods.discrete_lagrangian.discrete_lagrangian` beside its name."""
+
+    nodes: tuple[float, ...]
+    weights: tuple[float, ...]
+    order: int
+    summary: str
+
+
+RULES = {
+    "midpoint": Rule((0.5,), (1.0,), 2, "discrete Lagrangian, midpoint rule"),
+    "trapezoidal": Rule((0.0, 1.0), (0.5, 0.5), 2, "discrete Lagrangian, trapezoidal rule"),
+    "simpson-linear": Rule(
+        (0.0, 0.5, 1.0), (1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0), 2,
+        "discrete Lagrangian, Simpson's rule on a straight line (order 2: the line limits it)",
+    ),
+}  # fmt: skip
 
 
 def quadrature(nodes: Sequence[float], weights: Sequence[float]) -> tuple[Quadrature, bool]:

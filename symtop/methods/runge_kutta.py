@@ -23,7 +23,7 @@ from symtop.base.validate import SymtopError, row
 from symtop.methods.angles import chart_outcome
 from symtop.methods.compiled import register_jitable, set_item
 from symtop.methods.euler_lagrange import field_angles, observe_angles, to_angles, with_rates
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver
 from symtop.methods.registry import Integrator
 from symtop.methods.space import field_axis, finite_outcome, observe_axis, on_axis
@@ -156,8 +156,8 @@ def runge_kutta(
         family="runge-kutta",
         summary=summary or f"explicit Runge-Kutta method with {len(weights)} stages",
         solvers={
-            "angles": fixed_step(march_angles, rule, with_rates, 1, implicit=False, present=to_angles),
-            "axis": fixed_step(march_axis, rule, on_axis, 1, implicit=False),
+            "angles": FixedStep(march_angles, rule, with_rates, 1, implicit=False, present=to_angles),
+            "axis": FixedStep(march_axis, rule, on_axis, 1, implicit=False),
         },
         order=order,
         explicit=True,

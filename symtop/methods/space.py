@@ -12,6 +12,7 @@ p_phi = L_z and p_psi = L.e are not parameters of these charts: they are read of
 to them shows.
 """
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,18 +32,12 @@ class SpaceTop(NamedTuple):
 
 
 def _prepare(chart: str, top: SymmetricTop, at: Angles) -> tuple[SpaceTop, tuple[float, ...]]:
+    """Kernel parameters and state of a start."""
     spin = top.I3 * at.spin * (1.0 / top.I3 - 1.0 / top.I1)
     return SpaceTop(top.I1, top.mgl, spin), charts.space_numbers(chart, top, at)
 
 
-def on_axis(top: SymmetricTop, at: Angles) -> tuple[SpaceTop, tuple[float, ...]]:
-    """Kernel parameters and state (e, L) of a start."""
-    return _prepare("axis", top, at)
-
-
-def on_attitude(top: SymmetricTop, at: Angles) -> tuple[SpaceTop, tuple[float, ...]]:
-    """Kernel parameters and state (q, L) of a start."""
-    return _prepare("attitude", top, at)
+on_axis, on_attitude = partial(_prepare, "axis"), partial(_prepare, "attitude")
 
 
 def on_frame(top: SymmetricTop, at: Angles) -> tuple[SpaceTop, tuple[float, ...]]:
@@ -65,14 +60,8 @@ def field_axis(par: Any, y: Any) -> Any:
     """Time derivative of (e, L)."""
     inverse = 1.0 / par.I1  # leaves the loop, as three divisions would not
     wx, wy, wz = inverse * y[3], inverse * y[4], inverse * y[5]
-    return (
-        wy * y[2] - wz * y[1],
-        wz * y[0] - wx * y[2],
-        wx * y[1] - wy * y[0],
-        -par.mgl * y[1],
-        par.mgl * y[0],
-        0.0,
-    )
+    turn = wy * y[2] - wz * y[1], wz * y[0] - wx * y[2], wx * y[1] - wy * y[0]
+    return (*turn, -par.mgl * y[1], par.mgl * y[0], 0.0)
 
 
 @register_jitable
@@ -97,11 +86,15 @@ def observe_axis(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any
     return before[5] + dstate[5], p_psi
 
 
+@register_jitable
+def axis_of(w: float, x: float, y: float, z: float) -> Any:
+    """The axis of a quaternion."""
+    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z
+
+
 def observe_attitude(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     """p_phi = L_z and p_psi = L.e(q) after the step."""
-    w, x = before[0] + dstate[0], before[1] + dstate[1]
-    y, z = before[2] + dstate[2], before[3] + dstate[3]
-    axis = (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z)
+    axis = axis_of(before[0] + dstate[0], before[1] + dstate[1], before[2] + dstate[2], before[3] + dstate[3])
     p_psi = 0.0
     for i in range(3):
         p_psi += axis[i] * (before[4 + i] + dstate[4 + i])

@@ -17,17 +17,26 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from symtop.base.validate import SymtopError, finite, one_of, row
-from symtop.methods import coefficients as tables
 from symtop.methods import splitting_angles, splitting_space
 from symtop.methods.angles import reduced
-from symtop.methods.coefficients import Table
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.coefficients import METHODS
+from symtop.methods.fixed_step import FixedStep, Prepare
+from symtop.methods.loop import Loop
 from symtop.methods.registry import Integrator, ModifiedEnergy
 from symtop.methods.space import on_attitude, on_axis
 from symtop.methods.splitting_loop import Composition, closed
 from symtop.methods.splitting_space import ROTATIONS
 
-_SPACE = {"axis": (splitting_space.march_axis, on_axis), "attitude": (splitting_space.march_attitude, on_attitude)}
+_KERNELS: dict[str, dict[str, tuple[Loop, Prepare]]] = {
+    "angles": {"angles": (splitting_angles.march, reduced)},
+    "space": {"axis": (splitting_space.march_axis, on_axis), "attitude": (splitting_space.march_attitude, on_attitude)},
+}
+# the modified energy and the sleeping threshold of kick-drift-kick, by chart and rotation
+_KICK_DRIFT_KICK: dict[tuple[str, str], tuple[ModifiedEnergy, Callable[[float], float] | None]] = {
+    ("angles", "exact"): (splitting_angles.verlet_energy, None),
+    ("space", "exact"): (splitting_space.strang_energy, splitting_space.strang_sleeps_from),
+    ("space", "cayley"): (splitting_space.cayley_correction, splitting_space.cayley_sleeps_from),
+}
 
 
 def composition(
@@ -56,54 +65,38 @@ def composition(
 
     Raises SymtopError for tables that do not fit together or do not sum to 1.
     """
-    space = one_of("chart", chart, ("angles", "space")) == "space"
+    one_of("chart", chart, _KERNELS)
     one_of("rotation", rotation, ROTATIONS)
     rule, boost = _checked(drift, kick, gradient), finite("processor", processor)
-    if not space and (any(rule.gradient) or rotation != "exact" or boost):
+    bare = not any(rule.gradient) and not boost
+    if chart == "angles" and not (bare and rotation == "exact"):
         raise SymtopError(
             f"chart must be 'space' for a composition with a gradient, a rotation or a processor, not {chart!r}"
         )
-    reads_same = all(row == row[::-1] for row in rule[:3])
-    integrable = rotation != "exact" and rule.drift == (1.0,) and not any(rule.gradient) and not boost
-    modified, sleeps = _closed_forms(rule, rotation, boost, space=space)
-    if space:
-        stages = partial(splitting_space.stages, rule, rotation, boost)
-        solvers = {
-            chart: fixed_step(march, stages, prepare, 1, implicit=False) for chart, (march, prepare) in _SPACE.items()
-        }
-    else:
+    if chart == "angles":
         stages = partial(splitting_angles.stages, rule)
-        solvers = {"angles": fixed_step(splitting_angles.march, stages, reduced, 1, implicit=False)}
+    else:
+        stages = partial(splitting_space.stages, rule, rotation, boost)
+    one_drift = bare and rule.drift == (1.0,)
+    closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if one_drift and rule.kick == (0.5, 0.5) else None
+    modified, sleeps = closed_forms or (None, None)
     return Integrator(
         name=name,
         family="splitting",
         summary=summary or f"splitting with {len(rule.drift)} drifts and {rule.forces} forces a step",
-        solvers=solvers,
+        solvers={
+            shown: FixedStep(march, stages, prepare, 1, implicit=False)
+            for shown, (march, prepare) in _KERNELS[chart].items()
+        },
         order=order,
         explicit=True,
         symplectic=True,
-        symmetric=reads_same,
-        conserves=frozenset({"p_phi", "p_psi"} | ({"cayley_energy"} if integrable else set())),
+        symmetric=all(numbers == numbers[::-1] for numbers in rule[:3]),
+        conserves=frozenset({"p_phi", "p_psi"} | ({"cayley_energy"} if one_drift and rotation != "exact" else set())),
         reference=reference,
         modified_energy=modified,
         sleeps_from=sleeps,
     )
-
-
-_CLOSED_FORMS: dict[str, tuple[ModifiedEnergy, Callable[[float], float]]] = {
-    "exact": (splitting_space.strang_energy, splitting_space.strang_sleeps_from),
-    "cayley": (splitting_space.cayley_correction, splitting_space.cayley_sleeps_from),
-}  # of kick-drift-kick in the space frame, by the rotation of a drift
-
-
-def _closed_forms(
-    rule: Composition, rotation: str, processor: float, *, space: bool
-) -> tuple[ModifiedEnergy | None, Callable[[float], float] | None]:
-    """The modified energy and the sleeping threshold that are known of a composition."""
-    plain = rule.drift == (1.0,) and rule.kick == (0.5, 0.5) and not any(rule.gradient) and not processor
-    if plain and space:
-        return _CLOSED_FORMS.get(rotation, (None, None))
-    return (splitting_angles.verlet_energy if plain else None), None
 
 
 def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] | None) -> Composition:
@@ -122,81 +115,12 @@ def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[f
     return closed(drifts, kicks, slopes)
 
 
-def _on_space(name: str, numbers: Table, reference: str, summary: str) -> Integrator:
-    return composition(
-        name, *numbers[1:], chart="space", order=numbers.order, reference=reference, summary=f"free top and {summary}"
-    )
-
-
-def _on_angles(name: str, numbers: Table, reference: str, summary: str) -> Integrator:
-    return composition(name, numbers.drift, numbers.kick, order=numbers.order, reference=reference, summary=summary)
-
-
 def built_in() -> list[Integrator]:
     """The compositions that ship with symtop."""
-    ABA = "blanes-casas-farres-laskar-makazaga-murua-2013"
-    strang = tables.STRANG
     return [
-        _on_angles(
-            "stormer-verlet",
-            strang,
-            "hairer-lubich-wanner-2003",
-            "kick-drift-kick splitting of the reduced Hamiltonian",
-        ),
-        _on_angles("stormer-verlet-yoshida-4", tables.YOSHIDA_4, "yoshida-1990", "three Stormer-Verlet steps"),
-        _on_angles("stormer-verlet-suzuki-4", tables.SUZUKI_4, "suzuki-1990", "five Stormer-Verlet steps"),
-        _on_angles(
-            "stormer-verlet-blanes-moan-6",
-            tables.SRKN_11_6,  # up to five times more accurate here than the 14 forces of the other one
-            "blanes-moan-2002",
-            "Runge-Kutta-Nystrom splitting of the reduced Hamiltonian, 11 forces",
-        ),
-        _on_space("strang", strang, "touma-wisdom-1994", "gravity kicks, one force"),
         composition(
-            "cayley",
-            strang.drift,
-            strang.kick,
-            chart="space",
-            rotation="cayley",
-            order=2,
-            summary="Cayley rotation and gravity kicks, an integrable map, one force",
-            reference="bobenko-suris-1999",
-        ),
-        composition(
-            "cayley-tuned",
-            strang.drift,
-            strang.kick,
-            chart="space",
-            rotation="cayley-tuned",
-            order=2,
-            summary="Cayley rotation by the right mean angle and gravity kicks, an integrable map, one force",
-            reference="bobenko-suris-1999",
-        ),
-        composition(
-            "takahashi-imada",
-            *tables.TAKAHASHI_IMADA[1:],
-            chart="space",
-            processor=tables.TAKAHASHI_IMADA_PROCESSOR,
-            order=4,
-            summary="free top and kicks with a force gradient, processed, one force",
-            reference="takahashi-imada-1984",
-        ),
-        _on_space("chin-4a", tables.CHIN_4A, "chin-1997", "positive kicks with a force gradient, two forces"),
-        _on_space("yoshida-4", tables.YOSHIDA_4, "yoshida-1990", "gravity kicks, three Strang steps"),
-        _on_space("suzuki-4", tables.SUZUKI_4, "suzuki-1990", "gravity kicks, five Strang steps"),
-        _on_space("srkn-6-4", tables.SRKN_6_4, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 6 forces"),
-        _on_space("srkn-11-6", tables.SRKN_11_6, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 11 forces"),
-        _on_space("srkn-14-6", tables.SRKN_14_6, "blanes-moan-2002", "gravity kicks, Runge-Kutta-Nystrom, 14 forces"),
-        _on_space("kahan-li-6", tables.KAHAN_LI_6, "kahan-li-1997", "gravity kicks, 9 Strang steps"),
-        _on_space("suzuki-umeno-8", tables.SUZUKI_UMENO_8, "suzuki-umeno-1993", "gravity kicks, 15 Strang steps"),
-        _on_space("kahan-li-8", tables.KAHAN_LI_8, "kahan-li-1997", "gravity kicks, 17 Strang steps"),
-        _on_space(
-            "sofroniou-spaletta-10",
-            tables.SOFRONIOU_SPALETTA_10,
-            "sofroniou-spaletta-2005",
-            "gravity kicks, 35 Strang steps",
-        ),
-        _on_space("aba-8-6-4", tables.ABA_8_6_4, ABA, "gravity kicks, generalised order (8, 6, 4), 7 forces"),
-        _on_space("aba-10-6-4", tables.ABA_10_6_4, ABA, "gravity kicks, generalised order (10, 6, 4), 8 forces"),
-        _on_space("aba-10-4", tables.ABA_10_4, ABA, "gravity kicks, generalised order (10, 4), 7 forces"),
-    ]
+            name, *method.table[1:], chart=method.chart, rotation=method.rotation, processor=method.processor,
+            order=method.table.order, summary=method.summary, reference=method.reference,
+        )
+        for name, method in METHODS.items()
+    ]  # fmt: skip

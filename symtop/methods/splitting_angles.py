@@ -38,12 +38,7 @@ def force_angles(par: Any, state: Any, step: Any) -> Any:
 def kick_angles(par: Any, force: Any, step: Any, tau: float, bend: float) -> Any:
     """Flow of the potential for a time tau."""
     slope, precession, turn = force
-    return (
-        step[0],
-        step[1] - tau * slope,
-        step[2] + tau * precession,
-        step[3] + tau * (par.p_psi / par.I3 - turn),
-    )
+    return (step[0], step[1] - tau * slope, step[2] + tau * precession, step[3] + tau * (par.p_psi / par.I3 - turn))
 
 
 @register_jitable

@@ -44,7 +44,7 @@ from symtop.base.numbers import sign_changes
 from symtop.methods.compiled import register_jitable
 from symtop.methods.loop import driver
 from symtop.methods.registry import Array
-from symtop.methods.space import finite_outcome, observe_attitude, observe_axis
+from symtop.methods.space import axis_of, finite_outcome, observe_attitude, observe_axis
 from symtop.methods.splitting_loop import Composition, Stages, compose
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View, space_energy
@@ -112,11 +112,11 @@ def rotor(rule: Any, Lx: float, Ly: float, Lz: float, half: float) -> Any:
 
 
 @register_jitable
-def kicked(force: Any, pull: float, bend: float) -> Any:
-    """Increments of L_x and L_y by gravity."""
+def kick_space(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:
+    """Flow of gravity: L_x and L_y, the last components but one."""
     x, y, z = force
     strength = pull - bend * z
-    return -strength * y, strength * x
+    return (*step[:-3], step[-3] - strength * y, step[-2] + strength * x, step[-1])
 
 
 # ---- the axis --------------------------------------------------------------------------------------------------------
@@ -126,13 +126,6 @@ def kicked(force: Any, pull: float, bend: float) -> Any:
 def force_axis(par: Any, state: Any, step: Any) -> Any:
     """The present axis: what a kick needs."""
     return state[0] + step[0], state[1] + step[1], state[2] + step[2]
-
-
-@register_jitable
-def kick_axis(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:
-    """Flow of gravity."""
-    x, y = kicked(force, pull, bend)
-    return step[0], step[1], step[2], step[3] + x, step[4] + y, step[5]
 
 
 @register_jitable
@@ -162,7 +155,7 @@ def begin_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 def increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (e, L); the work counted is the number of kicks with a new axis."""
-    step, axis = compose(force_axis, kick_axis, drift_axis, par, rule, state, carry)
+    step, axis = compose(force_axis, kick_space, drift_axis, par, rule, state, carry)
     return step, axis, rule.forces, finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4])
 
 
@@ -176,38 +169,21 @@ def process_axis(s: float, x: float, y: float, z: float, Lx: float, Ly: float, L
 
 def enter_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
     """The start in the variables of a processed method."""
-    if rule.boost == 0.0:
-        return state
-    return process_axis(rule.boost, *state)
+    return state if rule.boost == 0.0 else process_axis(rule.boost, *state)
 
 
 def present_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """Back from the variables of a processed method."""
-    if rule.boost == 0.0:
-        return state
-    return process_axis(-rule.boost, *state)
+    return state if rule.boost == 0.0 else process_axis(-rule.boost, *state)
 
 
 # ---- the attitude ----------------------------------------------------------------------------------------------------
 
 
 @register_jitable
-def axis_of(w: float, x: float, y: float, z: float) -> Any:
-    """The axis of a quaternion."""
-    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z
-
-
-@register_jitable
 def force_attitude(par: Any, state: Any, step: Any) -> Any:
     """The present axis: what a kick needs."""
     return axis_of(state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3])
-
-
-@register_jitable
-def kick_attitude(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:
-    """Flow of gravity."""
-    x, y = kicked(force, pull, bend)
-    return step[0], step[1], step[2], step[3], step[4] + x, step[5] + y, step[6]
 
 
 @register_jitable
@@ -235,7 +211,7 @@ def begin_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 def increment_attitude(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (q, L); the work counted is the number of kicks with a new axis."""
-    step, axis = compose(force_attitude, kick_attitude, drift_attitude, par, rule, state, carry)
+    step, axis = compose(force_attitude, kick_space, drift_attitude, par, rule, state, carry)
     return step, axis, rule.forces, finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5])
 
 
@@ -252,9 +228,7 @@ def process_attitude(s: float, w: float, x: float, y: float, z: float, Lx: float
 
 def enter_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:
     """The start in the variables of a processed method."""
-    if rule.boost == 0.0:
-        return state
-    return process_attitude(rule.boost, *state)
+    return state if rule.boost == 0.0 else process_attitude(rule.boost, *state)
 
 
 def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:

@@ -86,13 +86,6 @@ def _idle(chart: str, precision: str, tolerance: float) -> list[Any]:
     return []
 
 
-def _take(idle: list[Any], chart: str, precision: str, tolerance: float) -> Any:
-    try:
-        return idle.pop()  # in one instruction: another thread may be here, too
-    except IndexError:
-        return stepper(chart, precision, tolerance)
-
-
 @functools.lru_cache(maxsize=256)
 def start_numbers(chart: str, precision: str, top: SymmetricTop, at: Angles) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """State and parameters of a start, correctly rounded to the working precision from its exact doubles.
@@ -127,7 +120,10 @@ def propagate(
     After `most` steps (0: never) it stops, and the states end at the last time that was reached.
     """
     idle, kind = _idle(chart, precision, tolerance), arithmetic(precision).kind
-    integrator = _take(idle, chart, precision, tolerance)
+    try:
+        integrator = idle.pop()  # in one instruction: another thread may be here, too
+    except IndexError:
+        integrator = stepper(chart, precision, tolerance)
     state, parameters = start_numbers(chart, precision, top, start)
     integrator.time = kind("0")
     integrator.state[:] = state
@@ -161,11 +157,9 @@ def solver(chart: str, precision: str) -> Solver:
 
 def _padded(values: Any, size: int) -> Array:
     """Values as doubles, and NaN for the times that were not reached."""
-    shown: Array = values.astype(float, copy=False)
-    if len(shown) == size:
-        return shown
-    missing: Array = np.full((size - len(shown), *shown.shape[1:]), np.nan)
-    return np.concatenate([shown, missing])
+    padded = np.full((size, *values.shape[1:]), np.nan)
+    padded[: len(values)] = values
+    return padded
 
 
 # beyond double there are no vector units, and quadruple precision is software: a step costs 12 and 500 times as much

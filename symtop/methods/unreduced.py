@@ -18,19 +18,20 @@ sum can undo (p1 is formed at full size, not as an increment), and p_phi - p_psi
 Source: Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357.
 """
 
-from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.base.validate import SymtopError
 from symtop.methods.angles import BareTop, chart_outcome, require_chart
 from symtop.methods.compiled import register_jitable
-from symtop.methods.discrete_lagrangian import record
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.discrete_lagrangian import built_in as reduced_methods
+from symtop.methods.discrete_lagrangian import rule_of
+from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver
 from symtop.methods.newton import Correction, newton
 from symtop.methods.outcomes import NOT_CONVERGED
-from symtop.methods.quadrature import RULES, quadrature
 from symtop.methods.registry import Array, Integrator
 from symtop.model.top import Angles, SymmetricTop
 
@@ -221,26 +222,21 @@ def _in_angles(par: BareTop, times: Array, states: Array) -> Array:
     return states[:, ANGLES_CHART]
 
 
-def unreduced(
-    name: str,
-    nodes: Sequence[float],
-    weights: Sequence[float],
-    *,
-    order: int | None = None,
-    summary: str = "",
-    reference: str = "marsden-west-2001",
-) -> Integrator:
-    """The method that `discrete_lagrangian` makes of the same arguments, stepped in all three angles."""
-    rule, symmetric = quadrature(nodes, weights)
-    solver = fixed_step(march, rule, with_momenta, len(rule.nodes), implicit=True, present=_in_angles)
-    return record(name, rule, solver, order=order, symmetric=symmetric, summary=summary, reference=reference)
+def unreduced(method: Integrator) -> Integrator:
+    """A method that `discrete_lagrangian` made, stepped in all three angles."""
+    rule = rule_of(method)
+    if rule is None:
+        raise SymtopError(f"unreduced takes a method that discrete_lagrangian made, not {method.name!r}")
+    return replace(
+        method,
+        name=f"{method.name}-unreduced",
+        summary=f"{method.summary}, in all three angles with nothing eliminated",
+        solvers={"angles": FixedStep(march, rule, with_momenta, len(rule.nodes), implicit=True, present=_in_angles)},
+        modified_energy=None,
+        about="",
+    )
 
 
 def built_in() -> list[Integrator]:
     """The twins of two reduced methods."""
-    twins = []
-    for name in ("midpoint", "trapezoidal"):
-        nodes, weights, order = RULES[name]
-        summary = f"discrete Lagrangian, {name} rule, in all three angles with nothing eliminated"
-        twins.append(unreduced(f"{name}-unreduced", nodes, weights, order=order, summary=summary))
-    return twins
+    return [unreduced(method) for method in reduced_methods() if method.name in {"midpoint", "trapezoidal"}]

@@ -40,11 +40,6 @@ def quaternion_from_angles(theta: Any, phi: Any, psi: Any) -> Array:
     return _stacked(quaternion_parts(np, theta, phi, psi))
 
 
-def momentum_from_angles(top: SymmetricTop, theta: Any, phi: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any) -> Array:
-    """Angular momentum in the space frame, shape (..., 3): its three terms are along n, e x n and e."""
-    return _stacked(momentum_parts(np, top, theta, phi, theta_dot, phi_dot, psi_dot))
-
-
 def space_state(chart: str, top: SymmetricTop, at: Angles) -> Array:
     """State (e, L) or (q, L) of a start in one of the space-frame charts."""
     return np.array(space_numbers(chart, top, at))
@@ -75,7 +70,7 @@ def quaternion_parts(of: Any, theta: Any, phi: Any, psi: Any) -> tuple[Any, ...]
 def momentum_parts(
     of: Any, top: SymmetricTop, theta: Any, phi: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any
 ) -> tuple[Any, ...]:
-    """The angular momentum, by the sine and cosine of a module."""
+    """The angular momentum, its three terms along n, e x n and e, by the sine and cosine of a module."""
     s, c, sin_phi, cos_phi = of.sin(theta), of.cos(theta), of.sin(phi), of.cos(phi)
     nod, swing, spin = top.I1 * theta_dot, top.I1 * phi_dot * s, top.I3 * (psi_dot + phi_dot * c)
     across = spin * s - swing * c

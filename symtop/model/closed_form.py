@@ -35,7 +35,7 @@ from numpy.typing import ArrayLike
 from symtop.base.validate import SymtopError
 from symtop.model.charts import Array
 from symtop.model.double_double import Pair, line, on_line, pair, reduced, turns
-from symtop.model.precise_form import PreciseForm
+from symtop.model.precise_form import Motion, PreciseForm
 from symtop.model.top import Angles, SymmetricTop
 
 Cubic = tuple[float, float, float, float]
@@ -45,17 +45,6 @@ _SINES = ((1, 0, 0, 0), (1, 2, 0, 0), (-1, 2, 4, 0), (-1, -4, 4, 8))
 _COSINES = ((1, 0, 0, 0), (-1, 2, 0, 0), (-1, -2, 4, 0), (1, -4, -4, 8))
 _EVEN_COSINES = ((1, 0, 0, 0), (0, 1, 0, 0), (-1, 0, 2, 0), (0, -3, 0, 4))
 _EVEN_SINES = ((0, 0, 0, 0), (2, 0, 0, 0), (0, 4, 0, 0), (-2, 0, 8, 0))
-
-
-class Motion(NamedTuple):
-    """Euler angles (radians, theta in [0, pi], phi and psi unwrapped) and their rates; arrays shaped as the times."""
-
-    theta: Array
-    phi: Array
-    psi: Array
-    theta_dot: Array
-    phi_dot: Array
-    psi_dot: Array
 
 
 class _Half(NamedTuple):
@@ -135,7 +124,7 @@ class ClosedForm:
         self._phi_turns = turns(ctx, form.phi_rate, phi0)
         self._half_turns = tuple(turns(ctx, r / 2, s) for r, s in zip(form.mean_rates, leading, strict=True))
 
-    def __call__(self, times: ArrayLike) -> Motion:
+    def __call__(self, times: ArrayLike) -> Motion[Array]:
         """Angles and rates at `times`; every field has their shape."""
         flat, shape = _times(times)
         wave = self._wave(flat)

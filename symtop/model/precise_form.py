@@ -32,7 +32,7 @@ time, except that a time of 10^k periods costs k of the 30 guard digits.
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from symtop.base.validate import SymtopError, whole
 from symtop.model.exact_numbers import rational, rationals, real_roots
@@ -41,15 +41,18 @@ from symtop.model.top import Angles, SymmetricTop
 GUARD_DIGITS, MOST_DIGITS = 30, 20_000  # the latter resolves relative gaps between roots down to 1e-5000
 
 
-class PreciseMotion(NamedTuple):
-    """Angles (radians; phi and psi unwrapped) and their rates at one time, as `mpmath.mpf`."""
+Number = TypeVar("Number")
 
-    theta: Any
-    phi: Any
-    psi: Any
-    theta_dot: Any
-    phi_dot: Any
-    psi_dot: Any
+
+class Motion(NamedTuple, Generic[Number]):
+    """Euler angles (radians, theta in [0, pi], phi and psi unwrapped) and their rates: arrays or `mpmath.mpf`."""
+
+    theta: Number
+    phi: Number
+    psi: Number
+    theta_dot: Number
+    phi_dot: Number
+    psi_dot: Number
 
 
 class Pole(NamedTuple):
@@ -201,8 +204,8 @@ class PreciseForm:
         sn2, dn2 = crown.high / (self.m1 * crown.low), swing / crown.low
         return lower, ctx.sqrt(sn2) * ctx.elliprf(self.curve.beyond * dn2, dn2, 1)
 
-    def __call__(self, time: Any) -> PreciseMotion:
-        """Angles and rates at `time` (float, string, fraction or mpf)."""
+    def __call__(self, time: Any) -> Motion[Any]:
+        """Angles and rates at `time` (float, string, fraction or mpf), as `mpmath.mpf`."""
         down, up, total, difference, nod = self._state(time)
         phi, psi = (total + difference) / 2, self.facing * (total - difference) / 2
         halves = ((self.curve.floor.twist, down), (self.curve.crown.twist, up))
@@ -212,7 +215,7 @@ class PreciseForm:
         if (cosine < 0) != (sine < 0):
             phi, psi, nod = phi + self.ctx.pi, psi + (self.ctx.pi if cosine < 0 else -self.ctx.pi), -nod
         motion = (self._theta(abs(down), abs(up)), phi, psi, self.facing * nod, phi_dot, psi_dot)
-        return PreciseMotion(*map(_plain, motion))
+        return Motion(*map(_plain, motion))
 
     def axis(self, time: Any) -> tuple[Any, ...]:
         """Unit vector (x, y, z) along the top's axis."""
@@ -224,37 +227,9 @@ class PreciseForm:
     def quaternion(self, time: Any) -> tuple[Any, ...]:
         """Attitude (w, x, y, z), body to space, from the integrals of the third kind."""
         down, up, total, difference, _ = self._state(time)
-        return self._quaternion(down * self.ctx.expj(total / 2), up * self.ctx.expj(difference / 2))
-
-    def theta_quaternion(self, time: Any) -> tuple[Any, ...]:
-        """Attitude (w, x, y, z) by theta functions, as Klein and Sommerfeld write it: a second, branch-free evaluation.
-
-        With z = pi tau/2K and the pole at z = z0 (floor i y, crown pi/2 + i y; y has the sign of the twist), the halves
-        are ``sqrt(d/2) exp(i angle/2) = C exp(i rate tau) theta_1(z - z0)/theta_4(z)``. C and the rate follow from the
-        value and derivative at the turning point far from the pole. Only roots and phase are shared with `quaternion`.
-        """
-        if self.curve.swing == 0:
-            return self.quaternion(time)
-        ctx, (floor, crown, *_, start_sn2, start_cn2) = self.ctx, self.curve
-        scale, quarter, heights = ctx.pi / (2 * self.K), ctx.pi / 2, self.zero_heights()
-        nome = ctx.exp(-ctx.pi * self.K1 / self.K) if self.m else ctx.zero
-        passed = self.Omega * self._real(rational("time", time))
-        start, now = scale * self.tau0, scale * (self.tau0 + passed)
-        halves = []
-        for pole, height, angle, drift, distance, far, on_pole in (
-            (floor, heights[0], self.angles0[0], self.drift, floor.high, quarter, floor.low == start_sn2 == 0),
-            (crown, heights[1], self.angles0[1], -self.drift, crown.low, 0, crown.high == start_cn2 == 0),
-        ):
-            zero = ctx.mpc(quarter - far, (-1 if pole.twist < 0 else 1) * scale * height)
-            value, derivative = _theta_series(ctx, 1, far - zero, nome)
-            turning = (drift + pole.twist / distance) / (2 * self.Omega) - scale * ctx.im(derivative / value)
-            size = ctx.sqrt(distance / 2) * _theta_series(ctx, 4, far, nome)[0] / abs(value)
-            begin = _theta_series(ctx, 1, start - zero, nome)[0]
-            if on_pole:  # continue towards theta'
-                begin = ctx.mpc(self.floor_sign if far else -1)
-            wave = _theta_series(ctx, 1, now - zero, nome)[0] / _theta_series(ctx, 4, now, nome)[0]
-            halves.append(size * ctx.expj(angle / 2 - ctx.arg(begin) + turning * passed) * wave)
-        return self._quaternion(*halves)
+        halves = down * self.ctx.expj(total / 2), up * self.ctx.expj(difference / 2)
+        first, second = halves if self.facing > 0 else halves[::-1]
+        return tuple(map(_plain, (first.real, second.real, second.imag, first.imag)))
 
     def _state(self, time: Any) -> tuple[Any, Any, Any, Any, Any]:
         """sqrt((1 + u)/2) and sqrt((1 - u)/2), signed, phi + psi, phi - psi and theta', all in the upright picture."""
@@ -313,10 +288,6 @@ class PreciseForm:
     def _theta(self, down: Any, up: Any) -> Any:
         return 2 * (self.ctx.atan2(up, down) if self.facing > 0 else self.ctx.atan2(down, up))
 
-    def _quaternion(self, down: Any, up: Any) -> tuple[Any, ...]:
-        first, second = (down, up) if self.facing > 0 else (up, down)
-        return tuple(map(_plain, (first.real, second.real, second.imag, first.imag)))
-
     def _real(self, value: Fraction) -> Any:
         return self.ctx.mpf(value.numerator) / value.denominator
 
@@ -326,17 +297,3 @@ def _plain(value: Any) -> Any:
     from mpmath import mp
 
     return mp.make_mpf(value._mpf_)
-
-
-def _theta_series(ctx: Any, kind: int, z: Any, nome: Any) -> tuple[Any, Any]:
-    """theta_1(z) without its factor 2 q^(1/4), or theta_4(z), and the derivative; nome q in [0, 1)."""
-    value, derivative = (ctx.sin(z), ctx.cos(z)) if kind == 1 else (ctx.one, ctx.zero)
-    growth, n, weight = 2 * abs(ctx.im(z)), 0, ctx.one
-    while abs(weight) * ctx.exp((n + 1) * growth) * (2 * n + 2) > ctx.eps:
-        n += 1
-        weight = (-1) ** n * (nome ** (n * (n + 1)) if kind == 1 else 2 * nome ** (n * n))
-        k = 2 * n + 1 if kind == 1 else 2 * n
-        sine, cosine = ctx.sin(k * z), ctx.cos(k * z)
-        value += weight * (sine if kind == 1 else cosine)
-        derivative += weight * k * (cosine if kind == 1 else -sine)
-    return value, derivative

@@ -121,10 +121,8 @@ def sleeping(spin: float, tilt: float = 1e-3, *, name: str = "", purpose: str = 
     sqrt(4 - spin^2)/2 until the top lies at about acos(spin^2/2 - 1), rises again, and so on.
     """
     w3 = finite("spin", spin)
-    words = purpose or f"let go almost upright with a spin of {w3:g}"
-    return Scene(
-        name or f"sleeping-{w3:.12g}", SymmetricTop(1.0, 1.0, 1.0), Angles(theta=tilt, psi_dot=w3), 60.0, words
-    )
+    words, start = purpose or f"let go almost upright with a spin of {w3:g}", Angles(theta=tilt, psi_dot=w3)
+    return Scene(name or f"sleeping-{w3:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 60.0, words)
 
 
 def steady(spin: float, *, name: str = "", purpose: str = "") -> Scene:
@@ -158,12 +156,7 @@ def _separatrix() -> Scene:
 
 def _goldstein(name: str, theta_dot: float, purpose: str) -> Scene:
     """a = p_psi/I1 = 2.5, b = p_phi/I1 = 1.7: phi' = (b - a u)/(1 - u^2), psi' = a I1/I3 - phi' u, u = cos 43 deg."""
-    start = Angles(
-        theta=math.radians(43.0),
-        theta_dot=theta_dot,
-        phi_dot=-0.2760228916930134,
-        psi_dot=5.201870363571313,
-    )
+    start = Angles(math.radians(43.0), 0.0, 0.0, theta_dot, -0.2760228916930134, 5.201870363571313)
     return Scene(name, SymmetricTop(2.0, 1.0, 2.0), start, 70.0, purpose)
 
 
@@ -183,72 +176,39 @@ def _kinon_betsch() -> Scene:
 
 @functools.lru_cache(maxsize=1)
 def _catalogue() -> dict[str, Scene]:
-    spheroid = SymmetricTop(2.0, 1.0, 9.81 * 2.7386127875258306)
-    third = math.pi / 3.0
+    usual, printed = SymmetricTop(2.0, 1.0, 2.0), "the second top with the printed alpha = 1.6, theta"
+    # fmt: off
     catalogue = [
-        Scene(
-            "spheroid",
-            spheroid,
-            Angles(theta=0.4, phi=0.1, psi=0.1, theta_dot=0.1, phi_dot=10.0, psi_dot=0.1),
-            8.0,
-            "the notebook's first top: violent nutation from 23 to 99 degrees",
-            units="SI",
-        ),
+        Scene("spheroid", SymmetricTop(2.0, 1.0, 9.81 * 2.7386127875258306),
+              Angles(theta=0.4, phi=0.1, psi=0.1, theta_dot=0.1, phi_dot=10.0, psi_dot=0.1), 8.0,
+              "the notebook's first top: violent nutation from 23 to 99 degrees", units="SI"),
         _goldstein("goldstein", 0.0, "the notebook's second top, released at rest (alpha = 1.4981)"),
-        _goldstein(
-            "goldstein-falling", -_ALPHA_RATE, "the second top with the printed alpha = 1.6, theta falling at first"
-        ),
-        _goldstein(
-            "goldstein-rising", _ALPHA_RATE, "the second top with the printed alpha = 1.6, theta rising at first"
-        ),
+        _goldstein("goldstein-falling", -_ALPHA_RATE, f"{printed} falling at first"),
+        _goldstein("goldstein-rising", _ALPHA_RATE, f"{printed} rising at first"),
         spinning(10.0, name="cusp", purpose="released from rest: the axis comes to rest again at each cusp"),
         spinning(10.0, -0.3, name="loop", purpose="started against its precession: the axis draws loops"),
         spinning(10.0, 0.1, name="wave", purpose="started along its precession: the axis draws a wave"),
-        Scene(
-            "fast",
-            SymmetricTop(2.0, 1.0, 2.0),
-            Angles(theta=0.5, psi_dot=100.0),
-            8.0,
-            "a very fast spin: 64 small nutations, gravity a perturbation of the free top",
-        ),
-        Scene(
-            "steady",
-            SymmetricTop(2.0, 1.0, 2.0),
-            Angles(theta=third, phi_dot=1.0, psi_dot=2.5),
-            20.0,
-            "exactly steady precession: whatever nutates here is error",
-        ),
-        Scene(
-            "hairer-lubich-wanner",
-            SymmetricTop(0.5, 1.0, 1.0),
-            Angles(theta=math.acos(0.6), phi=2.0 * math.atan(2.0), theta_dot=0.4, phi_dot=2.5, psi_dot=-1.1),
-            30.0,
-            "the flat top of Geometric Numerical Integration, figure VII.5.3",
-        ),
-        Scene(
-            "simo-wong",
-            SymmetricTop(5.0, 1.0, 20.0),
-            Angles(theta=0.05, psi_dot=50.0),
-            10.0,
-            "a fast top almost upright, the benchmark of structural dynamics",
-        ),
+        Scene("fast", usual, Angles(theta=0.5, psi_dot=100.0), 8.0,
+              "a very fast spin: 64 small nutations, gravity a perturbation of the free top"),
+        Scene("steady", usual, Angles(theta=math.pi / 3.0, phi_dot=1.0, psi_dot=2.5), 20.0,
+              "exactly steady precession: whatever nutates here is error"),
+        Scene("hairer-lubich-wanner", SymmetricTop(0.5, 1.0, 1.0),
+              Angles(theta=math.acos(0.6), phi=2.0 * math.atan(2.0), theta_dot=0.4, phi_dot=2.5, psi_dot=-1.1), 30.0,
+              "the flat top of Geometric Numerical Integration, figure VII.5.3"),
+        Scene("simo-wong", SymmetricTop(5.0, 1.0, 20.0), Angles(theta=0.05, psi_dot=50.0), 10.0,
+              "a fast top almost upright, the benchmark of structural dynamics"),
         _kinon_betsch(),
-        Scene(
-            "bruls-cardona-arnold",
-            SymmetricTop(15.234375, 0.46875, 147.15),
-            Angles(theta=math.pi / 2, phi=math.pi, psi=math.pi / 2, phi_dot=-4.61538, psi_dot=150.0),
-            2.0,
-            "a published benchmark that grazes the lower pole at 0.00004 degrees: no place for angles",
-            units="SI",
-        ),
-        grazing(
-            1e-3, name="grazing", purpose="passes the upper pole at 0.06 degrees: a step in angles may jump over it"
-        ),
+        Scene("bruls-cardona-arnold", SymmetricTop(15.234375, 0.46875, 147.15),
+              Angles(theta=math.pi / 2, phi=math.pi, psi=math.pi / 2, phi_dot=-4.61538, psi_dot=150.0), 2.0,
+              "a published benchmark that grazes the lower pole at 0.00004 degrees: no place for angles", units="SI"),
+        grazing(1e-3, name="grazing",
+                purpose="passes the upper pole at 0.06 degrees: a step in angles may jump over it"),
         sleeping(2.5, name="sleeping", purpose="let go almost upright and fast enough to stay there (threshold 2)"),
         sleeping(1.9, name="sleeping-unstable", purpose="let go almost upright and too slow: it falls and rises again"),
         steady(20.0, name="steady-fast", purpose="steady precession of a fast top: a large step makes it nutate"),
         _separatrix(),
     ]
+    # fmt: on
     return {scene.name: scene for scene in catalogue}
 
 

@@ -10,7 +10,7 @@ from symtop.measure.conservation import residuals, trend
 from symtop.measure.growth import growth
 from symtop.measure.step_map import one_step as map_of
 from symtop.measure.step_map import symplectic_defect
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.fixed_step import FixedStep
 from symtop.methods.gauss import STAGES, gauss_rule, march_axis, march_frame
 from symtop.methods.registry import integrator
 from symtop.methods.space import field_axis, frame_to_attitude, on_axis, on_frame
@@ -25,7 +25,7 @@ def with_rule(stages, **changes):
     rule = gauss_rule(stages)._replace(**changes)
     entry = integrator(f"gauss-{2 * stages}")
     return dataclasses.replace(
-        entry, name="wrong", solvers={"axis": fixed_step(march_axis, rule, on_axis, stages, implicit=True)}
+        entry, name="wrong", solvers={"axis": FixedStep(march_axis, rule, on_axis, stages, implicit=True)}
     )
 
 

@@ -12,7 +12,7 @@ from symtop.measure.step_map import one_step, return_miss, symplectic_defect
 from symtop.methods import discrete_lagrangian as family
 from symtop.methods.angles import reduced
 from symtop.methods.discrete_lagrangian import march
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver
 from symtop.methods.quadrature import Quadrature
 from symtop.methods.registry import Integrator
@@ -61,7 +61,7 @@ def test_starting_from_q0_plus_h_v0_costs_an_order():
 
     def solve(top, start, plan):
         begun_wrongly.h = plan.step_size
-        return fixed_step(march, Quadrature((0.5,), (1.0,)), begun_wrongly, 1, implicit=True)(top, start, plan)
+        return FixedStep(march, Quadrature((0.5,), (1.0,)), begun_wrongly, 1, implicit=True)(top, start, plan)
 
     wrong = Integrator(name="badly-started-midpoint", family="other", summary="", solvers={"angles": solve})
     where = symtop.scene("goldstein")

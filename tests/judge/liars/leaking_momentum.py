@@ -5,7 +5,7 @@ import dataclasses
 import symtop
 from symtop.methods import splitting_space as family
 from symtop.methods.coefficients import STRANG
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver
 from symtop.methods.space import observe_axis, on_axis
 from symtop.methods.splitting_loop import Stages
@@ -24,7 +24,7 @@ def solve(top, start, plan):
     """Strang's coefficients, multiplied out."""
     half, pull = 0.5 * plan.step_size / top.I1, plan.step_size * top.mgl
     stages = Stages((half,), tuple(b * pull for b in STRANG.kick), (0.0, 0.0), 1, 0, 0.0)
-    return fixed_step(march, stages, on_axis, 1, implicit=False)(top, start, plan)
+    return FixedStep(march, stages, on_axis, 1, implicit=False)(top, start, plan)
 
 
 symtop.register(dataclasses.replace(symtop.integrator("strang"), name="leaking-momentum", solvers={"axis": solve}))

@@ -8,7 +8,7 @@ import symtop
 from symtop.methods import discrete_lagrangian as family
 from symtop.methods.angles import chart_outcome, reduced
 from symtop.methods.compiled import register_jitable
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver
 
 
@@ -31,7 +31,7 @@ def forces_at(par, rule, theta, d):
 
 
 march = driver(family.begin, increment, family.observe)
-solver = fixed_step(march, family.Quadrature((0.5,), (1.0,)), reduced, 1, implicit=True)
+solver = FixedStep(march, family.Quadrature((0.5,), (1.0,)), reduced, 1, implicit=True)
 symtop.register(
     dataclasses.replace(
         symtop.integrator("midpoint"), name="one-newton", solvers={"angles": solver}, energy_error="bounded"

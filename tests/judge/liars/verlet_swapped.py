@@ -3,7 +3,7 @@
 import symtop
 from symtop.methods import splitting_angles
 from symtop.methods.angles import chart_outcome, reduced
-from symtop.methods.fixed_step import fixed_step
+from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver
 
 
@@ -33,7 +33,7 @@ def observe(par, rule, before, dstate, h):
     return 0.5 * (par.north + par.south), par.p_psi
 
 
-solver = fixed_step(driver(begin, increment, observe), (0.0,), reduced, 1, implicit=False)
+solver = FixedStep(driver(begin, increment, observe), (0.0,), reduced, 1, implicit=False)
 symtop.register(
     symtop.Integrator(
         name="verlet-swapped", family="other", summary="velocity Verlet, mistyped", solvers={"angles": solver}, order=2,
