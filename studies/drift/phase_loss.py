@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.measure.clock import Clock
 from symtop.measure.growth import growth, horizon, lost_at
+from symtop.measure.phase import nutation_phase
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate
@@ -42,21 +42,21 @@ class PhaseLoss(NamedTuple):
     exponent_interval: float = math.nan  # half-width, 95 %
 
 
-def phase_run(scene: Scene, method: Integrator, clock: Clock, per_nutation: float, nutations: float) -> xr.Dataset:
+def phase_run(scene: Scene, method: Integrator, per_nutation: float, nutations: float) -> xr.Dataset:
     """Phase error (rad) of a run: dimension ``time``, variable ``phase``."""
     period = scene.nutation_period
     run = simulate(scene, method, step_size=period / per_nutation, horizon=nutations * period, samples=SAMPLES,
                    observe="nutation", guard=False)  # fmt: skip
-    error = clock.error(run["time"].values, run["theta"].values, run["p_theta"].values / scene.top.I1)
+    error = nutation_phase(scene, run["time"].values, run["theta"].values, run["p_theta"].values / scene.top.I1)
     return xr.Dataset({"phase": ("time", error)}, coords={"time": run["time"]}, attrs=run.attrs)
 
 
-def steps_for(scene: Scene, method: Integrator, clock: Clock, target: float) -> float:
+def steps_for(scene: Scene, method: Integrator, target: float) -> float:
     """Steps a nutation with which the phase error is about `LOST` after `target` nutations."""
     order = method.order or 2
     steps = FIRST.get(order, 12.37)
     for _ in range(TRIALS):
-        run = phase_run(scene, method, clock, steps, TRIAL)
+        run = phase_run(scene, method, steps, TRIAL)
         lost = abs(float(np.polyfit(run["time"] / scene.nutation_period, run["phase"], 1)[0])) * target
         if run.attrs["outcome"] != "ok" or not math.isfinite(lost):
             steps *= 2.0
@@ -73,17 +73,17 @@ def phase_loss(scene: Scene, method: Integrator, short: float = SHORT, target: f
 
     Returns a dataset with the columns of `PhaseLoss`.
     """
-    clock, period = Clock(scene), scene.nutation_period
-    steps = steps_for(scene, method, clock, target)
+    period = scene.nutation_period
+    steps = steps_for(scene, method, target)
     for _ in range(TRIALS):
-        first = phase_run(scene, method, clock, steps, short)
+        first = phase_run(scene, method, steps, short)
         predicted = horizon(first["time"], first["phase"], LOST).time / period
         if predicted > 2.0 * short or steps > MOST:
             break
         steps *= 1.3  # the frequency error itself drifts, and a few nutations do not show it
     if not math.isfinite(predicted):
         return xr.Dataset({"steps": steps, "predicted": predicted, "short": short})
-    long = phase_run(scene, method, clock, steps, min(1.1 * predicted, MOST_STEPS / steps))
+    long = phase_run(scene, method, steps, min(1.1 * predicted, MOST_STEPS / steps))
     fit = growth(long["time"], long["phase"], 1.0)
     measured = lost_at(long["time"], long["phase"], LOST) / period
     nutations, phase = long["time"].values / period, long["phase"].values

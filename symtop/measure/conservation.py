@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from symtop.measure.clock import Clock, has_phase
 from symtop.measure.growth import change_point, growth, law, tops
+from symtop.measure.phase import nutation_phase
 from symtop.measure.statistics import line, student
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
@@ -63,9 +63,7 @@ def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
         columns[f"{name}_slope"], columns[f"{name}_interval"], columns[f"{name}_rise"] = drifting
         columns[f"{name}_exponent"], columns[f"{name}_exponent_interval"] = power.slope, power.interval
         columns |= _laws(name, law(power), time[late], values[late])
-    phase = np.full(time.size, np.nan)
-    if has_phase(scene):
-        phase = Clock(scene).error(time, run["theta"].values, run["p_theta"].values / scene.top.I1)
+    phase = nutation_phase(scene, time, run["theta"].values, run["p_theta"].values / scene.top.I1)
     power = growth(time, phase, 1.0)
     columns["phase_largest"] = float(np.nanmax(np.abs(phase))) if np.isfinite(phase).any() else np.nan
     columns["phase_exponent"], columns["phase_exponent_interval"] = power.slope, power.interval
