@@ -13,6 +13,7 @@ import xarray as xr
 
 from symtop.measure.growth import growth, horizon, lost_at
 from symtop.measure.phase import nutation_phase
+from symtop.measure.settings import seek
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate
@@ -23,6 +24,7 @@ TARGET = 2500.0  # nutations after which the phase error should reach `LOST`
 MOST_STEPS = 3e7  # of the run that measures
 TRIALS = 6
 TRIAL = 40.0  # nutations
+CLOSE = 0.8  # of `LOST`: a trial between it and `LOST` ends the search
 FEWEST, MOST = 4.37, 8000.37  # steps a nutation
 FIRST = {2: 1500.37, 4: 80.37, 6: 25.37}  # steps a nutation that are tried first, by order
 SAMPLES = 2001
@@ -52,20 +54,18 @@ def phase_run(scene: Scene, method: Integrator, per_nutation: float, nutations: 
 
 
 def steps_for(scene: Scene, method: Integrator, target: float) -> float:
-    """Steps a nutation with which the phase error is about `LOST` after `target` nutations."""
-    order = method.order or 2
-    steps = FIRST.get(order, 12.37)
-    for _ in range(TRIALS):
-        run = phase_run(scene, method, steps, TRIAL)
-        lost = abs(float(np.polyfit(run["time"] / scene.nutation_period, run["phase"], 1)[0])) * target
-        if run.attrs["outcome"] != "ok" or not math.isfinite(lost):
-            steps *= 2.0
-            continue
-        factor = (lost / LOST) ** (1.0 / order)
-        steps = min(max(steps * min(max(factor, 0.4), 4.0), FEWEST), MOST)
-        if 0.85 < factor < 1.2:
-            break
-    return steps
+    """Steps a nutation with which the phase error is `LOST` after `target` nutations, or up to a quarter more."""
+    period, order = scene.nutation_period, method.order or 2
+
+    def trial(step: float) -> tuple[float, float]:
+        run = phase_run(scene, method, period / step, TRIAL)
+        lost = abs(float(np.polyfit(run["time"] / period, run["phase"], 1)[0])) * target
+        good = run.attrs["outcome"] == "ok" and math.isfinite(lost)
+        return lost if good else math.inf, run.attrs["force_evaluations"]
+
+    first, ends = period / FIRST.get(order, 12.37), (period / MOST, period / FEWEST)
+    step = seek(trial, first, LOST, ends, float(order), least=CLOSE)
+    return MOST if isinstance(step, str) else period / step
 
 
 def phase_loss(scene: Scene, method: Integrator, short: float = SHORT, target: float = TARGET) -> xr.Dataset:

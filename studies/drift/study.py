@@ -5,7 +5,6 @@ import math
 import xarray as xr
 
 from symtop.measure.conservation import history
-from symtop.measure.modified_energy import KNOWN
 from symtop.methods.registry import Integrator, integrator, integrators
 from symtop.model.scenes import Scene, scene
 from symtop.run.long_run import PER_NUTATION
@@ -47,14 +46,14 @@ def grid(steps: int, members: int, walk: int, longest: int, share: float) -> lis
     long_run = {"steps": longest, "per_nutation": PER_NUTATION}
     ensemble = {"steps": walk, "per_nutation": PER_NUTATION, "count": members}
     loss = {"short": share * SHORT, "target": share * TARGET}
-    slowest_first = sorted(KNOWN, key=lambda name: name != "midpoint")
+    known = [method.name for method in integrators().values() if method.modified_energy is not None]
+    slowest_first = sorted(known, key=lambda name: name != "midpoint")
     scenes = [scene(name) for name in grid_scenes(LEFT_OUT, lambda one: math.isfinite(one.nutation_period))]
     return [
         *(history_case(one, method, steps) for one in scenes for method in integrators().values()),
         *(Case(LONG, name, settings, group=group) for name in slowest_first
           for group, settings in ((WINDOWS, long_run), (ROUNDINGS, ensemble))),
-        *(Case(LONG, method.name, loss, group=HORIZONS) for method in integrators().values()
-          if method.knob == "step_size"),
+        *(Case(LONG, method.name, loss, group=HORIZONS) for method in integrators().values() if method.fixed_step),
     ]  # fmt: skip
 
 
@@ -62,9 +61,9 @@ def history_case(on: Scene, method: Integrator, steps: int) -> Case:
     """So many steps of a fixed-step method, or the same horizon at a tolerance."""
     horizon = steps * on.nutation_period / STEPS_A_NUTATION
     settings = {"samples": 4001 if steps > 100_000 else 601, "horizon": horizon * SHORTENED.get(method.name, 1.0)}
-    if method.knob == "step_size":
+    if method.fixed_step:
         settings["step_size"] = horizon / steps
-    elif method.knob == "tolerance" and method.default_tolerance is None:
+    elif method.adaptive and method.default_tolerance is None:
         settings["tolerance"] = TOLERANCES.get(method.name, 1e-6)
     return Case(on.name, method.name, settings, group=HISTORIES)
 

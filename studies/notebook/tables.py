@@ -21,7 +21,6 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import residuals
-from symtop.measure.errors import energy_scale
 from symtop.methods.registry import integrators
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
@@ -92,7 +91,7 @@ def residual_history(scene: Scene, integrator: str, setting: float, samples: int
 
     `setting` is a step size in seconds or a tolerance, whichever the integrator takes.
     """
-    control = {"step_size": setting} if integrators()[integrator].knob == "step_size" else {"tolerance": setting}
+    control = integrators()[integrator].setting(setting).kwargs()
     run = simulate(scene, integrator, observe="nutation", samples=samples, guard=False, **control)
     columns: dict[str, Any] = {
         Column.SAMPLE_TIME: ("sample", run["time"].values),
@@ -147,7 +146,7 @@ def both_derivations(scene: Scene, samples: int = SAMPLES) -> xr.Dataset:
         Column.EASY_GAP: np.max(np.abs(easy[:3] - true), axis=0),
         Column.E: E,
         Column.E1: E1,
-        Column.ENERGY_GAP: np.abs(E1 + spin - E) / energy_scale(scene),
+        Column.ENERGY_GAP: np.abs(E1 + spin - E) / scene.energy_scale,
     }
     return xr.Dataset({name: ("both", values) for name, values in columns.items()})
 
@@ -187,7 +186,7 @@ def modified_energy_table(scene: Scene, integrator: str, steps: Sequence[float])
         }
         largest[Column.MODIFIED_STEP].append(h)
         for name, values in curves.items():
-            change = (values - values[0]) / energy_scale(scene)
+            change = (values - values[0]) / scene.energy_scale
             largest[name].append(float(np.max(np.abs(change))))
             history.setdefault(Column.history(name), ("shadow_sample", change))
         history.setdefault(Column.MODIFIED_TIME, ("shadow_sample", run["time"].values))

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.measure.errors import energy_scale, momentum_scale
 from symtop.measure.order import Fit, power_law
 from symtop.model.scenes import Scene
 
@@ -205,14 +204,14 @@ def damped_top_table(
         history = _history(scene, friction, states[[0, 1, 2, 4, 5]])
         history[Column.TOP_ENERGY] = scene.top.reduced_energy(states[0], states[3], states[4], states[5])
     history |= {Column.TOP_TIME: times, Column.THETA: history.pop(Column.THETA), Column.TRUE_THETA: truth.theta}
-    history[Column.TOP_ENERGY_ERROR] = np.abs(history[Column.TOP_ENERGY] - truth.energy) / energy_scale(scene)
+    history[Column.TOP_ENERGY_ERROR] = np.abs(history[Column.TOP_ENERGY] - truth.energy) / scene.energy_scale
     return xr.Dataset(columns | {name: ("top_sample", values) for name, values in history.items()})
 
 
 def _history(scene: Scene, friction: Friction, states: Array) -> dict[str, Array]:
     """Momenta and their balance from (theta, phi, psi, p_phi, p_psi)."""
     theta, phi, psi, p_phi, p_psi = states
-    scale = momentum_scale(scene)
+    scale = scene.momentum_scale
     return {
         Column.THETA: theta,
         Column.P_PHI: p_phi,

@@ -148,9 +148,7 @@ def path(scene: Scene, step: Step, h: float, steps: int) -> Array:
 
 def kernel_path(scene: Scene, method: Integrator, h: float, steps: int) -> Array:
     """The same of a fixed-step integrator in the angles chart."""
-    marks = np.arange(steps + 1, dtype=np.int64)
-    plan = Plan(marks.astype(np.float64) * h, steps * h, h, marks, np.nan)
-    return method.solvers["angles"](scene.top, scene.start, plan).states[:, :2]
+    return method.solvers["angles"](scene.top, scene.start, Plan.steps(h, np.arange(steps + 1))).states[:, :2]
 
 
 def gap(first: Array, second: Array) -> Gap:

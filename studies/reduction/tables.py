@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from symtop.base.validate import SymtopError
 from symtop.measure.accuracy import error_table
-from symtop.measure.errors import momentum_scale
 from symtop.measure.order import LARGEST_ERROR, power_law
 from symtop.measure.timing import bare_run, timings
 from symtop.methods import unreduced
@@ -169,7 +168,7 @@ def unreduced_gaps(scene: Scene, name: str, horizon: float, steps: int, samples:
     columns = {gap: np.abs(reduced[angle].values - whole[angle].values) for gap, angle in GAPS.items()}
     for drift, momentum in ((Column.P_PHI_DRIFT, "p_phi"), (Column.P_PSI_DRIFT, "p_psi")):
         values = whole[momentum].values
-        columns[drift] = np.abs(values - values[0]) / momentum_scale(scene)
+        columns[drift] = np.abs(values - values[0]) / scene.momentum_scale
     columns[Column.TIME] = reduced["time"].values
     return xr.Dataset({label: ("sample", values) for label, values in columns.items()})
 

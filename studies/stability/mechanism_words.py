@@ -36,7 +36,7 @@ def poles(data: xr.Dataset) -> list[str]:
     total = {True: 0, False: 0}
     for name in map(str, data["integrator"].values):
         effect, method = pole_effect(data, name), integrators().get(name)
-        if effect is None or method is None or method.knob != "step_size":
+        if effect is None or method is None or not method.fixed_step:
             continue
         angles = method.charts() == ("angles",)
         total[angles] += 1

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.measure.verdicts import ROUNDING, barriers, judge
+from symtop.measure.verdicts import NO_GAP, barriers, judge
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.registry import Integrator, Plan, solve
 from symtop.model import charts, scenes
@@ -68,7 +68,7 @@ class RowPlan(NamedTuple):
 def row_plan(method: Integrator, settings: Sequence[float], periods: float) -> RowPlan:
     """Runs over at least `periods` nutations: a whole number of steps where the step is fixed."""
     phases = np.full((len(settings), SAMPLES), math.nan)
-    if method.knob != "step_size":
+    if not method.fixed_step:
         phases[:] = sample_times(periods, SAMPLES, 1.0)[0]
         return RowPlan(method, tuple(settings), (), (), phases)
     steps, marks = [], []
@@ -108,7 +108,7 @@ def row(runs: RowPlan, scene: Scene) -> Row:
 
 
 def _plan(runs: RowPlan, k: int, value: float, period: float) -> Plan:
-    if runs.method.knob == "step_size":
+    if runs.method.fixed_step:
         h = value * period
         return Plan.steps(h, runs.marks[k], runs.steps[k] * h)
     return Plan.until(runs.phases[k] * period, value)
@@ -126,7 +126,7 @@ def _judged(scene: Scene, seen: View, phases: Array, outcome: NDArray[np.int64])
     error = np.fmax.reduce(charts.axis_distance(seen.axis, true_axis(scene, phases)), axis=1)
     error[outcome != 0] = math.nan
     start = scene.top.momenta(scene.start)
-    least, passed = ROUNDING * scene.momentum_scale, np.zeros(len(outcome), dtype=bool)
+    least, passed = NO_GAP * scene.momentum_scale, np.zeros(len(outcome), dtype=bool)
     for gap, now in ((start.north, seen.p_phi - seen.p_psi), (start.south, seen.p_phi + seen.p_psi)):
         if abs(gap) > least:
             passed |= (now * gap < 0.0).any(axis=1)

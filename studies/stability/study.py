@@ -25,7 +25,7 @@ def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool)
     slow = SLOW.get(method.name, PYTHON if method.tier == "python" else (steps.size, values.size))
     most = tuple(map(min, slow, QUICK)) if quick and slow[0] < steps.size else slow
     parameters = values[:: -(-values.size // most[1])].tolist()
-    if method.knob == "step_size":
+    if method.fixed_step:
         return steps.tolist(), parameters
     if method.knob is None:
         return [math.nan], parameters
@@ -54,11 +54,11 @@ def cases(quick: bool) -> list[Case]:
     for method in integrators().values():
         ladder, parameters = axes(method, passes, gaps, quick)
         settings = {"parameters": parameters, "ladder": ladder, "periods": 1.0}
-        grid.append(Case("grazing", method.name, settings | {"shown": 0.005 if method.knob == "step_size" else 1e-6}))
+        grid.append(Case("grazing", method.name, settings | {"shown": 0.005 if method.fixed_step else 1e-6}))
         if method.knob is not None:
-            ladder = [0.2, 0.1, 0.05, 0.025] if method.knob == "step_size" else [1e-4, 1e-6, 1e-8, 1e-10]
+            ladder = [0.2, 0.1, 0.05, 0.025] if method.fixed_step else [1e-4, 1e-6, 1e-8, 1e-10]
             grid.append(Case("separatrix", method.name, {"ladder": ladder[: 1 if quick else 4]}))
-        if method.knob == "step_size":
+        if method.fixed_step:
             grid.extend(Case(name, method.name, settings) for name, settings in fixed.items())
     return grid
 

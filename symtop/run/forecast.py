@@ -105,7 +105,7 @@ def _probe(
         start = Angles(*(float(value) for value in form(since)))
     place = np.arange(1.0, POINTS + 1.0)
     place[:-1] += np.mod(GOLDEN * place[:-1], 1.0) - 0.5  # not commensurate with the nutation
-    if method.knob == "step_size":
+    if method.fixed_step:
         steps = max(1, round(duration / step))
         marks = np.unique(np.maximum(np.rint(place * (steps / POINTS)).astype(np.int64), 1))
         piece = Plan.steps(step, marks)
@@ -150,7 +150,7 @@ def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
     straight = bool(method.symplectic or method.symmetric)
     period = marks.period if math.isfinite(marks.period) else plan.horizon
     share, twice = min(SHARE * plan.horizon, MOST_NUTATIONS * period), min(2.0 * period, plan.horizon)
-    if method.knob == "tolerance":
+    if method.adaptive:
         cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
         least = twice if cheap.tier == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
         piece = max(share, least)

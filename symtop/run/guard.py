@@ -87,7 +87,7 @@ def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Land
                 )
     if expected.outcome != "ok":
         return f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon)}"
-    if method.knob == "tolerance":
+    if method.adaptive:
         tolerance = max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance)
         return f"{size}: errors add up over {plan.horizon / marks.period:.3g} nutations; try tolerance {tolerance:.1g}"
     return (

@@ -6,10 +6,10 @@ from symtop_studies.drift.long_runs import elapsed_steps, members
 from symtop_studies.drift.phase_loss import phase_loss
 
 import symtop
-from symtop.measure import modified_energy as shadow
 from symtop.measure.conservation import history
 from symtop.measure.growth import change_point, ensemble_growth, growth, horizon, law, lost_at
 from symtop.measure.phase import nutation_phase
+from symtop.run import modified_energy as shadow
 from symtop.run.long_run import chart_of, scattered, watch
 
 TIME = np.linspace(0.0, 1000.0, 4001) + 0.3 * np.sin(np.arange(4001))

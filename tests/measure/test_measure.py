@@ -8,11 +8,12 @@ import xarray as xr
 
 import symtop
 from symtop.measure import verdicts
-from symtop.measure.accuracy import error_table, ladder
+from symtop.measure.accuracy import error_table
 from symtop.measure.conservation import trend
 from symtop.measure.errors import errors_against
 from symtop.measure.growth import growth
 from symtop.measure.order import order
+from symtop.measure.settings import ladder
 from symtop.measure.timing import Timing, timings
 from symtop.run.reference import reference
 from symtop.run.simulation import sample_times

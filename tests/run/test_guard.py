@@ -200,7 +200,7 @@ def test_a_remedy_is_a_remedy(scene, name, knob, horizon):
 def test_the_guard_costs_less_than_two_milliseconds():
     where, method = symtop.scene("spheroid"), symtop.integrator("midpoint")
     for step, horizon in ((0.01, 8.0), (1e-4, 8.0), (1e-3, 1000.0)):
-        plan, _ = make_plan(where, method, step, None, horizon, 501)
+        plan, _ = make_plan(where, method, step, horizon=horizon, samples=501)
         kernel, guarded = timings(
             [
                 lambda plan=plan: method.solvers["angles"](where.top, where.start, plan),
@@ -217,7 +217,7 @@ def test_every_method_can_be_probed_and_is_told_what_it_can_do():
         knob = {"step_size": 0.01} if method.knob == "step_size" else {}
         if method.knob == "tolerance" and method.default_tolerance is None:
             knob = {"tolerance": 1e-6 if method.tier == "compiled" else 1e-5}
-        plan, _ = make_plan(where, method, knob.get("step_size"), knob.get("tolerance"), 3.0, 11)
+        plan, _ = make_plan(where, method, **knob, horizon=3.0, samples=11)
         found = forecast.forecast(where, method, method.charts()[0], plan)
         assert found.outcome == "ok"
         assert found.axis_error < 1e-2

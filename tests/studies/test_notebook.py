@@ -27,12 +27,12 @@ from symtop_studies.notebook.tables import (
 
 import symtop
 from symtop.base.validate import SymtopError
-from symtop.measure.modified_energy import modified_energy
 from symtop.measure.order import power_law
 from symtop.methods.discrete_lagrangian import RULES
 from symtop.methods.euler_lagrange import accelerations, momenta
 from symtop.methods.registry import Plan
 from symtop.report import solid
+from symtop.run.modified_energy import modified_energy
 
 FIRST = symtop.scene("spheroid").top
 NUMBERS = (FIRST.I1, FIRST.I3, FIRST.mgl)
