@@ -16,10 +16,9 @@ from pathlib import Path
 import numpy as np
 
 import symtop
-from symtop.measure import modified_energy as shadow
-from symtop.measure.errors import energy_scale
 from symtop.methods.fixed_step import inside
 from symtop.run.long_run import PER_NUTATION, chart_of, long_run, windows
+from symtop.run.modified_energy import modified_energy
 
 HERE = Path(__file__).resolve().parent
 WIDE = np.longdouble
@@ -44,8 +43,10 @@ def main() -> None:
     library, where = build(), symtop.scene("spheroid")
     h, ends = where.nutation_period / PER_NUTATION, windows(int(options.steps))
     print(f"{'method':<16}{'steps':>12}{'80 bits':>12}{'by itself':>12}{'theta':>12}")
-    for name in shadow.KNOWN:
-        chart, solver = chart_of(symtop.integrator(name))
+    for name, method in symtop.integrators().items():
+        if method.modified_energy is None:
+            continue
+        chart, solver = chart_of(method)
         assert inside(solver) is solver
         par, rule, state = solver.setup(where.top, where.start, h)
         found = long_run(where, name, steps=int(options.steps), step_size=h, quiet=True)["modified_energy_mean"].values
@@ -62,8 +63,8 @@ def main() -> None:
             done = end
             ours = np.array(at.state[:size], dtype=WIDE) + np.array(at.low[:size], dtype=WIDE)
             pair = np.stack([ours, wide])
-            energies = shadow.modified_energy(where, name, chart, pair, h)
-            drift = float((energies[0] - energies[1]) / energy_scale(where))
+            energies = modified_energy(where, name, chart, pair, h)
+            drift = float((energies[0] - energies[1]) / where.energy_scale)
             theta = pair[:, 0] if chart == "angles" else np.arccos(pair[:, 2])
             if place % 6 == 0 or end == ends[-1]:
                 print(f"{name:<16}{end:>12}{drift:>12.1e}{found[place]:>12.1e}{float(theta[0] - theta[1]):>12.1e}")

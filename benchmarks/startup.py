@@ -6,8 +6,6 @@ import sys
 import tempfile
 import time
 
-import numpy as np
-
 import symtop
 from symtop.measure.timing import timings
 from symtop.methods.registry import Plan
@@ -32,7 +30,7 @@ def measure(repeats: int = 3) -> dict[str, float]:
     bare = min(_process("pass") for _ in range(repeats))
     scene = symtop.scene("spheroid")
     steps = round(scene.horizon / STEP)
-    plan = Plan(np.array([scene.horizon]), scene.horizon, scene.horizon / steps, np.array([steps]), np.nan)
+    plan = Plan.steps(scene.horizon / steps, [steps], scene.horizon)
     solve = symtop.integrator("midpoint").solvers["angles"]
     whole, kernel = timings(
         [

@@ -21,7 +21,7 @@ LADDER = np.unique(np.rint(np.geomspace(24, 60_000, 260)).astype(int))  # steps,
 
 def plan_of(steps: int) -> Plan:
     """Start to horizon, one sample."""
-    return Plan(np.array([HORIZON]), HORIZON, HORIZON / steps, np.array([steps]), np.nan)
+    return Plan.steps(HORIZON / steps, [steps], HORIZON)
 
 
 def steps_needed(method: symtop.Integrator, scene: symtop.Scene, chart: str, accuracy: float) -> int | None:
@@ -53,7 +53,7 @@ def measure(accuracy: float = ACCURACY) -> list[Reached]:
     found = {}
     for method in symtop.integrators().values():
         chart = "attitude" if "attitude" in method.solvers else "angles"
-        if method.knob == "step_size" and chart in method.solvers:
+        if method.fixed_step and chart in method.solvers:
             steps = steps_needed(method, scene, chart, accuracy)
             if steps is not None:
                 found[method.name] = (method.solvers[chart], steps)

@@ -4,9 +4,9 @@
        this one. The distance of two scenes is that of four dimensionless numbers which fix the motion of the axis:
        cos(theta) at both turning points, and both momenta over sqrt(I1 mgl). Without a stored study every compiled
        method is a candidate.
-    2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself. The
-       error is measured against the closed form. Its target is lowered by the law of growth (`symtop.measure.meet`),
-       and one run is timed.
+    2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
+       (`symtop.measure.settings`). The error is measured against the closed form, its target is lowered by the law of
+       growth, and one run is timed.
     3. Confirmation. The three fastest candidates are run to the whole horizon, if a budget of force evaluations allows
        it, and their settings are corrected.
 
@@ -32,7 +32,7 @@ import xarray as xr
 from symtop.base import datasets
 from symtop.base.numbers import TINY
 from symtop.base.validate import SymtopError, one_of, positive
-from symtop.measure import meet, ranking
+from symtop.measure import ranking, settings
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
 from symtop.methods.registry import Integrator, integrators
@@ -84,7 +84,7 @@ class Advice:
 class _Trial:
     """A candidate with its setting, the error expected at the horizon, and the wall time of the whole run."""
 
-    met: meet.Met
+    met: settings.Met
     error: float
     seconds: float
     confidence: str  # a key of CONFIDENCE
@@ -94,8 +94,7 @@ class _Trial:
         return self.met.integrator.name
 
     def words(self) -> str:
-        knob = "step size" if self.met.integrator.knob == "step_size" else "tolerance"
-        return f"{self.name} with {knob} {self.met.setting:.4g}"
+        return f"{self.name} with {self.met.integrator.setting(self.met.setting).label}"
 
 
 def regime(scene: Scene) -> np.ndarray:
@@ -129,7 +128,7 @@ def recommend(
     one_of("quantity", quantity, KNOWN_QUANTITIES)
     horizon = scene.horizon if horizon is None else positive("horizon", horizon)
     data = None if results is None else _stored(Path(results) / STORED_STUDY)
-    limit = meet.judgeable(scene, quantity, horizon)
+    limit = settings.judgeable(scene, quantity, horizon)
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(scene, accuracy, quantity, horizon, [], (), source)
@@ -175,7 +174,7 @@ def _stored(file: Path) -> xr.Dataset:
 
 def _usable(quantity: str) -> dict[str, Integrator]:
     """Methods that can be recommended: compiled, with a step or tolerance, and able to show the quantity."""
-    charts = {"angles", "attitude"} | ({"axis"} if meet.observed(quantity) == "axis" else set())
+    charts = {"angles", "attitude"} | ({"axis"} if settings.observed(quantity) == "axis" else set())
     return {
         name: method
         for name, method in integrators().items()
@@ -231,15 +230,15 @@ def _try(
 ) -> "_Trial | str":
     """A candidate's setting and cost from short runs, or the reason why it has none."""
     period = scene.nutation_period
-    short = min(horizon, meet.SHORT * period) if math.isfinite(period) else horizon
-    law = (short / horizon) ** meet.growth(method, quantity)
-    met = meet.search(scene, method, accuracy * law, quantity, short, guess, patience)
-    if isinstance(met, meet.Missed):
-        dear = met.why == meet.BUDGET and patience < meet.MOST_EVALUATIONS[method.tier]
-        return f"Not within {TOO_DEAR:g} times the work of the best" if dear else met.why
-    if method.knob == "step_size" and horizon / met.setting > MOST_STEPS:
+    short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
+    law = (short / horizon) ** settings.growth(method, quantity)
+    met = settings.search(scene, method, accuracy * law, quantity, short, guess, patience)
+    if isinstance(met, str):
+        dear = met == settings.BUDGET and patience < settings.MOST_EVALUATIONS[method.tier]
+        return f"Not within {TOO_DEAR:g} times the work of the best" if dear else met
+    if method.fixed_step and horizon / met.setting > MOST_STEPS:
         return f"Would need more than {MOST_STEPS:.0e} steps"
-    return _Trial(met, met.error / law, meet.seconds(scene, met, quantity, horizon), "extrapolated")
+    return _Trial(met, met.error / law, settings.seconds(scene, met, quantity, horizon), "extrapolated")
 
 
 def _confirm(scene: Scene, trial: _Trial, accuracy: float, quantity: str, horizon: float) -> "_Trial | str":
@@ -248,13 +247,13 @@ def _confirm(scene: Scene, trial: _Trial, accuracy: float, quantity: str, horizo
     A trial that would need too many evaluations is returned as it is.
     """
     short = trial.met
-    if short.evaluations * horizon / short.horizon > meet.MOST_EVALUATIONS[short.integrator.tier]:
+    if short.evaluations * horizon / short.horizon > settings.MOST_EVALUATIONS[short.integrator.tier]:
         return trial
-    met = meet.search(scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting)
-    if isinstance(met, meet.Missed):
-        return f"Good enough over a short run but not to the end ({met.why[0].lower()}{met.why[1:]})"
+    met = settings.search(scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting)
+    if isinstance(met, str):
+        return f"Good enough over a short run but not to the end ({met[0].lower()}{met[1:]})"
     confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
-    return _Trial(met, met.error, meet.seconds(scene, met, quantity, horizon), confidence)
+    return _Trial(met, met.error, settings.seconds(scene, met, quantity, horizon), confidence)
 
 
 def _advice(
@@ -275,7 +274,7 @@ def _advice(
     best = ranked[0]
     worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
-    step = best.met.integrator.knob == "step_size"
+    step = best.met.integrator.fixed_step
     return Advice(
         **question, integrator=best.name, step_size=best.met.setting if step else None,
         tolerance=None if step else best.met.setting, expected_error=best.error, seconds=best.seconds,

@@ -12,7 +12,7 @@ from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run import guard
-from symtop.run.simulation import choose_chart, make_plan
+from symtop.run.simulation import make_plan
 
 MOST_STEPS = 1.5e5
 MOST_NUTATIONS = {"radau": 6.0, "taylor-quad": 30.0}  # so that no run takes seconds
@@ -78,8 +78,8 @@ def trial(draw: random.Random, name: str) -> Trial:
         knob = {"tolerance": max(tolerance, method.least_tolerance, 1e-6 if method.name == "radau" else 0.0)}
     horizon = nutations * period
     observe = draw.choice(["axis", "attitude"])
-    plan, _ = make_plan(where, method, knob.get("step_size"), knob.get("tolerance"), horizon, 501)
-    said = guard.warning(where, method, choose_chart(method, observe), plan)
+    plan, _ = make_plan(where, method, **knob, horizon=horizon, samples=501)
+    said = guard.warning(where, method, method.chart_for(observe), plan)
     run = symtop.simulate(where, method, horizon=horizon, observe=observe, guard=False, **knob)
     with np.errstate(all="ignore"):
         error = charts.axis_distance(run["axis"].values, closed_form(where).axis(run["time"].values))

@@ -11,7 +11,7 @@ import symtop
 from symtop import advise
 from symtop.advise import regime
 from symtop.cli.main import main
-from symtop.measure import meet
+from symtop.measure import settings
 from symtop.measure.errors import errors_against
 
 
@@ -36,7 +36,7 @@ def test_what_is_recommended_meets_the_accuracy(quantity, accuracy):
 
 
 def test_a_longer_horizon_than_can_be_run_is_extrapolated(monkeypatch):
-    monkeypatch.setattr(meet, "MOST_EVALUATIONS", {"compiled": 3e4, "python": 3e4})
+    monkeypatch.setattr(settings, "MOST_EVALUATIONS", {"compiled": 3e4, "python": 3e4})
     advice = symtop.recommend("spheroid", accuracy=1e-3, horizon=2000.0)
     assert advice.confidence == "extrapolated"
     assert measured(symtop.scene("spheroid"), advice) <= 5e-3
@@ -54,33 +54,32 @@ def test_what_nobody_reaches_is_said():
 def test_an_error_grows_over_horizons_as_the_traits_promise(quantity):
     scene, method = symtop.scene("spheroid"), symtop.integrator("rk45-compiled")
     far = [horizon * scene.nutation_period for horizon in (12.37, 123.7)]
-    near, later = (meet.attempt(scene, method, 1e-6, horizon, quantity).error for horizon in far)
+    near, later = (settings.attempt(scene, method, 1e-6, horizon, quantity).error for horizon in far)
     grown = math.log10(later / near)
-    assert grown == pytest.approx(meet.growth(method, quantity), abs=0.35)
+    assert grown == pytest.approx(settings.growth(method, quantity), abs=0.35)
 
 
 def test_mean_frequencies_of_a_structured_method_do_not_drift():
     scene, method = symtop.scene("spheroid"), symtop.integrator("stormer-verlet")
     step = scene.nutation_period / 100.37
     far = [horizon * scene.nutation_period for horizon in (12.37, 123.7)]
-    near, later = (meet.attempt(scene, method, step, horizon, "precession_rate").error for horizon in far)
-    assert meet.growth(method, "precession_rate") == 0
+    near, later = (settings.attempt(scene, method, step, horizon, "precession_rate").error for horizon in far)
+    assert settings.growth(method, "precession_rate") == 0
     assert 0.5 < later / near < 2.0
 
 
 @pytest.mark.parametrize(
     ("name", "accuracy", "patience", "why"),
     [
-        ("rk45-compiled", 1e-15, math.inf, meet.STOPPED),  # its least tolerance
-        ("gauss-10", 1e-15, math.inf, meet.STOPPED),  # a finer step that gains nothing
-        ("stormer-verlet", 1e-6, 1e3, meet.BUDGET),
+        ("rk45-compiled", 1e-15, math.inf, settings.STOPPED),  # its least tolerance
+        ("gauss-10", 1e-15, math.inf, settings.STOPPED),  # a finer step that gains nothing
+        ("stormer-verlet", 1e-6, 1e3, settings.BUDGET),
     ],
 )
 def test_a_search_says_why_it_found_nothing(name, accuracy, patience, why):
     scene, method = symtop.scene("spheroid"), symtop.integrator(name)
-    missed = meet.search(scene, method, accuracy, "axis", 5.0, None, patience)
-    assert isinstance(missed, meet.Missed)
-    assert missed.why == why
+    missed = settings.search(scene, method, accuracy, "axis", 5.0, None, patience)
+    assert missed == why
 
 
 def few(monkeypatch, count):
@@ -91,15 +90,15 @@ def few(monkeypatch, count):
 
 def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch):
     few(monkeypatch, 5)
-    real, ended = meet.search, []
+    real, ended = settings.search, []
 
     def search(scene, method, accuracy, quantity, horizon, *rest):
         if horizon < 60.0 or len(ended) >= 3:
             return real(scene, method, accuracy, quantity, horizon, *rest)
         ended.append(method.name)
-        return meet.Missed(meet.STOPPED, 1.0)
+        return settings.STOPPED
 
-    monkeypatch.setattr(meet, "search", search)
+    monkeypatch.setattr(settings, "search", search)
     advice = symtop.recommend("spheroid", accuracy=1e-4, horizon=60.0)
     assert len(ended) == 3
     assert advice.confidence == "checked"  # the fourth was run, not just believed
@@ -110,8 +109,8 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
 
 def test_a_run_to_the_end_at_the_references_limit_is_not_called_extrapolated(monkeypatch):
     few(monkeypatch, 1)
-    real = meet.attempt
-    monkeypatch.setattr(meet, "attempt", lambda *question: real(*question)._replace(bound=0.99e-4))
+    real = settings.attempt
+    monkeypatch.setattr(settings, "attempt", lambda *question: real(*question)._replace(bound=0.99e-4))
     advice = symtop.recommend("spheroid", accuracy=1e-4, horizon=20.0)
     assert advice.confidence == "at the reference's limit"
     assert "measured to the end" in advice.reason
@@ -199,12 +198,14 @@ def test_sixty_random_tops():
             met.append(good)
             if number % 6 == 0:
                 searches = [
-                    meet.search(scene, method, accuracy, "axis", scene.horizon, patience=2e6)
+                    settings.search(scene, method, accuracy, "axis", scene.horizon, patience=2e6)
                     for method in symtop.integrators().values()
                     if method.tier == "compiled" and method.knob is not None and method.name != "taylor-quad"
                 ]
                 best = min(
-                    meet.seconds(scene, one, "axis", scene.horizon) for one in searches if isinstance(one, meet.Met)
+                    settings.seconds(scene, one, "axis", scene.horizon)
+                    for one in searches
+                    if isinstance(one, settings.Met)
                 )
                 ratios.append(advice.seconds / best)
     assert np.mean(met) >= 0.97

@@ -5,8 +5,8 @@ largest angle between the axes over ten nutation periods, at 331 times that neve
 that would bend its steps to them, at the ends of its own steps), against the closed form with its bound. Time: runs of
 their own, start to horizon with nothing sampled between, all solvers of a scene interleaved in random order.
 
-The knob is searched, not only gridded: for each target the loosest setting of a ladder that meets it is refined by
-halving its last interval three times, for us as for them.
+The setting is searched, not only gridded: between the loosest setting of a ladder that meets a target and the one
+before it, `symtop.measure.settings.seek` looks for a looser one, for us as for them.
 """
 
 import importlib.metadata
@@ -18,21 +18,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from symtop.measure.settings import seek, step_ladder
 
 import symtop
 from benchmarks.peers import Peer
-from symtop.measure.accuracy import SAMPLES, judge_limit, knobs, step_ladder
+from symtop.measure.accuracy import SAMPLES, judge_limit
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.registry import Integrator
 from symtop.model import charts
 from symtop.model.scenes import Scene
 from symtop.run.reference import reference
-from symtop.run.simulation import as_dataset, choose_chart, make_plan
+from symtop.run.simulation import as_dataset, make_plan
 
 SCENES = ("spheroid", "goldstein", "fast")
 TARGETS = (1e-3, 1e-6, 1e-9)
 PERIODS = 10.0
-RUNGS, HALVINGS = 9, 3
+RUNGS = 9
+CLOSE = 0.8  # of a target: an error between it and the target ends a search
 ENOUGH = 0.1 * TARGETS[-1]  # no finer setting is tried below this error
 PATIENCE = 0.6  # seconds of one run after which no finer setting is tried
 BATCHES, BATCH = 8, 0.006
@@ -54,8 +56,8 @@ class Point(NamedTuple):
 
 def accuracy(scene: Scene, method: Integrator, setting: float) -> Point:
     """One run with samples, judged."""
-    chart, horizon = choose_chart(method, "axis"), PERIODS * scene.nutation_period
-    plan, _ = make_plan(scene, method, horizon=horizon, samples=SAMPLES, **knobs(method, setting))
+    chart, horizon = method.chart_for("axis"), PERIODS * scene.nutation_period
+    plan, _ = make_plan(scene, method, **method.setting(setting).kwargs(), horizon=horizon, samples=SAMPLES)
     solve: Any = method.solvers[chart]
     run = None
     begun = time.process_time()
@@ -74,31 +76,35 @@ def accuracy(scene: Scene, method: Integrator, setting: float) -> Point:
 
 def ladder(scene: Scene, method: Integrator) -> list[float]:
     """Settings from coarse to fine."""
-    if method.knob == "step_size":
+    if method.fixed_step:
         return step_ladder(method, scene, PERIODS * scene.nutation_period, RUNGS, most=1e5)
     return [float(value) for value in np.geomspace(1e-3, 1.0001 * max(method.least_tolerance, 1e-15), RUNGS)]
 
 
 def search(scene: Scene, method: Integrator, targets: Sequence[float] = TARGETS) -> list[Point]:
     """The ladder, as far as it is needed, and for each target the loosest setting that meets it."""
-    rungs: list[Point] = []
+    points: dict[float, Point] = {}
+
+    def run(setting: float) -> tuple[float, float]:
+        if setting not in points:
+            points[setting] = accuracy(scene, method, setting)
+        point = points[setting]
+        return point.error if math.isfinite(point.error) else math.inf, point.evaluations
+
     settings = ladder(scene, method)
     accuracy(scene, method, settings[0])  # what is compiled at the first call would look like a lack of patience
     for setting in settings:
-        rungs.append(accuracy(scene, method, setting))
-        if rungs[-1].error < ENOUGH or rungs[-1].seconds > PATIENCE:
+        if run(setting)[0] < ENOUGH or points[setting].seconds > PATIENCE:
             break
-    found = list(rungs)
+    rungs = list(points.values())
     for target in targets:
         good = next((i for i, point in enumerate(rungs) if point.error <= target), 0)
         if not good:  # nobody, or the coarsest already
             continue
-        loose, tight = rungs[good - 1].setting, rungs[good].setting
-        for _ in range(HALVINGS):
-            middle = accuracy(scene, method, math.sqrt(loose * tight))
-            found.append(middle)
-            loose, tight = (loose, middle.setting) if middle.error <= target else (middle.setting, tight)
-    return sorted(found, key=lambda point: -point.setting)
+        ends = rungs[good].setting, rungs[good - 1].setting
+        power = float(method.order or 2) if method.fixed_step else 1.0
+        seek(run, math.sqrt(ends[0] * ends[1]), target, ends, power, fixed_step=method.fixed_step, least=CLOSE)
+    return sorted(points.values(), key=lambda point: -point.setting)
 
 
 def worth_timing(points: Sequence[Point], targets: Sequence[float] = TARGETS) -> list[Point]:
@@ -128,7 +134,7 @@ def ours(scene: Scene, tell: Callable[[str], None]) -> list[tuple[Peer, list[Poi
         for target in TARGETS:
             best = next((point for point in points if point.error <= target), None)
             if best is not None:
-                call = bare_run(scene, method, choose_chart(method, "axis"), best.setting, _horizon(scene))
+                call = bare_run(scene, method, method.chart_for("axis"), best.setting, _horizon(scene))
                 rough[target].append((timings([call], batches=5, batch=1e-3)[0].best, method.name))
     for target, row in rough.items():
         for _, name in sorted(row)[:CONTENDERS]:
@@ -156,7 +162,7 @@ def measure(peers: Sequence[Peer], scenes: Sequence[str] = SCENES) -> xr.Dataset
             except Exception as error:  # noqa: BLE001  (somebody else's solver must not take the others down)
                 _tell(f"{name}: {peer.method.name} failed, {type(error).__name__}: {error}")
         calls = [
-            bare_run(scene, peer.method, choose_chart(peer.method, "axis"), point.setting, _horizon(scene))
+            bare_run(scene, peer.method, peer.method.chart_for("axis"), point.setting, _horizon(scene))
             for peer, points in entries
             for point in points
         ]

@@ -3,8 +3,9 @@
 import math
 
 import xarray as xr
+from symtop.measure.settings import step_ladder
 
-from symtop.measure.accuracy import error_table, step_ladder
+from symtop.measure.accuracy import error_table
 from symtop.methods.registry import integrator, integrators
 from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes
@@ -32,7 +33,7 @@ def cases(quick: bool) -> list[Case]:
         on = scene(name)
         horizon = min(on.horizon, math.inf if name == WHOLE else NUTATIONS * on.nutation_period)
         for method in integrators().values():
-            if method.knob == "step_size":
+            if method.fixed_step:
                 steps = step_ladder(method, on, horizon, *((8, 1e5) if quick else (17,)))
                 grid.append(Case(name, method.name, {"horizon": horizon, "step_sizes": steps}))
     return grid

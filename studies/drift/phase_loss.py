@@ -9,9 +9,10 @@ import math
 
 import numpy as np
 import xarray as xr
+from symtop.measure.settings import seek
 
-from symtop.measure.clock import Clock
 from symtop.measure.growth import growth, horizon, lost_at
+from symtop.measure.phase import nutation_phase
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate
@@ -22,35 +23,34 @@ TARGET = 2500.0  # nutations after which the phase error should reach `LOST`
 MOST_STEPS = 3e7  # of the run that measures
 TRIALS = 6
 TRIAL = 40.0  # nutations
+CLOSE = 0.8  # of `LOST`: a trial between it and `LOST` ends the search
 FEWEST, MOST = 4.37, 8000.37  # steps a nutation
 FIRST = {2: 1500.37, 4: 80.37, 6: 25.37}  # steps a nutation that are tried first, by order
 SAMPLES = 2001
 
 
-def phase_run(scene: Scene, method: Integrator, clock: Clock, per_nutation: float, nutations: float) -> xr.Dataset:
+def phase_run(scene: Scene, method: Integrator, per_nutation: float, nutations: float) -> xr.Dataset:
     """Phase error (rad) of a run: dimension ``time``, variable ``phase``."""
     period = scene.nutation_period
     run = simulate(scene, method, step_size=period / per_nutation, horizon=nutations * period, samples=SAMPLES,
                    observe="nutation", guard=False)  # fmt: skip
-    error = clock.error(run["time"].values, run["theta"].values, run["p_theta"].values / scene.top.I1)
+    error = nutation_phase(scene, run["time"].values, run["theta"].values, run["p_theta"].values / scene.top.I1)
     return xr.Dataset({"phase": ("time", error)}, coords={"time": run["time"]}, attrs=run.attrs)
 
 
-def steps_for(scene: Scene, method: Integrator, clock: Clock, target: float) -> float:
-    """Steps a nutation with which the phase error is about `LOST` after `target` nutations."""
-    order = method.order or 2
-    steps = FIRST.get(order, 12.37)
-    for _ in range(TRIALS):
-        run = phase_run(scene, method, clock, steps, TRIAL)
-        lost = abs(float(np.polyfit(run["time"] / scene.nutation_period, run["phase"], 1)[0])) * target
-        if run.attrs["outcome"] != "ok" or not math.isfinite(lost):
-            steps *= 2.0
-            continue
-        factor = (lost / LOST) ** (1.0 / order)
-        steps = min(max(steps * min(max(factor, 0.4), 4.0), FEWEST), MOST)
-        if 0.85 < factor < 1.2:
-            break
-    return steps
+def steps_for(scene: Scene, method: Integrator, target: float) -> float:
+    """Steps a nutation with which the phase error is `LOST` after `target` nutations, or up to a quarter more."""
+    period, order = scene.nutation_period, method.order or 2
+
+    def trial(step: float) -> tuple[float, float]:
+        run = phase_run(scene, method, period / step, TRIAL)
+        lost = abs(float(np.polyfit(run["time"] / period, run["phase"], 1)[0])) * target
+        good = run.attrs["outcome"] == "ok" and math.isfinite(lost)
+        return lost if good else math.inf, run.attrs["force_evaluations"]
+
+    first, ends = period / FIRST.get(order, 12.37), (period / MOST, period / FEWEST)
+    step = seek(trial, first, LOST, ends, float(order), least=CLOSE)
+    return MOST if isinstance(step, str) else period / step
 
 
 def phase_loss(scene: Scene, method: Integrator, short: float = SHORT, target: float = TARGET) -> xr.Dataset:
@@ -61,17 +61,17 @@ def phase_loss(scene: Scene, method: Integrator, short: float = SHORT, target: f
     measures; ``exponent`` of the growth of its phase error in the last decade, with ``exponent_interval`` (half-width,
     95 %). If nothing can be predicted there are the first three alone.
     """
-    clock, period = Clock(scene), scene.nutation_period
-    steps = steps_for(scene, method, clock, target)
+    period = scene.nutation_period
+    steps = steps_for(scene, method, target)
     for _ in range(TRIALS):
-        first = phase_run(scene, method, clock, steps, short)
+        first = phase_run(scene, method, steps, short)
         predicted = horizon(first["time"], first["phase"], LOST).time / period
         if predicted > 2.0 * short or steps > MOST:
             break
         steps *= 1.3  # the frequency error itself drifts, and a few nutations do not show it
     if not math.isfinite(predicted):
         return xr.Dataset({"steps": steps, "predicted": predicted, "short": short})
-    long = phase_run(scene, method, clock, steps, min(1.1 * predicted, MOST_STEPS / steps))
+    long = phase_run(scene, method, steps, min(1.1 * predicted, MOST_STEPS / steps))
     fit = growth(long["time"], long["phase"], 1.0)
     measured = lost_at(long["time"], long["phase"], LOST) / period
     return xr.Dataset(

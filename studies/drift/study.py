@@ -52,7 +52,7 @@ def grid(steps: int, members: int, walk: int, longest: int, share: float) -> lis
           for name in grid_scenes(LEFT_OUT, lambda one: math.isfinite(one.nutation_period)) for method in methods),
         *(Case(LONG, method.name, settings, group=group) for method in methods if method.modified_energy
           for group, settings in ((WINDOWS, long_run), (ROUNDINGS, ensemble))),
-        *(Case(LONG, method.name, loss, group=HORIZONS) for method in methods if method.knob == "step_size"),
+        *(Case(LONG, method.name, loss, group=HORIZONS) for method in methods if method.fixed_step),
     ]  # fmt: skip
 
 
@@ -60,9 +60,9 @@ def history_settings(on: Scene, method: Integrator, steps: int) -> dict[str, flo
     """So many steps of a fixed-step method, or the same horizon at a tolerance."""
     horizon = steps * on.nutation_period / STEPS_A_NUTATION
     settings = {"samples": 4001 if steps > 100_000 else 601, "horizon": horizon * SHORTENED.get(method.name, 1.0)}
-    if method.knob == "step_size":
+    if method.fixed_step:
         return settings | {"step_size": horizon / steps}
-    chooses = method.knob == "tolerance" and method.default_tolerance is None
+    chooses = method.adaptive and method.default_tolerance is None
     return settings | ({"tolerance": TOLERANCES.get(method.name, 1e-6)} if chooses else {})
 
 

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.measure.accuracy import knobs
 from symtop.measure.conservation import residuals
 from symtop.methods.registry import integrator, integrators
 from symtop.model import charts
@@ -67,7 +66,7 @@ def residual_history(scene: Scene, name: str, setting: float, samples: int = SAM
 
     `setting` is a step size in seconds or a tolerance, whichever the integrator takes.
     """
-    control = knobs(integrator(name), setting)
+    control = integrator(name).setting(setting).kwargs()
     run = simulate(scene, name, observe="nutation", samples=samples, guard=False, **control)
     columns: dict[str, Any] = {Column.OUTCOME: run.attrs["outcome"], Column.SAMPLE_TIME: ("sample", run["time"].values)}
     for constant, values in residuals(scene, run).items():

@@ -6,8 +6,8 @@ Lagrangian with nothing eliminated, and the order of reducing and discretising.
 """
 
 import xarray as xr
+from symtop.measure.settings import ladder
 
-from symtop.measure.accuracy import ladder
 from symtop.methods.registry import integrator, integrators
 from symtop.model.scenes import added_scenes, scene
 from symtop.runner.study import Case, Study

@@ -140,7 +140,7 @@ def pages(names: Sequence[str]) -> dict[str, list[str]]:
             page = "splitting-angles" if method.charts() == ("angles",) else high
         elif method and page == "runge-kutta" and method.symmetric:
             page = "gauss"
-        elif method and method.knob != "step_size":
+        elif method and not method.fixed_step:
             page = "adaptive"
         by_page.setdefault(page, []).append(name)
     return by_page

@@ -84,7 +84,7 @@ class Horizon(NamedTuple):
 def separatrix_horizon(method: Integrator, scene: Scene, setting: float, longest: float = 80.0) -> Horizon:
     """When the axis error passes `LOST`; `setting` is the step in units of 1/g, or the tolerance."""
     g = math.sqrt(scene.top.mgl / scene.top.I1)
-    if method.knob == "step_size":
+    if method.fixed_step:
         plan = Plan.steps(setting / g, np.unique(np.linspace(0, round(longest / setting), 1601).astype(np.int64)))
     else:
         plan = Plan.until(np.linspace(0.0, longest, 1601) / g, setting)

@@ -68,7 +68,7 @@ class RowPlan(NamedTuple):
 def row_plan(method: Integrator, settings: Sequence[float], periods: float) -> RowPlan:
     """Runs over at least `periods` nutations: a whole number of steps where the step is fixed."""
     phases = np.full((len(settings), SAMPLES), math.nan)
-    if method.knob != "step_size":
+    if not method.fixed_step:
         phases[:] = sample_times(periods, SAMPLES, 1.0)[0]
         return RowPlan(method, tuple(settings), (), (), phases)
     steps, marks = [], []

@@ -36,12 +36,12 @@ def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool)
     settings, rows = steps.size, values.size
     if method.tier == "python":
         settings, rows = (13, 12) if solves_slowly(method) else (25, 24)
-    elif method.knob == "tolerance" and method.order is None:  # the order of a series grows with the accuracy
+    elif method.adaptive and method.order is None:  # the order of a series grows with the accuracy
         settings, rows = (25, values.size) if method.speed == 1.0 else (13, 20)
     if quick and settings < steps.size:
         settings, rows = min(settings, QUICK[0]), min(rows, QUICK[1])
     parameters = values[:: -(-values.size // rows)].tolist()
-    if method.knob == "step_size":
+    if method.fixed_step:
         return steps.tolist(), parameters
     if method.knob is None:
         return [math.nan], parameters
@@ -70,11 +70,11 @@ def cases(quick: bool) -> list[Case]:
     for method in integrators().values():
         ladder, parameters = axes(method, passes, gaps, quick)
         settings = {"parameters": parameters, "ladder": ladder, "periods": 1.0}
-        grid.append(Case("grazing", method.name, settings | {"shown": 0.005 if method.knob == "step_size" else 1e-6}))
+        grid.append(Case("grazing", method.name, settings | {"shown": 0.005 if method.fixed_step else 1e-6}))
         if method.knob is not None:
-            ladder = [0.2, 0.1, 0.05, 0.025] if method.knob == "step_size" else [1e-4, 1e-6, 1e-8, 1e-10]
+            ladder = [0.2, 0.1, 0.05, 0.025] if method.fixed_step else [1e-4, 1e-6, 1e-8, 1e-10]
             grid.append(Case("separatrix", method.name, {"ladder": ladder[: 1 if quick else 4]}))
-        if method.knob == "step_size":
+        if method.fixed_step:
             grid.extend(Case(name, method.name, settings) for name, settings in fixed.items())
     return grid
 

@@ -67,7 +67,7 @@ def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.
         column = int(np.argmin(nearest)) if method.knob else 0
         table[Column.SHOWN_SETTING] = float(ladder[column])
         table[Column.GRAZING_ERROR] = ("parameter", runs.axis_error[:, column])
-    elif method.knob == "step_size" and settings.get("limits"):
+    elif method.fixed_step and settings.get("limits"):
         values = np.asarray(settings["limits"], float)
         ends = np.array([family_limits(name, method, float(value), ladder[-1]) for value in values])
         table[Column.LIMIT_PARAMETER] = ("curve", values)

@@ -50,7 +50,7 @@ def declared_energy(method: Integrator) -> str:
         return method.energy_error
     if "energy" in (method.conserves or ()):
         return "kept"
-    return "bounded" if method.symplectic and method.knob == "step_size" else ""
+    return "bounded" if method.symplectic and method.fixed_step else ""
 
 
 def judge(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
@@ -60,12 +60,7 @@ def judge(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
     findings |= _structure(method, scene, quick, traces)
     findings |= _over_steps(method, scene, quick, traces)
     findings["pole"] = _attempt("pole", _pole_claim(method), lambda: _pole(method))
-    return Ledger(
-        method.name,
-        scene.name,
-        tuple(findings[claim] for claim in CLAIMS),
-        traces,
-    )
+    return Ledger(method.name, scene.name, tuple(findings[claim] for claim in CLAIMS), traces)
 
 
 def _attempt(claim: str, declared: str, measure: Callable[[], Finding]) -> Finding:
@@ -100,7 +95,7 @@ def _order(method: Integrator, scene: Scene, quick: bool, traces: dict[str, np.n
     measured = str(main) if math.isfinite(main.slope) else ""
     slopes = ", ".join(f"{name} {fit}" for name, fit in fitted.fits.items() if math.isfinite(fit.slope))
     slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
-    if method.knob == "step_size":
+    if method.fixed_step:
         power = method.order or 1
         if math.isfinite(main.slope):
             power = max(1, min(power if method.order else 99, round(main.slope)))
@@ -115,13 +110,13 @@ def _order(method: Integrator, scene: Scene, quick: bool, traces: dict[str, np.n
         return Finding("order", declared, "", "undecided", f"{main.reason} ({slopes})")
     if method.order is None:
         return Finding("order", declared, measured, "measured", slopes, main.slope, main.interval)
-    band = BAND if method.knob == "step_size" else LOOSE_BAND
+    band = BAND if method.fixed_step else LOOSE_BAND
     low = any(fit.slope + fit.interval < method.order - BESIDE for fit in fitted.fits.values())
     off = abs(main.slope - method.order) > band + main.interval
-    if off or (low and method.knob == "step_size"):
-        why = f"the error falls with another power of the step: {slopes}"
-        return Finding("order", declared, measured, "refuted", why, main.slope, band + main.interval)
-    return Finding("order", declared, measured, "confirmed", slopes, main.slope, band + main.interval)
+    verdict, why = "confirmed", slopes
+    if off or (low and method.fixed_step):
+        verdict, why = "refuted", f"the error falls with another power of the step: {slopes}"
+    return Finding("order", declared, measured, verdict, why, main.slope, band + main.interval)
 
 
 # ---- structure of a step ---------------------------------------------------------------------------------------------
@@ -268,25 +263,23 @@ def _kept(method: Integrator, run: long.LongRun, claim: str) -> Finding:
 
 
 def _constant(claim: str, declared: str, run: long.LongRun, constant: long.Constant) -> Finding:
-    kind = constant.kind
-    measured = f"{kind}, {constant.largest:.0e}".replace("0e+00", "0") if kind != "unknown" else ""
-    why = f"largest relative change {constant.largest:.1e} in {_span(run)}, {constant.a_step:.0e} in one step at most"
+    kind, changed, verdict = constant.kind, constant.changed, "undecided"
+    measured = f"{kind}, {changed.largest:.0e}".replace("0e+00", "0") if kind != "unknown" else ""
+    why = f"largest relative change {changed.largest:.1e} in {_span(run)}, {constant.a_step:.0e} in one step at most"
     if kind not in ("kept", "unknown"):
-        why += f", growth exponent {constant.exponent:.2f} +- {constant.interval:.2f}"
+        why += f", growth exponent {changed.exponent:.2f} +- {changed.exponent_interval:.2f}"
         if kind == "drift":
-            why += f", drifting by {constant.rise / max(run.steps, 1):.1e} a step"
+            why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step"
     if run.outcome not in ("ok", "not_finite") or (kind in ("kept", "bounded") and run.outcome != "ok"):
         why += f"; but the run {run.message}"
-        return Finding(claim, declared, measured, "undecided", why, constant.largest, constant.floor)
-    if kind == "unknown":
+    elif kind == "unknown":
         why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"
-        return Finding(claim, declared, measured, "undecided", why, constant.largest, constant.floor)
-    if declared == "bounded" and constant.grows is None:
+    elif declared == "bounded" and constant.grows is None:
         why += ", which leaves open whether it grows"
-        return Finding(claim, declared, measured, "undecided", why, constant.largest, constant.floor)
-    true = {"kept": kind == "kept", "bounded": not constant.grows}.get(declared)
-    verdict = "measured" if true is None else "confirmed" if true else "refuted"
-    return Finding(claim, declared, measured, verdict, why, constant.largest, constant.floor)
+    else:
+        true = {"kept": kind == "kept", "bounded": not constant.grows}.get(declared)
+        verdict = "measured" if true is None else "confirmed" if true else "refuted"
+    return Finding(claim, declared, measured, verdict, why, changed.largest, constant.floor)
 
 
 def _invariant(method: Integrator, run: long.LongRun) -> Finding:
@@ -299,7 +292,7 @@ def _invariant(method: Integrator, run: long.LongRun) -> Finding:
     if judged != claimed:
         unknown = ", ".join(name for name in claimed if name not in run.constants)
         return undecided("invariant", declared, f"the battery has no formula for {unknown}")
-    worst = max(judged, key=lambda name: run.constants[name].largest)
+    worst = max(judged, key=lambda name: run.constants[name].changed.largest)
     return _constant("invariant", "kept", run, run.constants[worst])._replace(declared=declared)
 
 

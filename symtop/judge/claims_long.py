@@ -21,9 +21,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.measure.conservation import residuals, trend
+from symtop.measure.conservation import Changed, constant_of, residuals
 from symtop.measure.errors import errors_against
-from symtop.measure.growth import behaviour, growth
+from symtop.measure.growth import behaviour
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
@@ -49,23 +49,21 @@ VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
 class Constant(NamedTuple):
     """What became of one constant of the motion."""
 
-    largest: float  # relative change
+    changed: Changed  # relative change, its trend and its growth
     a_step: float  # largest change in one step
-    exponent: float  # of its growth with time
-    interval: float
     floor: float  # a smaller change is rounding
-    rise: float  # of the line through the means over the whole run
-    certain: float  # the rise in units of its 95 % interval
 
     @property
     def kind(self) -> str:
         """kept, bounded, random walk, drift, or just growing; unknown without a size or an exponent to judge it by."""
-        word = behaviour(self.largest, self.exponent, self.interval, self.floor)
+        seen = self.changed
+        word = behaviour(seen.largest, seen.exponent, seen.exponent_interval, self.floor)
         if word == "kept":
             return word
-        if not (math.isfinite(self.largest) and math.isfinite(self.exponent)):
+        if not (math.isfinite(seen.largest) and math.isfinite(seen.exponent)):
             return "unknown"
-        drifts = abs(self.certain) > SURE and abs(self.rise) > VISIBLE * self.largest
+        sure = 0.0 < SURE * seen.interval < abs(seen.slope)
+        drifts = sure and abs(seen.rise) > VISIBLE * seen.largest
         return "drift" if drifts else word
 
     @property
@@ -73,7 +71,8 @@ class Constant(NamedTuple):
         """Is it beyond doubt that it grows? None if the exponent leaves that open."""
         if self.kind in ("kept", "bounded", "unknown"):
             return None if self.kind == "unknown" else False
-        return True if self.kind == "drift" or self.exponent - self.interval > BOUNDED else None
+        least = self.changed.exponent - self.changed.exponent_interval
+        return True if self.kind == "drift" or least > BOUNDED else None
 
 
 class LongRun(NamedTuple):
@@ -92,12 +91,11 @@ class LongRun(NamedTuple):
 
 def _run(method: Integrator, scene: Scene, steps: float, step: float, samples: int) -> xr.Dataset:
     """A run for `steps` times `step`: of that many steps, or for that time at the tolerance."""
-    if method.knob == "step_size":
-        return simulate(
-            scene, method, step_size=step, horizon=round(steps) * step, samples=samples, observe="axis", guard=False
-        )
-    given = None if method.knob is None or method.default_tolerance is not None else TOLERANCE
-    return simulate(scene, method, tolerance=given, horizon=steps * step, samples=samples, observe="axis", guard=False)
+    horizon = (round(steps) if method.fixed_step else steps) * step
+    control = {"step_size": step} if method.fixed_step else {}
+    if method.adaptive and method.default_tolerance is None:
+        control = {"tolerance": TOLERANCE}
+    return simulate(scene, method, **control, horizon=horizon, samples=samples, observe="axis", guard=False)
 
 
 def long_run(method: Integrator, scene: Scene, chart: str, *, quick: bool = False) -> LongRun:
@@ -112,7 +110,7 @@ def long_run(method: Integrator, scene: Scene, chart: str, *, quick: bool = Fals
         if method.knob is None:
             steps = PILOT  # a formula has no steps: nothing adds up
         run = _run(method, scene, max(steps, PILOT), step, SAMPLES)
-        if run.attrs["outcome"] == "ok" or method.knob != "step_size":
+        if run.attrs["outcome"] == "ok" or not method.fixed_step:
             break
     other = _run(method, scene, PILOT, 0.21 * step, PILOT + 1)
     made = max(int(run.attrs["steps"]), 1)
@@ -159,15 +157,11 @@ def _cayley_residual(top: SymmetricTop, run: xr.Dataset) -> Array:
 
 def _judged(time: Array, values: Array, every_step: Array, steps: int) -> Constant:
     """Size, growth and trend of a residual over so many steps; `every_step` holds it at consecutive ones."""
-    size = np.abs(values[np.isfinite(values)])
     jumps = np.abs(np.diff(every_step))
     jumps = jumps[np.isfinite(jumps)]
-    power, line = growth(time, values), trend(time, values)
-    sure = abs(line.slope) / line.interval if line.interval > 0.0 else 0.0
     a_step = float(jumps.max()) if jumps.size else math.nan
     floor = max(KEPT, a_step * math.sqrt(steps)) if a_step <= ROUNDING_OF_A_STEP else KEPT
-    largest = float(size.max()) if size.size else math.nan
-    return Constant(largest, a_step, power.slope, power.interval, floor, line.rise, sure)
+    return Constant(constant_of(time, values), a_step, floor)
 
 
 # the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1
@@ -203,13 +197,10 @@ def passages(method: Integrator) -> list[Passage]:
         only = method.only(chart)
         ends, errors_there = [], []
         for finer in (1.0, 2.0):
-            step = POLE.horizon / (POLE_STEPS * finer)
-            knob = {"step_size": step} if method.knob == "step_size" else {}
-            if method.knob == "tolerance":
-                knob = {"tolerance": max(10.0 ** (-5.0 - finer), method.least_tolerance)}
-            run = simulate(
-                POLE, only, samples=201, observe="axis" if chart != "attitude" else "attitude", guard=False, **knob
-            )
+            step, tolerance = POLE.horizon / (POLE_STEPS * finer), max(10.0 ** (-5.0 - finer), method.least_tolerance)
+            control = method.setting(step if method.fixed_step else tolerance).kwargs()
+            observe = "axis" if chart != "attitude" else "attitude"
+            run = simulate(POLE, only, samples=201, observe=observe, guard=False, **control)
             truth = reference(POLE, run["time"].values, precision="closed-form")
             ends.append(str(run.attrs["outcome"]))
             miss = errors_against(POLE, run, truth)["axis"].values

@@ -18,8 +18,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.base.validate import SymtopError
-from symtop.measure.accuracy import error_table, step_ladder, tolerance_ladder
+from symtop.measure.accuracy import error_table
 from symtop.measure.order import Fit, order
+from symtop.measure.settings import ladder
 from symtop.methods.registry import Integrator
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
@@ -59,7 +60,7 @@ def measured_order(method: Integrator, scene: Scene, *, quick: bool = False) -> 
     if method.knob is None:
         raise SymtopError(f"{method.name} has neither a step nor a tolerance")
     fitted = _slopes(method, scene, NUTATIONS, quick)
-    if quick or method.knob != "step_size" or method.order is None or method.tier == "python":
+    if quick or not method.fixed_step or method.order is None or method.tier == "python":
         return fitted
     for nutations in LONGER:
         if math.isfinite(fitted.fits[fitted.observed].slope):
@@ -71,14 +72,12 @@ def measured_order(method: Integrator, scene: Scene, *, quick: bool = False) -> 
 
 def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool) -> Order:
     horizon = nutations * scene.time_scale()
-    if method.knob == "step_size":
-        settings = step_ladder(method, scene, horizon, 11 if quick else 13, FINEST[method.tier])
-    else:
-        settings = tolerance_ladder(method, 9 if quick else 13)
+    count = 13 if not quick else 11 if method.fixed_step else 9
+    settings = ladder(method, scene, horizon, count, FINEST[method.tier])
     main = observable(method)
     table = error_table(scene, method, settings, horizon, observe=main)
     fitted = _fitted(method, scene, main, horizon, table)
-    if math.isfinite(fitted.fits[main].slope) or method.knob != "step_size":
+    if math.isfinite(fitted.fits[main].slope) or not method.fixed_step:
         return fitted
     dense = _asymptotic(method, fitted)
     if not dense:
@@ -88,7 +87,7 @@ def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool) -> 
 
 
 def _fitted(method: Integrator, scene: Scene, main: str, horizon: float, table: xr.Dataset) -> Order:
-    step = table["step_size"].values if method.knob == "step_size" else horizon / table["steps"].values
+    step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
     omega = 2.0 * math.pi / scene.nutation_period
     fits = {
         name: order(step, table[name].values, table[f"{name}_bound"].values, omega, method.order)

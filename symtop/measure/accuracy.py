@@ -18,38 +18,6 @@ SAMPLES = 331
 ENOUGH = {"compiled": 1e9, "python": 2e4}  # force evaluations of a run after which no finer setting is tried
 
 
-def step_ladder(method: Integrator, scene: Scene, horizon: float, count: int = 13, most: float = 4e6) -> list[float]:
-    """Steps from ten a nutation down to where the method meets round-off or `most` steps, evenly in the logarithm.
-
-    The finest step of a method of order p resolves a nutation about 10 * 10^(11/p) times; methods of high order, whose
-    steps have many stages, begin at five.
-    """
-    period = scene.time_scale(horizon)
-    power = method.order or 2
-    first = 10.37 if power <= 4 else 5.37  # nothing here may be commensurate with the nutation
-    decades = min(4.5, 11.0 / power + math.log10(10.37 / first), max(math.log10(most * period / horizon / first), 0.5))
-    return [period / (first * 10.0 ** (decades * k / (count - 1))) for k in range(count)]
-
-
-def tolerance_ladder(method: Integrator, count: int = 9) -> list[float]:
-    """Tolerances from 1e-2 down to what the method's arithmetic allows, or its patience."""
-    tedious = method.tier == "python" and method.explicit is False  # radau at 1e-12: a minute for ten nutations
-    decades = -2.0 - math.log10(max(method.least_tolerance, 1e-8 if tedious else 1e-18))
-    return [10.0 ** (-2.0 - 0.999 * decades * k / (count - 1)) for k in range(count)]
-
-
-def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, most: float = 4e6) -> list[float]:
-    """`count` settings of a method's one knob, coarse to fine; steps end at `most` of them."""
-    if method.knob == "step_size":
-        return step_ladder(method, scene, horizon, count, most)
-    return tolerance_ladder(method, count) if method.knob == "tolerance" else [math.nan]
-
-
-def knobs(method: Integrator, setting: float) -> dict[str, float | None]:
-    """The arguments `step_size` and `tolerance` that a setting of the method's one knob stands for."""
-    return {name: setting if method.knob == name else None for name in ("step_size", "tolerance")}
-
-
 def error_table(
     scene: Scene, method: Integrator, settings: Sequence[float], horizon: float, observe: str | None = None
 ) -> xr.Dataset:
@@ -88,8 +56,8 @@ def error_row(
     With `phases` also its frequencies, shape error and lags (see `phase`), and, if the chart that shows what is
     observed does not show the attitude, the attitude error of a second run in the chart that does.
     """
-    knob = knobs(method, setting)
-    run = simulate(scene, method, **knob, horizon=horizon, samples=SAMPLES, observe=observe, guard=False)
+    control = method.setting(setting).kwargs()
+    run = simulate(scene, method, **control, horizon=horizon, samples=SAMPLES, observe=observe, guard=False)
     truth = reference(scene, run["time"].values, precision="closed-form")
     shown = errors_against(scene, run, truth)
     row: dict[str, float | str] = {name: run.attrs[name] for name in _COUNTS}
@@ -102,7 +70,7 @@ def error_row(
     if not phases:
         return row
     if not failed and "attitude" not in shown:
-        wide = simulate(scene, method, **knob, horizon=horizon, samples=SAMPLES, observe="attitude", guard=False)
+        wide = simulate(scene, method, **control, horizon=horizon, samples=SAMPLES, observe="attitude", guard=False)
         values = attitude_error(wide, truth)
         row["attitude"], row["attitude_end"] = float(np.max(values)), float(values[-1])
     return row | phase(scene, run, truth)._asdict()

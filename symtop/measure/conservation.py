@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from symtop.measure.clock import Clock, has_phase
 from symtop.measure.growth import change_point, growth, law, tops
+from symtop.measure.phase import nutation_phase
 from symtop.measure.statistics import line, student
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
@@ -40,6 +40,27 @@ class Trend(NamedTuple):
         return bool(abs(self.slope) > self.interval)
 
 
+class Changed(NamedTuple):
+    """What became of a quantity that the true motion keeps: its size, its trend and its law of growth."""
+
+    largest: float  # NaN if there is no finite sample
+    slope: float  # of the trend, per unit time
+    interval: float
+    rise: float
+    exponent: float  # of growth with time
+    exponent_interval: float  # half-width, 95 %
+    law: str  # name of the exponent
+
+
+def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Changed:
+    """Size, trend and growth over the last `decades` of a residual (n,) at times (n,); samples may be NaN."""
+    size, power = np.abs(np.asarray(residual, float)), growth(time, residual, decades)
+    largest = float(np.max(size[np.isfinite(size)], initial=-1.0))
+    return Changed(
+        largest if largest >= 0.0 else math.nan, *trend(time, residual), power.slope, power.interval, law(power)
+    )
+
+
 def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
     """One run and what became of the constants of the motion and of its phase.
 
@@ -57,26 +78,20 @@ def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
     period = scene.nutation_period
     late = time > (SETTLED * period if math.isfinite(period) else 0.0)
     for name, values in residuals(scene, run).items():
-        drifting, power = trend(time, values), growth(time, values)
         columns[f"{name}_residual"] = ("sample", values)
-        columns[f"{name}_largest"] = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else np.nan
-        columns[f"{name}_slope"], columns[f"{name}_interval"], columns[f"{name}_rise"] = drifting
-        columns[f"{name}_exponent"], columns[f"{name}_exponent_interval"] = power.slope, power.interval
-        columns |= _laws(name, law(power), time[late], values[late])
-    phase = np.full(time.size, np.nan)
-    if has_phase(scene):
-        phase = Clock(scene).error(time, run["theta"].values, run["p_theta"].values / scene.top.I1)
-    power = growth(time, phase, 1.0)
-    columns["phase_largest"] = float(np.nanmax(np.abs(phase))) if np.isfinite(phase).any() else np.nan
-    columns["phase_exponent"], columns["phase_exponent_interval"] = power.slope, power.interval
-    return xr.Dataset(columns | _laws("phase", law(power), time[late], phase[late]))
+        columns |= _columns(name, constant_of(time, values)._asdict(), time[late], values[late])
+    phase = nutation_phase(scene, time, run["theta"].values, run["p_theta"].values / scene.top.I1)
+    changed = constant_of(time, phase, 1.0)._asdict()
+    without_trend = {part: value for part, value in changed.items() if part not in Trend._fields}
+    return xr.Dataset(columns | _columns("phase", without_trend, time[late], phase[late]))
 
 
-def _laws(name: str, named: str, time: np.ndarray, values: np.ndarray) -> dict[str, Any]:
-    """The law of the end of a run, and where within the last two decades another one ended."""
+def _columns(name: str, changed: dict[str, Any], time: np.ndarray, values: np.ndarray) -> dict[str, Any]:
+    """What became of a quantity, and where within the last two decades another law than that of the end ended."""
     change = change_point(*tops(time, values, count=WINDOWS)) if time.size else None
     when, before, after = (math.nan,) * 3 if change is None else change
-    return {f"{name}_law": named, f"{name}_change": when, f"{name}_before": before, f"{name}_after": after}
+    parts = changed | {"change": when, "before": before, "after": after}
+    return {f"{name}_{part}": value for part, value in parts.items()}
 
 
 def residuals(scene: Scene, run: xr.Dataset) -> dict[str, np.ndarray]:

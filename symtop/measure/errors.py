@@ -81,16 +81,6 @@ def _bound(scene: Scene, truth: xr.Dataset, quantity: str) -> charts.Array:
     return bound
 
 
-def energy_scale(scene: Scene) -> float:
-    """Alias for studies: `Scene.energy_scale` says it."""
-    return scene.energy_scale
-
-
-def momentum_scale(scene: Scene) -> float:
-    """Alias for studies: `Scene.momentum_scale` says it."""
-    return scene.momentum_scale
-
-
 def errors_against(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Dataset:
     """Error of every quantity that a run shows at every sample; NaN where the run had failed.
 

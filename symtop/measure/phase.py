@@ -95,11 +95,26 @@ def nutates(scene: Scene) -> bool:
     return high - low > STEADY and math.isfinite(scene.nutation_period)
 
 
+def nutation_phase(scene: Scene, time: Array, theta: Array, theta_dot: Array) -> Array:
+    """How far states (n,) are ahead of the truth at the same times, rad of the nutation, unwrapped.
+
+    NaN where a state is not finite, and everywhere if the motion has no nutation (see `nutates`).
+    """
+    phase, good = np.full(np.shape(time), math.nan), np.isfinite(theta) & np.isfinite(theta_dot)
+    if nutates(scene) and good.any():
+        u, du = np.cos(theta[good]), -np.sin(theta[good]) * theta_dot[good]
+        phase[good] = 2.0 * math.pi / scene.nutation_period * _split(scene, time[good], u, du, np.zeros_like(u)).lag
+    return phase
+
+
 def split(scene: Scene, run: xr.Dataset) -> Split:
     """Shape error and lags at every sample (n,) of a run without failures."""
-    t, phi = run["time"].values, run["phi"].values
     u = np.cos(run["theta"].values)
     du = -np.sin(run["theta"].values) * run["p_theta"].values / scene.top.I1
+    return _split(scene, run["time"].values, u, du, run["phi"].values)
+
+
+def _split(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Split:
     period = scene.nutation_period
     omega = 2.0 * math.pi / period if math.isfinite(period) else 1.0
     if not nutates(scene):

@@ -58,10 +58,10 @@ class StepMap:
 
     def run(self, start: Angles, h: float, steps: int = 1) -> Run:
         """A run of so many steps, sampled at its end; for an adaptive method a run for that time."""
-        if self.method.knob == "step_size":
+        if self.method.fixed_step:
             plan = Plan.steps(h, [steps])
         else:
-            loose = math.nan if self.method.knob is None else max(LOOSE, self.method.least_tolerance)
+            loose = max(LOOSE, self.method.least_tolerance) if self.method.adaptive else math.nan
             plan = Plan.until([steps * h], loose)
         done = solve_plan(self.method, self.chart, self.top, start, plan)
         if done.outcome != "ok" or not np.isfinite(done.states).all():
@@ -150,7 +150,7 @@ def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Ang
     """
     start = generic_start(scene)
     trial = one_step(method, chart, scene, SHARE * scene.time_scale())
-    if method.knob != "step_size":
+    if not method.fixed_step:
         return trial, start
     refusal = SymtopError(f"{method.name} makes no step in the {chart} chart")
     h = trial.h
@@ -243,7 +243,7 @@ def return_miss(step: StepMap, start: Angles) -> float:
     """Distance from the start after a step forth and back; a solver that takes no negative step runs reversed."""
     before = step.at(start)
     arrived = step.restart(step.image(step.point(start)))
-    if step.method.knob == "step_size":
+    if step.method.fixed_step:
         try:
             return step.gap(step.shown(step.run(arrived, -step.h)), before)
         except SymtopError:
@@ -263,7 +263,7 @@ def restart_gap(step: StepMap, start: Angles) -> float:
     A step that does not keep |e| or |q| at one cannot be taken up again by a start: that is no evidence, and zero.
     """
     after = step.image(step.point(start))
-    if step.method.knob != "step_size" or abs(step.length(after) - 1.0) > UNIT:
+    if not step.method.fixed_step or abs(step.length(after) - 1.0) > UNIT:
         return 0.0
     once = step.restart(after)
     return step.gap(step.shown(step.run(start, step.h, 2)), step.shown(step.run(once, step.h)))

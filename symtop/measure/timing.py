@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from symtop.measure.accuracy import knobs
 from symtop.methods.registry import Integrator, Run
 from symtop.model.scenes import Scene
 from symtop.run.simulation import make_plan
@@ -80,6 +79,6 @@ def timings(
 
 def bare_run(scene: Scene, method: Integrator, chart: str, setting: float, horizon: float) -> Callable[[], Run]:
     """A call of one of a method's solvers, start to horizon, with nothing around it."""
-    plan, _ = make_plan(scene, method, horizon=horizon, samples=2, **knobs(method, setting))
+    plan, _ = make_plan(scene, method, **method.setting(setting).kwargs(), horizon=horizon, samples=2)
     solve = method.solvers[chart]
     return lambda: solve(scene.top, scene.start, plan)

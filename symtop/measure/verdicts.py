@@ -27,7 +27,6 @@ STEADY = 1e-6  # rad; a nutation narrower than this is a steady precession, know
 DRIFT = 0.01  # of the energy's scale
 GROWING = 1.3  # the second half's largest energy error over the first half's; bounded errors have 1
 NO_GAP = 1e-9  # of the momentum scale: a gap p_phi -+ p_psi below this has no sign to change
-ROUNDING = NO_GAP  # alias for studies/stability/outcome_maps.py
 
 JUDGED = ("accurate", "bounded_but_wrong", "drifting", "wrong_regime")
 VERDICTS = (*JUDGED, *OUTCOMES[1:])

@@ -22,6 +22,7 @@ import xarray as xr
 from symtop.measure.accuracy import as_table, error_row
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
+from symtop.measure.settings import ROUNDED, between, coarse_setting, limits
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 
@@ -34,12 +35,10 @@ NOTCHES = 2.5  # decades of tolerance likewise
 CLOSE = 0.6  # an error between CLOSE times the target and the target is near enough
 AIM = 0.85
 REFINEMENTS = 2
-LEAST_STEPS = 4.37  # a nutation; not commensurate with it
 COARSER = 4  # doublings of the first setting, while it meets the loosest target
 NEARBY = 1.2  # a setting less coarser than that is not worth a run
 MOST = 24  # runs of one walk
 FLAT = 1.5  # two steps in a row that gain less than this, below `ROUNDED`, have met rounding
-ROUNDED = 1e-8
 STOPS = ("all targets met", "rounding", "budget", "least tolerance", "nothing to set", "too many runs")
 
 
@@ -52,26 +51,6 @@ def spans(scene: Scene, periods: Sequence[float]) -> list[float]:
     return [count * period for count in periods]
 
 
-def coarsest_step(scene: Scene, horizon: float) -> float:
-    """The longest fixed step that is tried: a quarter of the horizon and about a quarter of a nutation."""
-    return min(0.25 * horizon, scene.nutation_period / LEAST_STEPS)
-
-
-def first_setting(method: Integrator, scene: Scene, horizon: float) -> float:
-    """The coarsest setting that is tried at first; incommensurate with the nutation."""
-    if method.knob == "tolerance":
-        return 1e-2
-    period = scene.time_scale(horizon)
-    power = method.order or 2
-    return period / (7.37 if power <= 2 else 5.37 if power <= 4 else LEAST_STEPS)
-
-
-def least_setting(method: Integrator) -> float:
-    """The finest setting the method allows."""
-    tedious = method.tier == "python" and method.explicit is False  # radau at 1e-12: a minute for ten nutations
-    return max(method.least_tolerance, 1e-8 if tedious else 0.0) * 1.001 if method.knob == "tolerance" else 0.0
-
-
 class Walk:
     """All runs of one method on one scene to one horizon, by setting."""
 
@@ -79,7 +58,8 @@ class Walk:
         self.scene, self.method, self.horizon, self.budget = scene, method, horizon, budget
         self.rows: dict[float, Row] = {}
         self.stopped = ""
-        self.power = float(method.order or (2 if method.knob == "step_size" else 8))
+        self.power = float(method.order or (2 if method.fixed_step else 8))
+        self.finest, self.coarsest = limits(scene, method, horizon)
 
     def run(self, setting: float) -> Row:
         """Measure a setting, once."""
@@ -95,13 +75,11 @@ class Walk:
 
     def growth(self, ratio: float) -> float:
         """How the work grows if the setting is divided by `ratio`."""
-        return ratio if self.method.knob == "step_size" else ratio ** (1.0 / min(self.power + 1.0, 20.0))
+        return ratio if self.method.fixed_step else ratio ** (1.0 / min(self.power + 1.0, 20.0))
 
     def descend(self, targets: Sequence[float], expected: float) -> None:
         """Walk from coarse to fine; `expected` is the work of the first run, if known."""
-        setting, finest = first_setting(self.method, self.scene, self.horizon), least_setting(self.method)
-        stepping = self.method.knob == "step_size"
-        setting = min(setting, coarsest_step(self.scene, self.horizon)) if stepping else setting
+        setting, stepping = coarse_setting(self.scene, self.method, self.horizon), self.method.fixed_step
         ratio = min(max(10.0 ** (DECADES / self.power), 1.35), 3.5) if stepping else 10.0**NOTCHES
         flat, last, work = 0, math.inf, expected
         while True:
@@ -111,9 +89,9 @@ class Walk:
             error = self.error(setting)
             work = float(self.rows[setting]["force_evaluations"])
             flat = flat + 1 if error < ROUNDED and error > last / FLAT else 0
-            if error <= min(targets) or flat == 2 or setting <= finest or len(self.rows) >= MOST:
+            if error <= min(targets) or flat == 2 or setting <= self.finest or len(self.rows) >= MOST:
                 met, stuck = error <= min(targets), flat == 2
-                least = setting <= finest
+                least = setting <= self.finest
                 self.stopped = STOPS[0] if met else STOPS[1] if stuck else STOPS[3] if least else STOPS[5]
                 return
             last = error
@@ -121,14 +99,13 @@ class Walk:
             if self.growth(ratio) > room > self.growth(1.3) and stepping:
                 setting, work = setting / room, self.budget  # the last run that can be afforded
             else:
-                setting, work = max(setting / ratio, finest), work * self.growth(ratio)
+                setting, work = max(setting / ratio, self.finest), work * self.growth(ratio)
 
     def coarsen(self, target: float) -> None:
         """Coarser settings, as long as they meet the loosest target."""
         for _ in range(COARSER):
             last = max(self.rows)
-            most = coarsest_step(self.scene, self.horizon) if self.method.knob == "step_size" else 0.4
-            setting = min(2.0 * last, most)
+            setting = min(2.0 * last, self.coarsest)
             if setting < NEARBY * last or self.error(last) > target:
                 return
             self.run(setting)
@@ -141,13 +118,8 @@ class Walk:
             if not met or met[0] == 0 or self.error(settings[met[0]]) >= CLOSE * target:
                 return
             fine, coarse = settings[met[0]], settings[met[0] - 1]
-            low, high = self.error(fine), self.error(coarse)
-            if math.isinf(high) or low <= 0.0 or high > 1e6 * low:
-                part = 0.5
-            else:
-                part = min(max(math.log(AIM * target / low) / math.log(high / low), 0.1), 0.9)
-            setting = fine * (coarse / fine) ** part
-            if self.method.knob == "step_size" and round(self.horizon / setting) in {
+            setting = between(fine, self.error(fine), coarse, self.error(coarse), AIM * target)
+            if self.method.fixed_step and round(self.horizon / setting) in {
                 round(self.horizon / fine), round(self.horizon / coarse)
             }:  # fmt: skip
                 return

@@ -102,6 +102,22 @@ SMALLEST_FIRST = {
 _CLAIM = {True: "yes", False: "no", None: "unknown"}
 
 
+class Setting(NamedTuple):
+    """A value of an integrator's control: a step, a tolerance, or NaN where there is nothing to set."""
+
+    control: str | None  # step_size, tolerance or None
+    value: float
+
+    def kwargs(self) -> dict[str, float]:
+        """The argument of `simulate` that it stands for."""
+        return {} if self.control is None else {self.control: self.value}
+
+    @property
+    def label(self) -> str:
+        """What a sentence calls it."""
+        return f"{(self.control or 'nothing').replace('_', ' ')} {self.value:.4g}"
+
+
 @dataclass(frozen=True)
 class Integrator:
     """One integrator: its name, its claims, and how to run it.
@@ -164,6 +180,20 @@ class Integrator:
                 f"tolerance of {self.name} must be at least {self.least_tolerance:.3g} and below 1, not {value!r}"
             )
         return finite("tolerance", value)
+
+    @property
+    def fixed_step(self) -> bool:
+        """Is a step what a user sets?"""
+        return self.knob == "step_size"
+
+    @property
+    def adaptive(self) -> bool:
+        """Is a tolerance what a user sets?"""
+        return self.knob == "tolerance"
+
+    def setting(self, value: float) -> Setting:
+        """A value of what a user sets."""
+        return Setting(self.knob, value)
 
     def charts(self) -> tuple[str, ...]:
         """The charts this integrator works in."""

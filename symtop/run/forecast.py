@@ -9,10 +9,6 @@ errors shear, they do not grow exponentially), so that an error e_1 of one piece
 Symplectic and symmetric methods commit no error along which N shears, and theirs grows linearly. Where two nutations
 cost too much, the probe takes a coarser step and scales its error by the declared order; the passage of a pole is
 then probed by itself at the step of the run.
-
-A step map is linearised where the reduced top stands still: at the steady precession with the momenta of the start,
-one step from two sides of theta and of p_theta gives a matrix of 2 x 2, whose eigenvalues say whether small nutations
-stay small and by what angle a step turns them. This is exact for any method, and needs no table of its coefficients.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters X.3 and XI.3.
 """
 
@@ -40,7 +36,6 @@ PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have misse
 LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nutation: a few of its steps, milliseconds
 LEAST_GROWTH = 0.05  # of the error of a piece: less growth from the first to the second is luck
 RESOLVED = 0.3  # rad that the axis may precess in one step at a pole: coarser probes say nothing about the passage
-ASIDE = 1e-5  # rad; how far a step map's starts are set aside, which leaves 1e-10 of its entries
 
 
 class Landmarks(NamedTuple):
@@ -110,7 +105,7 @@ def _probe(
         start = Angles(*(float(value) for value in form(since)))
     place = np.arange(1.0, POINTS + 1.0)
     place[:-1] += np.mod(GOLDEN * place[:-1], 1.0) - 0.5  # not commensurate with the nutation
-    if method.knob == "step_size":
+    if method.fixed_step:
         steps = max(1, round(duration / step))
         marks = np.unique(np.maximum(np.rint(place * (steps / POINTS)).astype(np.int64), 1))
         piece = Plan.steps(step, marks)
@@ -155,7 +150,7 @@ def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
     straight = bool(method.symplectic or method.symmetric)
     period = marks.period if math.isfinite(marks.period) else plan.horizon
     share, twice = min(SHARE * plan.horizon, MOST_NUTATIONS * period), min(2.0 * period, plan.horizon)
-    if method.knob == "tolerance":
+    if method.adaptive:
         cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
         least = twice if cheap.tier == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
         piece = max(share, least)
@@ -198,37 +193,3 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Foreca
     turns = plan.horizon / marks.period
     rounding = marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0
     return Forecast(expected, rounding, steps, samples, passage, probe.outcome, probe.reached)
-
-
-def step_map(scene: Scene, method: Integrator, chart: str, step: float) -> charts.Array | None:
-    """One step linearised about the steady precession with the scene's momenta, on (theta, p_theta / I1 omega).
-
-    None where that precession stands on a pole, small nutations have no frequency, or a step fails.
-    """
-    top, marks, momenta = scene.top, landmarks(scene), scene.top.momenta(scene.start)
-    theta = top.steady_theta(momenta)
-    if not ASIDE < theta < math.pi - ASIDE or marks.frequency <= 0.0:
-        return None
-    columns = []
-    size = np.array([1.0, top.I1 * marks.frequency])
-    plan = Plan.steps(step, [1])
-    for aside, nod in ((ASIDE, 0.0), (0.0, ASIDE * marks.frequency)):
-        ends = []
-        for sign in (1.0, -1.0):
-            start = _with_momenta(top, theta + sign * aside, sign * nod, momenta.north, momenta.south)
-            run = solve(method, chart, top, start, plan)
-            if run.outcome != "ok":
-                return None
-            seen = view(chart, top, np.asarray(run.states)[0])
-            ends.append(np.array([seen.theta, seen.p_theta]))
-        columns.append((ends[0] - ends[1]) / (2.0 * ASIDE * size))
-    matrix = np.stack(columns, axis=1)
-    return matrix if np.isfinite(matrix).all() else None
-
-
-def _with_momenta(top: SymmetricTop, theta: float, theta_dot: float, north: float, south: float) -> Angles:
-    """A state with given p_phi - p_psi and p_phi + p_psi."""
-    x = 0.5 * theta
-    precession = (north / math.sin(x) ** 2 + south / math.cos(x) ** 2) / (4.0 * top.I1)
-    spin = 0.5 * (south - north) / top.I3 - precession * math.cos(theta)
-    return Angles(theta, theta_dot=theta_dot, phi_dot=precession, psi_dot=spin)

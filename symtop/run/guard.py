@@ -17,17 +17,16 @@ and `simulate` dithers samples that would fall on the same phases.
 
 import math
 
-import numpy as np
-
 from symtop.methods.outcomes import sentence
 from symtop.methods.registry import Integrator, Plan
 from symtop.model.scenes import Scene
-from symtop.run.forecast import Forecast, Landmarks, forecast, landmarks, step_map
+from symtop.run.forecast import Forecast, Landmarks, forecast, landmarks
+from symtop.run.linear_stability import trace
 
 EXPECTED = 2e-2  # rad; a larger forecast is worth a warning (of compiled methods, it was 0.38 of the error or more)
 AIM = 1e-3  # rad, what a remedy aims at
 SMALL_TURN = 0.3  # h omega below which no method loses small nutations
-GROWS = 1e-3  # how much larger than 1 a multiplier of the step map is when small nutations grow
+GROWS = 1e-3  # a step that multiplies small nutations by more than 1 + GROWS loses them
 NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a resonance
 COARSE = 1.0  # rad of precession in a step
 
@@ -41,23 +40,15 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan) -> str:
     return f"{method.name} on {scene.name}: {reason}" if reason else ""
 
 
-def _turn(scene: Scene, method: Integrator, chart: str, step: float) -> float:
-    """The angle by which a step turns small nutations; inf if they grow instead, nan if nobody can say."""
-    matrix = step_map(scene, method, chart, step)
-    if matrix is None:
-        return math.nan
-    multiplier = np.linalg.eigvals(matrix)
-    return math.inf if float(np.max(np.abs(multiplier))) > 1.0 + GROWS else abs(float(np.angle(multiplier[0])))
-
-
 def _unstable(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks) -> str:
     step = plan.step_size
-    if not step * marks.frequency > SMALL_TURN or not math.isinf(_turn(scene, method, chart, step)):
+    if not step * marks.frequency > SMALL_TURN or not trace(method, scene, step, chart).growth > 1.0 + GROWS:
         return ""
     good, bad = SMALL_TURN / marks.frequency, step
     while bad - good > 1e-3 * bad:
         middle = 0.5 * (good + bad)
-        good, bad = (good, middle) if math.isinf(_turn(scene, method, chart, middle)) else (middle, bad)
+        stable = trace(method, scene, middle, chart).growth <= 1.0 + GROWS
+        good, bad = (middle, bad) if stable else (good, middle)
     return (
         f"small nutations (frequency {marks.frequency:.4g}) grow at a step of {step:.4g}, the method is stable up to "
         f"{good:.4g} (h omega = {good * marks.frequency:.3f}); take a step below {0.5 * good:.2g}"
@@ -87,7 +78,7 @@ def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Land
             f"below {marks.period / 20.0:.2g}"
         )
     if step * frequency > SMALL_TURN:
-        turn = _turn(scene, method, chart, step)
+        turn = trace(method, scene, step, chart).turn
         for order in (3, 4):
             if abs(order * turn - 2.0 * math.pi) < NEAR * order:
                 return (
@@ -96,7 +87,7 @@ def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Land
                 )
     if expected.outcome != "ok":
         return f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon)}"
-    if method.knob == "tolerance":
+    if method.adaptive:
         tolerance = max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance)
         return f"{size}: errors add up over {plan.horizon / marks.period:.3g} nutations; try tolerance {tolerance:.1g}"
     return (

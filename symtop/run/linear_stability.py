@@ -16,6 +16,7 @@ a^2 = 4 + h^2; the motion itself sleeps for a >= 2. Source: Hairer, Lubich, Wann
 sections I.5 and X.4 (stability, resonance); Arnold, Mathematical Methods of Classical Mechanics, appendix 7.
 """
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -58,15 +59,28 @@ class Trace(NamedTuple):
             return math.nan
         return float(np.max(np.abs(np.roots([1.0, -self.trace, self.determinant]))))
 
+    @property
+    def turn(self) -> float:
+        """The angle by which a step turns small nutations, rad; 0 or pi if they grow or shrink without turning."""
+        return math.acos(min(max(0.5 * self.trace / math.sqrt(abs(self.determinant) or 1.0), -1.0), 1.0))
+
 
 NO_TRACE = Trace(math.nan, math.nan, math.nan)
 
 
-def trace(method: Integrator, scene: Scene, h: float, rounds: int = 6) -> Trace:
-    """The trace of the map of one step h at the fixed point that the method has near a steady precession."""
+@functools.lru_cache(maxsize=256)
+def _standing(top: SymmetricTop, momenta: Momenta) -> float:
+    return top.steady_theta(momenta)
+
+
+def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None, rounds: int = 6) -> Trace:
+    """The trace of the map of one step h at the method's fixed point next to the steady precession of these momenta.
+
+    In the chart that shows the axis unless another is given.
+    """
     top, momenta = scene.top, scene.top.momenta(scene.start)
-    chart, standing = method.chart_for("axis"), scene.start.theta
-    theta, traced, moved = standing, NO_TRACE, math.inf
+    chart = chart or method.chart_for("axis")
+    theta, moved = _standing(top, momenta), math.inf
     for _ in range(rounds):
         if not 1e-3 < theta < math.pi - 1e-3:
             return NO_TRACE
@@ -81,9 +95,8 @@ def trace(method: Integrator, scene: Scene, h: float, rounds: int = 6) -> Trace:
         if denominator == 0.0:
             return NO_TRACE
         last, moved = moved, abs(c / denominator)
-        traced = Trace(t, d, theta)
         if moved < NUDGE:
-            return traced
+            return Trace(t, d, theta)
         if moved > 2.0 * last:
             return NO_TRACE
         theta += c / denominator

@@ -25,18 +25,9 @@ from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import view
 from symtop.run.guard import warning
 
-__all__ = [
-    "as_dataset", "choose_chart", "make_plan", "sample_times", "simulate", "solve_plan",
-]  # fmt: skip
-
 MOST_STEPS = 20_000_000_000  # ten minutes of the fastest kernel
 MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
 WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
-
-
-def choose_chart(method: Integrator, observe: str) -> str:
-    """The smallest chart that shows what is observed (alias for studies and benchmarks of `Integrator.chart_for`)."""
-    return method.chart_for(observe)
 
 
 def _unseen(times: Any, period: float) -> float:
@@ -69,15 +60,16 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
 def make_plan(
     scene: Scene,
     method: Integrator,
-    step_size: object,
-    tolerance: object,
+    step_size: object = None,
+    tolerance: object = None,
+    *,
     horizon: float,
     samples: int,
     budget: float | None = None,
 ) -> tuple[Plan, bool]:
-    """Check the knobs against the integrator and the budget, and lay out steps and samples."""
+    """Check the step or tolerance against the integrator and the budget, and lay out steps and samples."""
     period = scene.nutation_period
-    if method.knob == "step_size":
+    if method.fixed_step:
         if tolerance is not None:
             raise SymtopError(f"{method.name} has a fixed step: give step_size, not tolerance = {tolerance!r}")
         if step_size is None:
@@ -95,11 +87,11 @@ def make_plan(
         return Plan.steps(horizon / steps, marks, horizon), dithered
     if step_size is not None:
         raise SymtopError(f"{method.name} chooses its own steps: give tolerance, not step_size = {step_size!r}")
-    if method.knob is None and tolerance is not None:
+    if not method.adaptive and tolerance is not None:
         raise SymtopError(f"{method.name} has nothing to tune: leave tolerance out, not {tolerance!r}")
-    bound = math.nan if method.knob is None else method.check_tolerance(tolerance)
+    bound = method.check_tolerance(tolerance) if method.adaptive else math.nan
     swings = horizon * max(1.0 / period, math.sqrt(abs(scene.top.mgl) / scene.top.I1) / (2.0 * math.pi))
-    if method.knob is not None and swings > MOST_SWINGS:
+    if method.adaptive and swings > MOST_SWINGS:
         raise SymtopError(
             f"horizon {horizon!r} is {swings:.3g} swings of the top; an adaptive method may take {MOST_SWINGS:.3g}"
         )
@@ -144,7 +136,7 @@ def simulate(
         raise SymtopError(f"samples must be at most {MOST_SAMPLES}, not {count}")
     chart = method.chart_for(watched)
     limit = None if budget is None else positive("budget", budget)
-    plan, dithered = make_plan(chosen, method, step_size, tolerance, end, count, limit)
+    plan, dithered = make_plan(chosen, method, step_size, tolerance, horizon=end, samples=count, budget=limit)
     caution = warning(chosen, method, chart, plan) if guard is not False else "off"
     if guard is not False and caution:
         if callable(guard):

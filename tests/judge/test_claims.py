@@ -140,7 +140,7 @@ def test_a_law_is_named_only_if_the_interval_excludes_its_neighbours(size, slope
 def test_a_run_too_short_for_an_exponent_is_not_called_bounded():
     short = np.where(TIME < 4.0, WAVE + 1e-6, np.nan)  # ends before the last two decades begin
     found = long._judged(TIME, short, short[:2], 2000)
-    assert math.isnan(found.exponent)
+    assert math.isnan(found.changed.exponent)
     assert (found.kind, found.grows) == ("unknown", None)
 
 

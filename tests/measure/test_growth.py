@@ -6,10 +6,10 @@ from symtop_studies.drift.long_runs import elapsed_steps, members
 from symtop_studies.drift.phase_loss import phase_loss
 
 import symtop
-from symtop.measure import modified_energy as shadow
-from symtop.measure.clock import Clock
 from symtop.measure.conservation import history
 from symtop.measure.growth import change_point, ensemble_growth, growth, horizon, law, lost_at
+from symtop.measure.phase import nutation_phase
+from symtop.run import modified_energy as shadow
 from symtop.run.long_run import chart_of, scattered, watch
 
 TIME = np.linspace(0.0, 1000.0, 4001) + 0.3 * np.sin(np.arange(4001))
@@ -102,18 +102,24 @@ def test_a_phase_that_is_not_lost_has_no_horizon():
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "cusp", "fast", "hairer-lubich-wanner"])
 def test_the_truth_is_never_late_and_a_shift_is_measured(name):
     where = symtop.scene(name)
-    clock, exact = Clock(where), symtop.ClosedForm(where.top, where.start)
+    exact = symtop.ClosedForm(where.top, where.start)
     times = np.linspace(0.0, 300.7 * where.nutation_period, 3001)
     motion = exact(times)
-    assert np.max(np.abs(clock.error(times, motion.theta, motion.theta_dot))) < 1e-9
+    assert np.max(np.abs(nutation_phase(where, times, motion.theta, motion.theta_dot))) < 1e-9
     ahead = exact(times * (1.0 + 1e-4))
     expected = 2.0 * np.pi * 1e-4 * times / where.nutation_period
-    assert clock.error(times, ahead.theta, ahead.theta_dot) == pytest.approx(expected, abs=1e-9)
+    assert nutation_phase(where, times, ahead.theta, ahead.theta_dot) == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_steady_precession_has_no_phase():
-    with pytest.raises(symtop.SymtopError, match="scene steady has no nutation"):
-        Clock(symtop.scene("steady"))
+def test_a_steady_precession_and_a_failed_sample_have_no_phase():
+    steady, spheroid = symtop.scene("steady"), symtop.scene("spheroid")
+    times = np.linspace(0.0, 9.0, 101)
+    for where, phased in ((steady, 0), (spheroid, 60)):
+        motion = symtop.ClosedForm(where.top, where.start)(times)
+        theta = np.where(np.arange(101) < 60, motion.theta, np.nan)
+        phase = nutation_phase(where, times, theta, motion.theta_dot)
+        assert np.isfinite(phase).sum() == phased
+        assert not np.isfinite(phase[60:]).any()
 
 
 def test_laws_of_growth_of_a_symplectic_method_and_of_runge_kutta():

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from symtop.measure.settings import ladder
 
 import symtop
 from symtop.measure import verdicts
-from symtop.measure.accuracy import error_table, ladder
+from symtop.measure.accuracy import error_table
 from symtop.measure.conservation import trend
 from symtop.measure.errors import errors_against
 from symtop.measure.growth import growth

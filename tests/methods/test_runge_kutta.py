@@ -111,7 +111,7 @@ def test_bad_tableaux_are_refused(a, b, c, words):
 
 
 def _walk(scene, tolerance, horizon, pair=dormand_prince.DORMAND_PRINCE):
-    plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon, 301)
+    plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon=horizon, samples=301)
     return plan, dormand_prince.solve(scene.top, scene.start, plan, pair)
 
 

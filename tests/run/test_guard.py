@@ -15,8 +15,9 @@ from symtop.methods.registry import integrators
 from symtop.model import charts
 from symtop.model.scenes import closed_form, grazing, steady
 from symtop.run import forecast, guard
-from symtop.run.forecast import Probe, grown, landmarks, step_map
+from symtop.run.forecast import Probe, grown, landmarks
 from symtop.run.guard import EXPECTED
+from symtop.run.linear_stability import trace
 from symtop.run.simulation import make_plan
 
 WRONG, RIGHT = 0.1, 1e-3  # rad
@@ -110,24 +111,27 @@ def test_errors_are_grown_by_their_law(law, straight):
         assert grown(probe, 1000.0, straight=True) < 0.1 * law(1000.0)
 
 
+def nutating():
+    """A motion that nutates about a steady precession."""
+    return symtop.Scene("nutating", steady(20.0).top, symtop.Angles(1.0, theta_dot=1.0, psi_dot=20.0), 60.0)
+
+
 @pytest.mark.parametrize("turn", [0.3, 1.0, 1.7, 1.99])
-def test_a_step_map_is_what_linear_theory_says(turn):
-    """Verlet turns by 2 asin(h omega/2), the midpoint rule by 2 atan(h omega/2); both maps keep areas."""
-    scene = steady(20.0)
+def test_the_trace_of_any_motion_is_what_linear_theory_says(turn):
+    """Verlet turns by 2 asin(h omega/2), the midpoint rule by 2 atan(h omega/2)."""
+    scene = nutating()
     h = turn / landmarks(scene).frequency
     for name, angle in (("stormer-verlet", 2.0 * math.asin(0.5 * turn)), ("midpoint", 2.0 * math.atan(0.5 * turn))):
-        matrix = step_map(scene, symtop.integrator(name), "angles", h)
-        assert np.linalg.det(matrix) == pytest.approx(1.0, abs=1e-8)
-        assert math.acos(0.5 * np.trace(matrix)) == pytest.approx(angle, abs=1e-6)
+        traced = trace(symtop.integrator(name), scene, h, "angles")
+        assert traced.turn == pytest.approx(angle, abs=1e-6)
+        assert traced.theta == pytest.approx(scene.top.steady_theta(scene.top.momenta(scene.start)), abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["strang", "gauss-4", "rk4"])
-def test_a_step_map_in_space_turns_a_small_step_by_omega(name):
-    scene = steady(20.0)
-    frequency = landmarks(scene).frequency
-    method = symtop.integrator(name)
-    matrix = step_map(scene, method, "axis", 0.01 / frequency)
-    assert abs(np.angle(np.linalg.eigvals(matrix)[0])) == pytest.approx(0.01, rel=1e-5)
+def test_the_trace_in_space_turns_a_small_step_by_omega(name):
+    scene = nutating()
+    traced = trace(symtop.integrator(name), scene, 0.1 / landmarks(scene).frequency, "axis")
+    assert traced.turn == pytest.approx(0.1, rel=1e-5)
 
 
 def test_the_limits_of_verlet_and_rk4_are_found():
@@ -159,13 +163,12 @@ def test_landmarks_are_those_of_the_closed_form():
 def test_each_cause_is_named():
     fast = steady(20.0)
     frequency = landmarks(fast).frequency
-    nutating = symtop.Scene("nutating", fast.top, symtop.Angles(1.0, theta_dot=1.0, psi_dot=20.0), 60.0)
     assert "the upper pole" in said(grazing(1e-3), "stormer-verlet", step_size=0.02)
     assert said(grazing(1e-3), "strang", step_size=2e-3) == ""  # no pole in its chart
     assert "separatrix" in said("separatrix", "gauss-8", step_size=0.01, horizon=150.0)
     assert said("separatrix", "gauss-8", step_size=0.01, horizon=15.0) == ""
     assert "jumps over the nutation" in said("goldstein", "gauss-4", step_size=2.0)
-    assert "1/3 of a turn, a resonance" in said(nutating, "stormer-verlet", step_size=math.sqrt(3.0) / frequency)
+    assert "1/3 of a turn, a resonance" in said(nutating(), "stormer-verlet", step_size=math.sqrt(3.0) / frequency)
     assert "errors add up over" in said("goldstein", "midpoint", step_size=0.1, horizon=1000.0)
     assert "tolerance" in said("goldstein", "rk45-compiled", tolerance=1e-5, horizon=1000.0)
     assert "stopped at t =" in said("spheroid", "gauss-2", step_size=0.5, observe="axis")
@@ -197,7 +200,7 @@ def test_a_remedy_is_a_remedy(scene, name, knob, horizon):
 def test_the_guard_costs_less_than_two_milliseconds():
     where, method = symtop.scene("spheroid"), symtop.integrator("midpoint")
     for step, horizon in ((0.01, 8.0), (1e-4, 8.0), (1e-3, 1000.0)):
-        plan, _ = make_plan(where, method, step, None, horizon, 501)
+        plan, _ = make_plan(where, method, step, horizon=horizon, samples=501)
         kernel, guarded = timings(
             [
                 lambda plan=plan: method.solvers["angles"](where.top, where.start, plan),
@@ -214,7 +217,7 @@ def test_every_method_can_be_probed_and_is_told_what_it_can_do():
         knob = {"step_size": 0.01} if method.knob == "step_size" else {}
         if method.knob == "tolerance" and method.default_tolerance is None:
             knob = {"tolerance": 1e-6 if method.tier == "compiled" else 1e-5}
-        plan, _ = make_plan(where, method, knob.get("step_size"), knob.get("tolerance"), 3.0, 11)
+        plan, _ = make_plan(where, method, **knob, horizon=3.0, samples=11)
         found = forecast.forecast(where, method, method.charts()[0], plan)
         assert found.outcome == "ok"
         assert found.axis_error < 1e-2

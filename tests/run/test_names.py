@@ -56,7 +56,7 @@ def test_long_run_modified_energy_stability_and_forecast_do_not_look_at_the_name
     )
     assert sleeping_threshold_in_theory(own, 0.4) == sleeping_threshold_in_theory(other, 0.4)
     assert sleeping_threshold(own, 0.4) == sleeping_threshold(other, 0.4)
-    plans = [make_plan(SCENE, method, h, None, 8.0, 101)[0] for method in (own, other)]
+    plans = [make_plan(SCENE, method, h, horizon=8.0, samples=101)[0] for method in (own, other)]
     assert forecast(SCENE, own, chart, plans[0]) == forecast(SCENE, other, chart, plans[1])
 
 
@@ -74,7 +74,7 @@ def test_a_slow_solver_is_forecast_by_its_compiled_twin_whatever_its_name():
     own = symtop.integrator("rk45")
     other = dataclasses.replace(own, name="renamed")
     plain = dataclasses.replace(own, name="renamed", same_steps_as=None)
-    plan, _ = make_plan(SCENE, own, None, 1e-8, 8.0, 101)
+    plan, _ = make_plan(SCENE, own, None, 1e-8, horizon=8.0, samples=101)
     expected = forecast(SCENE, own, "angles", plan)
     np.testing.assert_equal(tuple(forecast(SCENE, other, "angles", plan)), tuple(expected))  # some are nan
     assert (

@@ -1,0 +1,222 @@
+"""The setting of a method, a step or a tolerance: its limits, ladders of them, and the search for one.
+
+The error of a quantity over a horizon T follows C T^a s^p: s the setting, p the order of a fixed-step method and about
+1 of an adaptive one, a the law of growth (energy, momenta and mean frequencies 0 and angles 1 for maps that are
+symplectic or symmetric, 1 and 2 for the others, whose frequencies drift with the energy). So log error is close to a
+straight line in log setting. `seek` steps along that line with the known power until one run misses the target and
+another meets it, and then along the line through both.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from symtop.measure.accuracy import error_row
+from symtop.measure.phase import FREQUENCIES
+from symtop.measure.timing import bare_run, timings
+from symtop.methods.registry import Integrator, integrators
+from symtop.model.scenes import Scene
+
+LEAST_STEPS = 4.37  # a nutation; not commensurate with it
+LOOSEST = 0.4  # tolerance
+COARSEST_TOLERANCE = 1e-2  # of a ladder or a walk
+TEDIOUS = 1e-8  # the least tolerance of an implicit method in Python: radau at 1e-12 takes a minute for ten nutations
+SHORT = 12.37  # nutations of a trial run
+LEAST = 0.3  # of the target: the least error that ends a search
+TRIES = 9  # runs of a search
+MOST_EVALUATIONS = {"compiled": 3e8, "python": 3e5}  # of one run
+FLAT, ROUNDED = 1.3, 1e-8  # a finer setting that gains less has met rounding, if its error is below this
+
+STOPPED = "Stopped by rounding or by what the method's settings allow"
+BUDGET = "Not within the work that a run may take"
+FAILED = "No run ended well"
+TRIED = f"Not within {TRIES} runs"
+
+
+# ---- limits and ladders ----------------------------------------------------------------------------------------------
+
+
+def least_tolerance(method: Integrator) -> float:
+    """The least tolerance that an adaptive method is tried with."""
+    return max(method.least_tolerance, TEDIOUS if method.tier == "python" and method.explicit is False else 0.0)
+
+
+def limits(scene: Scene, method: Integrator, horizon: float) -> tuple[float, float]:
+    """The finest and the coarsest setting; a step is at most a quarter of the horizon and about that of a nutation."""
+    if method.fixed_step:
+        return 0.0, min(0.25 * horizon, scene.nutation_period / LEAST_STEPS)
+    return 1.001 * least_tolerance(method), LOOSEST
+
+
+def coarse_setting(scene: Scene, method: Integrator, horizon: float) -> float:
+    """The setting that a walk from coarse to fine begins with."""
+    if not method.fixed_step:
+        return COARSEST_TOLERANCE
+    power = method.order or 2
+    step = scene.time_scale(horizon) / (7.37 if power <= 2 else 5.37 if power <= 4 else LEAST_STEPS)
+    return min(step, limits(scene, method, horizon)[1])
+
+
+def step_ladder(method: Integrator, scene: Scene, horizon: float, count: int = 13, most: float = 4e6) -> list[float]:
+    """Steps from ten a nutation down to where the method meets round-off or `most` steps, evenly in the logarithm.
+
+    The finest step of a method of order p resolves a nutation about 10 * 10^(11/p) times; methods of high order, whose
+    steps have many stages, begin at five.
+    """
+    period = scene.time_scale(horizon)
+    power = method.order or 2
+    first = 10.37 if power <= 4 else 5.37  # nothing here may be commensurate with the nutation
+    decades = min(4.5, 11.0 / power + math.log10(10.37 / first), max(math.log10(most * period / horizon / first), 0.5))
+    return [period / (first * 10.0 ** (decades * k / (count - 1))) for k in range(count)]
+
+
+def tolerance_ladder(method: Integrator, count: int = 9) -> list[float]:
+    """Tolerances from 1e-2 down to the least, evenly in the logarithm."""
+    decades = -2.0 - math.log10(max(least_tolerance(method), 1e-18))
+    return [10.0 ** (-2.0 - 0.999 * decades * k / (count - 1)) for k in range(count)]
+
+
+def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, most: float = 4e6) -> list[float]:
+    """`count` settings of a method, coarse to fine; steps end at `most` of them."""
+    if method.fixed_step:
+        return step_ladder(method, scene, horizon, count, most)
+    return tolerance_ladder(method, count) if method.adaptive else [math.nan]
+
+
+# ---- the search ------------------------------------------------------------------------------------------------------
+
+
+def between(fine: float, low: float, coarse: float, high: float, goal: float) -> float:
+    """The setting between two whose errors are `low` and `high` at which the line through both in logs has `goal`.
+
+    At most nine tenths of the way to either; half the way where the errors show no line.
+    """
+    if math.isinf(high) or low <= 0.0 or high > 1e6 * low:
+        part = 0.5
+    else:
+        part = min(max(math.log(goal / low) / math.log(high / low), 0.1), 0.9)
+    return float(fine * (coarse / fine) ** part)
+
+
+def seek(
+    run: Callable[[float], tuple[float, float]],
+    guess: float,
+    target: float,
+    ends: tuple[float, float],
+    power: float,
+    *,
+    fixed_step: bool = True,
+    patience: float = math.inf,
+    least: float = LEAST,
+) -> float | str:
+    """The coarsest setting found whose error is at most the target, if possible `least` of it, or why there is none.
+
+    `run` takes a setting and returns the error, infinite after a failure, and the force evaluations of a run. `ends`
+    are the finest and the coarsest setting, `power` is that of the error in the setting. No run is begun that is
+    foreseen to take more than `patience` force evaluations.
+    """
+    (finest, coarsest), goal = ends, math.sqrt(least) * target
+    after_failure, finer, coarser = (0.4, 0.02, 8.0) if fixed_step else (0.01, 1e-5, 1e4)  # changes of a setting
+    setting, why, smallest = min(max(guess, finest), coarsest), TRIED, math.inf
+    met: tuple[float, float] | None = None  # the coarsest setting that meets the target, with its error
+    missed: tuple[float, float] | None = None  # the finest that does not
+    for _ in range(TRIES):
+        last = setting
+        error, evaluations = run(setting)
+        smallest = min(smallest, error)
+        if error <= target:
+            met = setting, error
+            if error >= least * target or setting >= coarsest:
+                break
+        elif met is None and missed is not None and missed[1] < FLAT * error < ROUNDED:
+            why = STOPPED  # a finer setting gains nothing
+            break
+        else:
+            missed = setting, error
+        if met is not None and missed is not None:
+            if missed[0] < 1.15 * met[0]:
+                break
+            setting = between(*met, *missed, goal)
+        else:
+            change = (goal / max(error, 1e-3 * target)) ** (1.0 / power)
+            setting *= after_failure if math.isinf(error) else min(max(change, finer), coarser)
+            setting = min(max(setting, finest), coarsest)
+        if setting == last or evaluations * (last / setting if fixed_step else 1.0) > patience:
+            why = STOPPED if setting == last else BUDGET
+            break
+    if met is not None:
+        return met[0]
+    return FAILED if math.isinf(smallest) and why != BUDGET else why
+
+
+class Met(NamedTuple):
+    """A setting, the largest error measured with it over `horizon`, what the reference can judge, and its work."""
+
+    integrator: Integrator
+    setting: float
+    error: float
+    bound: float
+    horizon: float
+    evaluations: float
+
+
+def observed(quantity: str) -> str:
+    """What must be observed to see a quantity: the attitude only for itself."""
+    return "attitude" if quantity == "attitude" else "axis"
+
+
+def growth(method: Integrator, quantity: str) -> int:
+    """The exponent a of the error's growth with the horizon that the method's traits promise."""
+    angles = quantity in ("axis", "attitude", "theta")
+    structured = bool(method.symplectic) or bool(method.symmetric)
+    return (1 if angles else 0) + (0 if structured else 1)
+
+
+def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Met:
+    """One run; the error of a run that failed is infinite."""
+    row = error_row(scene, method, setting, horizon, observed(quantity), phases=quantity in FREQUENCIES)
+    error, bound, work = (float(row[name]) for name in (quantity, f"{quantity}_bound", "force_evaluations"))
+    good = row["outcome"] == "ok" and math.isfinite(error)
+    return Met(method, setting, error if good else math.inf, bound, horizon, work)
+
+
+def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
+    """The least error of a quantity that the reference can judge over a horizon; NaN if the motion does not show it."""
+    return attempt(scene, integrators()["exact"], math.nan, horizon, quantity).bound
+
+
+def search(
+    scene: Scene,
+    method: Integrator,
+    accuracy: float,
+    quantity: str,
+    horizon: float,
+    guess: float | None = None,
+    patience: float = math.inf,
+) -> Met | str:
+    """The coarsest setting found that meets the accuracy over the horizon, or the reason why there is none.
+
+    It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess. No run is begun that is
+    foreseen to take more than `patience` force evaluations.
+    """
+    ends, patience = limits(scene, method, horizon), min(patience, MOST_EVALUATIONS[method.tier])
+    power = float(method.order or 2) if method.fixed_step else 1.0
+    if guess is None:
+        guess = 0.2 * scene.time_scale(horizon) * accuracy ** (1.0 / power) if method.fixed_step else 0.1 * accuracy
+    if method.fixed_step and horizon / min(guess, ends[1]) > patience:
+        return BUDGET
+    tried: dict[float, Met] = {}
+
+    def run(setting: float) -> tuple[float, float]:
+        met = tried[setting] = attempt(scene, method, setting, horizon, quantity)
+        return met.error, met.evaluations
+
+    found = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience)
+    return found if isinstance(found, str) else tried[found]
+
+
+def seconds(scene: Scene, met: Met, quantity: str, horizon: float) -> float:
+    """Wall time of a bare run to a horizon with a setting: measured, or scaled from the run it was found by."""
+    chart = met.integrator.chart_for(observed(quantity))
+    run = timings([bare_run(scene, met.integrator, chart, met.setting, met.horizon)], batches=3, batch=0.004)
+    return float(run[0].best) * horizon / met.horizon
