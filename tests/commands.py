@@ -1,6 +1,8 @@
 """The command line in processes of its own, on the probe study."""
 
+import contextlib
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -26,9 +28,20 @@ def symtop(*words: object, cwd: Path | None = None, **environment: object) -> su
     )
 
 
+def stop(process: subprocess.Popen) -> None:
+    """Kill a command with its workers, and wait for it, so that a test that fails leaves no process behind."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+
+
 def ended(process: subprocess.Popen, seconds: float = 240.0) -> tuple[int, str, str]:
     """Exit code, output and errors of a command; none of them may hold a traceback or a leak."""
-    out, err = process.communicate(timeout=seconds)
+    try:
+        out, err = process.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        stop(process)
+        raise
     assert "Traceback" not in out + err, err
     assert "leaked" not in err, err
     return process.returncode, out, err

@@ -90,13 +90,17 @@ longrun.long_run(where, "midpoint", steps=12_000_000, step_size=where.nutation_p
 @pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGTERM])
 def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
     file = tmp_path / "run.nc"
-    child = subprocess.Popen([sys.executable, "-c", SCRIPT, str(file)], env={**os.environ, "PYTHONPATH": _root()})
-    deadline = time.monotonic() + 120.0
-    while not file.is_file() and child.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.01)
-    time.sleep(0.1)
-    child.send_signal(blow)
-    code = child.wait(60)
+    environment = {**os.environ, "PYTHONPATH": _root()}
+    with subprocess.Popen([sys.executable, "-c", SCRIPT, str(file)], env=environment) as child:
+        try:
+            deadline = time.monotonic() + 120.0
+            while not file.is_file() and child.poll() is None and time.monotonic() < deadline:
+                time.sleep(0.01)
+            time.sleep(0.1)
+            child.send_signal(blow)
+            code = child.wait(60)
+        finally:
+            child.kill()  # it is waited for even if the machine was too slow for the minute
     assert code == (-signal.SIGKILL if blow == signal.SIGKILL else 128 + signal.SIGTERM)
     monkeypatch.setattr(longrun, "LONGEST", 200_000)
     from symtop.base import datasets

@@ -22,7 +22,7 @@ from symtop.cli.main import main
 from symtop.methods import compiled
 from symtop.runner import run as runner
 from symtop.runner import store, work
-from tests.commands import PROBE, contents, ended, leftovers, symtop
+from tests.commands import PROBE, contents, ended, leftovers, stop, symtop
 from tests.kills import survive
 
 
@@ -274,7 +274,9 @@ def begun(log: Path, count: int, process) -> None:
         if log.is_file() and len(log.read_text().split()) >= count:
             return
         time.sleep(0.02)
-    pytest.fail(f"it never came to {count} cases: {process.poll()}")
+    code = process.poll()
+    stop(process)
+    pytest.fail(f"it never came to {count} cases: {code}")
 
 
 @pytest.mark.slow
