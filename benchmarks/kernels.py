@@ -52,7 +52,7 @@ def kernels() -> dict[tuple[str, str], twin.Kernel]:
     found = {
         (method.name, chart): twin.kernel_of(method, chart, scene, h)
         for method in symtop.integrators().values()
-        if method.fixed_step and method.tier == "compiled"
+        if method.fixed_step and method.implementation == "compiled"
         for chart in method.solvers
     }
     return {key: kernel for key, kernel in found.items() if kernel is not None}

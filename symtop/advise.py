@@ -178,7 +178,7 @@ def _usable(quantity: str) -> dict[str, Integrator]:
     return {
         name: method
         for name, method in integrators().items()
-        if method.knob is not None and method.tier == "compiled" and charts & method.solvers.keys()
+        if method.control is not None and method.implementation == "compiled" and charts & method.solvers.keys()
     }
 
 
@@ -234,7 +234,7 @@ def _try(
     law = (short / horizon) ** settings.growth(method, quantity)
     met = settings.search(scene, method, accuracy * law, quantity, short, guess, patience)
     if isinstance(met, str):
-        dear = met == settings.BUDGET and patience < settings.MOST_EVALUATIONS[method.tier]
+        dear = met == settings.BUDGET and patience < settings.MOST_EVALUATIONS[method.implementation]
         return f"Not within {TOO_DEAR:g} times the work of the best" if dear else met
     if method.fixed_step and horizon / met.setting > MOST_STEPS:
         return f"Would need more than {MOST_STEPS:.0e} steps"
@@ -247,7 +247,7 @@ def _confirm(scene: Scene, trial: _Trial, accuracy: float, quantity: str, horizo
     A trial that would need too many evaluations is returned as it is.
     """
     short = trial.met
-    if short.evaluations * horizon / short.horizon > settings.MOST_EVALUATIONS[short.integrator.tier]:
+    if short.evaluations * horizon / short.horizon > settings.MOST_EVALUATIONS[short.integrator.implementation]:
         return trial
     met = settings.search(scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting)
     if isinstance(met, str):

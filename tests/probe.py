@@ -22,8 +22,8 @@ METHODS = ("midpoint", "stormer-verlet", "strang", "gauss-4", "rk4", "rk45")
 
 def cases(quick: bool) -> list[Case]:
     methods = [*METHODS[: 2 if quick else None], *(name for name in integrators() if name.startswith("bad-"))]
-    knobs = {"rk45": {"tolerance": 1e-6}}
-    return [Case(w, name, knobs.get(name, {"step_size": 0.01})) for w in ("goldstein", "loop") for name in methods]
+    controls = {"rk45": {"tolerance": 1e-6}}
+    return [Case(w, name, controls.get(name, {"step_size": 0.01})) for w in ("goldstein", "loop") for name in methods]
 
 
 def measure(case: Case) -> xr.Dataset:

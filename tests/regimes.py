@@ -23,7 +23,7 @@ class Trial(NamedTuple):
 
     scene: Scene
     integrator: str
-    knob: dict
+    control: dict
     nutations: float
     warning: str
     outcome: str
@@ -59,7 +59,7 @@ def any_scene(draw: random.Random, name: str) -> Scene:
 
 def trial(draw: random.Random, name: str) -> Trial:
     """One run of one method: 1 to 500 steps a nutation or a tolerance of 0.1 to 1e-11, over 1 to 1000 nutations."""
-    method = draw.choice([entry for entry in integrators().values() if entry.knob is not None])
+    method = draw.choice([entry for entry in integrators().values() if entry.control is not None])
     where = any_scene(draw, name)
     period = where.nutation_period
     if not math.isfinite(period):
@@ -69,19 +69,19 @@ def trial(draw: random.Random, name: str) -> Trial:
         10.0 ** draw.uniform(0, 2.7),
         10.0 ** draw.uniform(-11, -1),
     )
-    if method.knob == "step_size":
-        knob = {"step_size": period / steps}
+    if method.control == "step_size":
+        control = {"step_size": period / steps}
         nutations = max(min(nutations, MOST_STEPS / steps), 3.0 / steps)
     else:
-        slow = 60.0 if method.tier == "python" else 1000.0
+        slow = 60.0 if method.implementation == "python" else 1000.0
         nutations = min(nutations, MOST_NUTATIONS.get(method.name, slow))
-        knob = {"tolerance": max(tolerance, method.least_tolerance, 1e-6 if method.name == "radau" else 0.0)}
+        control = {"tolerance": max(tolerance, method.least_tolerance, 1e-6 if method.name == "radau" else 0.0)}
     horizon = nutations * period
     observe = draw.choice(["axis", "attitude"])
-    plan, _ = make_plan(where, method, **knob, horizon=horizon, samples=501)
+    plan, _ = make_plan(where, method, **control, horizon=horizon, samples=501)
     said = guard.warning(where, method, method.chart_for(observe), plan)
-    run = symtop.simulate(where, method, horizon=horizon, observe=observe, guard=False, **knob)
+    run = symtop.simulate(where, method, horizon=horizon, observe=observe, guard=False, **control)
     with np.errstate(all="ignore"):
         error = charts.axis_distance(run["axis"].values, closed_form(where).axis(run["time"].values))
     largest = float(np.max(error)) if run.attrs["outcome"] == "ok" else math.inf
-    return Trial(where, method.name, knob, nutations, said, run.attrs["outcome"], largest)
+    return Trial(where, method.name, control, nutations, said, run.attrs["outcome"], largest)

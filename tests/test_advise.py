@@ -200,7 +200,9 @@ def test_sixty_random_tops():
                 searches = [
                     settings.search(scene, method, accuracy, "axis", scene.horizon, patience=2e6)
                     for method in symtop.integrators().values()
-                    if method.tier == "compiled" and method.knob is not None and method.name != "taylor-quad"
+                    if method.implementation == "compiled"
+                    and method.control is not None
+                    and method.name != "taylor-quad"
                 ]
                 best = min(
                     settings.seconds(scene, one, "axis", scene.horizon)

@@ -45,8 +45,8 @@ def with_start(plan: Plan) -> Array:
 
 
 def peer(
-    name: str, solve: Solver, summary: str, *, tier: str, knob: str = "tolerance", order: int | None = None,
-    least: float = 1e-15, chart: str = "axis",
+    name: str, solve: Solver, summary: str, *, implementation: str, control: str = "tolerance",
+    order: int | None = None, least: float = 1e-15, chart: str = "axis",
 ) -> Integrator:  # fmt: skip
     """An outside solver in the same record as our own methods, so that one code measures and times both."""
     return Integrator(
@@ -54,8 +54,8 @@ def peer(
         family="other",
         summary=summary,
         solvers={chart: solve},
-        knob=knob,
-        tier=tier,
+        control=control,
+        implementation=implementation,
         order=order,
         symplectic=False,
         least_tolerance=least,

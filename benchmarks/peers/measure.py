@@ -18,11 +18,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from symtop.measure.settings import seek, step_ladder
 
 import symtop
 from benchmarks.peers import Peer
 from symtop.measure.accuracy import SAMPLES, judge_limit
+from symtop.measure.settings import seek, step_ladder
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.registry import Integrator
 from symtop.model import charts
@@ -124,8 +124,8 @@ def ours(scene: Scene, tell: Callable[[str], None]) -> list[tuple[Peer, list[Poi
     rough: dict[float, list[tuple[float, str]]] = {target: [] for target in TARGETS}
     searched = {}
     for method in symtop.integrators().values():
-        if method.tier != "compiled" or method.knob is None or method.name.startswith("taylor-"):
-            continue  # no knob: the closed form, which is the truth here
+        if method.implementation != "compiled" or method.control is None or method.name.startswith("taylor-"):
+            continue  # no control: the closed form, which is the truth here
         points = worth_timing(search(scene, method))
         searched[method.name] = points
         if method.family == "taylor":
@@ -199,7 +199,7 @@ def _combined(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, 
     variables["package"] = ("integrator", [about[name].package for name in names])
     variables["version"] = ("integrator", [_version(about[name].distribution or about[name].package) for name in names])
     variables["formulation"] = ("integrator", [about[name].method.summary for name in names])
-    variables["tier"] = ("integrator", [about[name].method.tier for name in names])
+    variables["implementation"] = ("integrator", [about[name].method.implementation for name in names])
     return xr.Dataset(variables, coords={"scene": scenes, "integrator": names})
 
 

@@ -179,7 +179,7 @@ def tables(data: xr.Dataset) -> list[Table]:
     given = [
         [str(data[key].sel(integrator=name).values) for key in ("package", "version")]
         + [str(name)]
-        + [str(data[key].sel(integrator=name).values) for key in ("tier", "formulation")]
+        + [str(data[key].sel(integrator=name).values) for key in ("implementation", "formulation")]
         for name in data["integrator"].values
     ]
     header = ["scene", "package", *(f"axis error {target:.0e}" for target in TARGETS)]

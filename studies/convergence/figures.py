@@ -36,7 +36,7 @@ def _picture(data: xr.Dataset, quantity: str, power: int) -> Picture:
             ranked = ranked[np.isfinite(h[ranked]) & np.isfinite(error[ranked])]
             if not ranked.size:
                 continue
-            line = (0, (4, 2)) if "python" in cell["tier"].values else "-"
+            line = (0, (4, 2)) if "python" in cell["implementation"].values else "-"
             axis.plot(h[ranked], error[ranked], color=style.color, ls=line, lw=1.1, zorder=2)
             marks = {"marker": style.marker, "color": style.color, "ms": style.size}
             axis.plot(h[used], error[used], ls="none", zorder=3, **marks)

@@ -25,7 +25,7 @@ QUICK = (6, 4)  # settings and rows of a map of a slow method
 
 def solves_slowly(method: Integrator) -> bool:
     """Does it solve equations of a fixed order in plain Python? A run at a tolerance of 1e-10 then takes a second."""
-    return method.tier == "python" and method.explicit is False and method.order is not None
+    return method.implementation == "python" and method.explicit is False and method.order is not None
 
 
 def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool) -> tuple[list[float], list[float]]:
@@ -34,7 +34,7 @@ def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool)
     There are fewer where a run takes milliseconds; the map's "grid" says what was run.
     """
     settings, rows = steps.size, values.size
-    if method.tier == "python":
+    if method.implementation == "python":
         settings, rows = (13, 12) if solves_slowly(method) else (25, 24)
     elif method.adaptive and method.order is None:  # the order of a series grows with the accuracy
         settings, rows = (25, values.size) if method.speed == 1.0 else (13, 20)
@@ -43,7 +43,7 @@ def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool)
     parameters = values[:: -(-values.size // rows)].tolist()
     if method.fixed_step:
         return steps.tolist(), parameters
-    if method.knob is None:
+    if method.control is None:
         return [math.nan], parameters
     return np.geomspace(1e-6 if solves_slowly(method) else 1e-10, 0.5, settings).tolist(), parameters
 
@@ -71,7 +71,7 @@ def cases(quick: bool) -> list[Case]:
         ladder, parameters = axes(method, passes, gaps, quick)
         settings = {"parameters": parameters, "ladder": ladder, "periods": 1.0}
         grid.append(Case("grazing", method.name, settings | {"shown": 0.005 if method.fixed_step else 1e-6}))
-        if method.knob is not None:
+        if method.control is not None:
             ladder = [0.2, 0.1, 0.05, 0.025] if method.fixed_step else [1e-4, 1e-6, 1e-8, 1e-10]
             grid.append(Case("separatrix", method.name, {"ladder": ladder[: 1 if quick else 4]}))
         if method.fixed_step:

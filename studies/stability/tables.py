@@ -29,7 +29,7 @@ class Column:
     """Names of the variables of the study's dataset, with dimensions."""
 
     # maps of outcomes; parameter (relative spin or gap delta), setting (steps in nutation periods, or tolerances)
-    OUTCOME, PARAMETER, SETTING = "outcome", "parameter_value", "knob"
+    OUTCOME, PARAMETER, SETTING = "outcome", "parameter_value", "control"
     CONTROL, GRID = "knob_name", "grid"  # step_size, tolerance or none; settings x parameters
     # limits of a step along a map over spin; curve
     LIMIT_PARAMETER, LINEAR_LIMIT, THIRD_TURN = "limit_parameter", "linear_limit", "third_turn"
@@ -59,12 +59,12 @@ def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.
         Column.OUTCOME: (("parameter", "setting"), runs.verdict),
         Column.PARAMETER: ("parameter", np.asarray(parameters, float)),
         Column.SETTING: ("setting", np.asarray(ladder, float)),
-        Column.CONTROL: method.knob or "none",
+        Column.CONTROL: method.control or "none",
         Column.GRID: f"{len(ladder)} x {len(parameters)}",
     }
     if name == "grazing":
         nearest = np.abs(np.log(np.asarray(ladder, float) / settings["shown"]))
-        column = int(np.argmin(nearest)) if method.knob else 0
+        column = int(np.argmin(nearest)) if method.control else 0
         table[Column.SHOWN_SETTING] = float(ladder[column])
         table[Column.GRAZING_ERROR] = ("parameter", runs.axis_error[:, column])
     elif method.fixed_step and settings.get("limits"):

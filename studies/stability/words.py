@@ -51,7 +51,7 @@ def poles(part: xr.Dataset) -> str:
     halved: dict[bool, list[bool]] = {True: [], False: []}  # by: is it in the angles chart
     for name, method in _methods(part).items():
         effect = pole_effect(map_of(part.sel(integrator=name)))
-        if effect is not None and method.knob == "step_size":
+        if effect is not None and method.control == "step_size":
             halved[method.charts() == ("angles",)].append(effect.halves)
     if not halved[True] + halved[False]:
         return ""

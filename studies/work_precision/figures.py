@@ -59,13 +59,13 @@ def _fronts(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     for axis, scene in zip(axes, scenes, strict=True):
         cell = data.sel(scene=scene).isel(horizon=far)
         floor = 0.5 * error_band(axis, cell["axis_bound"].values, LEAST)
-        for tier, line in (("compiled", "-"), ("python", (0, (3, 2)))):
-            names = words.of_tier(cell, tier)
+        for implementation, line in (("compiled", "-"), ("python", (0, (3, 2)))):
+            names = words.of_implementation(cell, implementation)
             for method in names:
                 x, y = _curve(cell.sel(integrator=method), "axis", cost, floor)
                 axis.plot(x, y, color=look(method).color, ls=line, lw=0.7, alpha=0.4, zorder=1)
-            front = _front(axis, cell.sel(integrator=names), tier, cost, floor)
-            on_front |= dict.fromkeys(front if tier == "compiled" else ())
+            front = _front(axis, cell.sel(integrator=names), implementation, cost, floor)
+            on_front |= dict.fromkeys(front if implementation == "compiled" else ())
         axis.set(xscale="log", yscale="log", title=scene)
     axes[0].set_ylim(LEAST, 3.0)
     legend_below(figure, axes)
@@ -88,16 +88,18 @@ def _curve(runs: xr.Dataset, quantity: str, cost: str, floor: float) -> tuple[An
     return x[order], np.maximum(y[order], floor)
 
 
-def _front(axis: Any, cell: xr.Dataset, tier: str, cost: str, floor: float) -> list[str]:
-    """Draw the front of the methods of a tier; returns the names of those on it."""
+def _front(axis: Any, cell: xr.Dataset, implementation: str, cost: str, floor: float) -> list[str]:
+    """Draw the front of the methods of a implementation; returns the names of those on it."""
     x, y = cell[cost].values, np.maximum(cell["axis"].values, floor)
     on = pareto(x, y)
     if not on.any():
         return []
     order = np.argsort(x[on])
     x, y, owners = (part[on][order] for part in (x, y, np.broadcast_to(cell["integrator"].values[:, None], x.shape)))
-    line = "-" if tier == "compiled" else (0, (4, 2))
-    axis.step(x, y, where="post", color=BLACK, ls=line, lw=1.4, zorder=3, label=f"front of the {tier} methods")
+    line = "-" if implementation == "compiled" else (0, (4, 2))
+    axis.step(
+        x, y, where="post", color=BLACK, ls=line, lw=1.4, zorder=3, label=f"front of the {implementation} methods"
+    )
     names = list(dict.fromkeys(map(str, owners)))
     for name in names:
         style = look(name)
@@ -150,7 +152,7 @@ def _winners(data: xr.Dataset) -> Picture:
 
 def _profiles(data: xr.Dataset) -> Picture:
     """Share of problems on which a method's time is within a factor of the best, one panel a target."""
-    names = words.of_tier(data, "compiled")
+    names = words.of_implementation(data, "compiled")
     ratios = ranking.relative_costs(ranking.counted(data)[0], names)
     shown = ranking.leaders(ratios.sel(integrator=names), LEADERS)
     shown += [name for name in ALWAYS_SHOWN if name not in shown]

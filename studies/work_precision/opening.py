@@ -10,7 +10,7 @@ from symtop.measure.errors import QUANTITIES
 from symtop.runner.study import Chart, Opening, Series, Table
 
 from .figures import COSTS
-from .words import energy_in_all, left_out, of_tier, seconds, spans
+from .words import energy_in_all, left_out, of_implementation, seconds, spans
 
 
 def opening(data: xr.Dataset) -> Opening:
@@ -18,7 +18,7 @@ def opening(data: xr.Dataset) -> Opening:
     rows, sentences = [], []
     data, uncounted = ranking.counted(data)
     stepping = data[["step_size", "tolerance"]].notnull().any(["scene", "horizon", "setting"])  # not the closed form
-    names = [name for name in of_tier(data, "compiled") if stepping.sel(integrator=name).to_array().any()]
+    names = [name for name in of_implementation(data, "compiled") if stepping.sel(integrator=name).to_array().any()]
     ahead: Counter[str] = Counter()
     for far, span in enumerate(spans(data)):
         table = ranking.relative_costs(data.isel(horizon=[far]), names).sel(integrator=names)

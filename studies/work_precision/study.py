@@ -41,7 +41,7 @@ def cases(quick: bool) -> list[Case]:
     grid = []
     for name in grid_scenes(LEFT_OUT | (NOT_QUICK if quick else {})):
         for method in integrators().values():
-            budget = (BUDGET[method.tier] if method.speed == 1.0 else SOFTWARE) / (20.0 if quick else 1.0)
+            budget = (BUDGET[method.implementation] if method.speed == 1.0 else SOFTWARE) / (20.0 if quick else 1.0)
             grid.append(Case(name, method.name, {"periods": PERIODS[quick], "budget": budget}))
     return grid
 

@@ -9,8 +9,8 @@ Dimensions: scene, integrator, horizon (in nutation periods), setting (coarse to
     nutation_period, precession_rate (and _bound)   relative errors of the mean frequencies
     shape, nutation_lag, precession_lag             parts of the axis error
     seconds, seconds_samples(batch), spread         time of one run, NaN if it was not timed, see `timing_rounds`
-    first_call, tier, stopped(horizon)              of a method: seconds of its first run, "compiled" or "python", and
-                                                    why it tried nothing finer
+    first_call, implementation                      of a method: seconds of its first run, "compiled" or "python"
+    stopped(horizon)                                why it tried nothing finer
 """
 
 import xarray as xr

@@ -5,8 +5,8 @@ of the methods whose energy errors are compared at equal run time, every run ove
 run has a time.
 
 All of them take part in a few rounds of short batches: in each round every run once, in random order. The contenders
-for a target, those within `WITHIN` of the fastest of their tier, then take part in further rounds of longer batches.
-A contender whose two times differ by more than a quarter (`NOISY`) takes part in as many rounds again.
+for a target, those within `WITHIN` of the fastest compiled or plain Python one, then take part in further rounds of
+longer batches. A contender whose two times differ by more than a quarter (`NOISY`) takes part in as many rounds again.
 
 `seconds` is the smallest sample. Everything runs on one thread; compilation and first use are in `first_call`.
 """
@@ -63,12 +63,14 @@ def timed_runs(data: xr.Dataset, compared: Collection[str] = ()) -> list[TimedRu
     return runs
 
 
-def contenders(runs: Sequence[TimedRun], cost: Mapping[TimedRun, float], tier: Mapping[str, str]) -> list[TimedRun]:
-    """The runs that are near the fastest of their tier for some horizon and target, which is one of them."""
+def contenders(
+    runs: Sequence[TimedRun], cost: Mapping[TimedRun, float], implementation: Mapping[str, str]
+) -> list[TimedRun]:
+    """The runs that are near the fastest of their kind, compiled or plain Python, for some horizon and target, which is one of them."""
     rivals: dict[tuple[str, int, int], list[TimedRun]] = {}
     for run in sorted(runs, key=lambda run: cost[run]):
         for number in run.targets:
-            rivals.setdefault((tier[run.name], run.far, number), []).append(run)
+            rivals.setdefault((implementation[run.name], run.far, number), []).append(run)
     near = [[run for run in group[:MOST_NEAR] if cost[run] <= WITHIN * cost[group[0]]] for group in rivals.values()]
     return list(dict.fromkeys(run for group in near if len(group) > 1 for run in group))
 
@@ -91,8 +93,8 @@ def timing_rounds(
         return dict(zip(chosen, timings(calls, *effort, seed), strict=True))
 
     once = measured(runs, first, 0)
-    tier = {name: method.tier for name, method in methods.items()}
-    twice = measured(contenders(runs, {run: timing.best for run, timing in once.items()}, tier), further, 1)
+    implementation = {name: method.implementation for name, method in methods.items()}
+    twice = measured(contenders(runs, {run: timing.best for run, timing in once.items()}, implementation), further, 1)
     differing = [run for run, timing in twice.items() if differ(once[run].best, timing.best)]
     again = measured(differing, further, 2)
 

@@ -38,9 +38,13 @@ def seconds(value: float) -> str:
     return f"{value * 1e6:.3g} us" if value < 1e-3 else f"{value * 1e3:.3g} ms" if value < 1.0 else f"{value:.3g} s"
 
 
-def of_tier(data: xr.Dataset, tier: str) -> list[str]:
+def of_implementation(data: xr.Dataset, implementation: str) -> list[str]:
     """The names of the compiled methods, or of those in plain Python."""
-    return [str(name) for name in data["integrator"].values if tier in data["tier"].sel(integrator=name).values]
+    return [
+        str(name)
+        for name in data["integrator"].values
+        if implementation in data["implementation"].sel(integrator=name).values
+    ]
 
 
 def level(won: ranking.Win) -> str:
@@ -131,7 +135,7 @@ def sentences(data: xr.Dataset) -> list[str]:
         + left_out(uncounted),
         f"Energy error {spans(data)[-1]}. {energy_of_each(data)}",
     ]
-    if python := of_tier(data, "python"):
+    if python := of_implementation(data, "python"):
         spoken.append(
             f"Only compiled methods are ranked. Those in plain Python ({', '.join(python)}) are ranked "
             "among themselves in the table; compare them with the rest by force evaluations."
@@ -158,9 +162,9 @@ def tables(data: xr.Dataset) -> list[Table]:
         fastest, times = [], []
         for name in data["scene"].values:
             cell = data.sel(scene=name).isel(horizon=far)
-            for tier in ("compiled", "python"):
-                won = [ranking.win(cell, target, tier) for target in TARGETS]
-                fastest.append([str(name), tier, *map(_winner, won)])
+            for implementation in ("compiled", "python"):
+                won = [ranking.win(cell, target, implementation) for target in TARGETS]
+                fastest.append([str(name), implementation, *map(_winner, won)])
             met = [{place.integrator: seconds(place.cost) for place in ranking.cheapest(cell, target)}
                    for target in TARGETS]  # fmt: skip
             for method, stopped in zip(map(str, cell["integrator"].values), cell["stopped"].values, strict=True):

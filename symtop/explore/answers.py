@@ -38,14 +38,14 @@ class Setup:
     method: Integrator
     setting: float | None
 
-    def knob(self, name: str) -> float | None:
+    def control(self, name: str) -> float | None:
         """The setting, if it is the one called `name`; None otherwise."""
-        return self.setting if self.method.knob == name else None
+        return self.setting if self.method.control == name else None
 
     @property
     def budget(self) -> float | None:
         """The most work of an adaptive run, which ends there and says so; None for a fixed step."""
-        return MOST_WORK[self.method.tier] if self.method.knob == "tolerance" else None
+        return MOST_WORK[self.method.implementation] if self.method.control == "tolerance" else None
 
     @property
     def samples(self) -> int:
@@ -67,10 +67,10 @@ def setup(fields: Mapping[str, Any]) -> Setup:
     start = Angles(*(finite(name, fields[name]) for name in START))
     method = integrator(str(fields["integrator"]))
     scene = Scene("explored", top, start, positive("horizon", fields["horizon"]))
-    if method.knob is None:
+    if method.control is None:
         return Setup(scene, method, None)
-    setting = positive(method.knob, fields.get(method.knob))
-    if method.knob == "step_size" and scene.horizon / setting > MOST_STEPS:
+    setting = positive(method.control, fields.get(method.control))
+    if method.control == "step_size" and scene.horizon / setting > MOST_STEPS:
         raise SymtopError(
             f"step_size must be at least {scene.horizon / MOST_STEPS:.3g} for this horizon, not {setting!r}: "
             f"the explorer runs at most {MOST_STEPS} steps"
@@ -81,7 +81,7 @@ def setup(fields: Mapping[str, Any]) -> Setup:
 def dataset(chosen: Setup, warn: Callable[[str], object]) -> xr.Dataset:
     """The run as `simulate` returns it; `warn` gets the sentence of the guard, if it has one."""
     return simulate(
-        chosen.scene, chosen.method, step_size=chosen.knob("step_size"), tolerance=chosen.knob("tolerance"),
+        chosen.scene, chosen.method, step_size=chosen.control("step_size"), tolerance=chosen.control("tolerance"),
         observe="attitude", samples=chosen.samples, guard=warn, budget=chosen.budget,
     )  # fmt: skip
 
@@ -147,7 +147,7 @@ def script(chosen: Setup) -> str:
     top = ", ".join(f"{name}={getattr(scene.top, name)!r}" for name in TOP)
     start = ", ".join(f"{name}={getattr(scene.start, name)!r}" for name in START)
     name, samples = chosen.method.name, chosen.samples
-    options = "" if chosen.method.knob is None else f", {chosen.method.knob}={chosen.setting!r}"
+    options = "" if chosen.method.control is None else f", {chosen.method.control}={chosen.setting!r}"
     options += "" if chosen.budget is None else f", budget={chosen.budget!r}"
     return "\n".join(
         [
@@ -186,8 +186,8 @@ def catalogue() -> dict[str, Any]:
             "name": entry.name,
             "family": entry.family,
             "summary": entry.summary,
-            "knob": entry.knob,
-            "tier": entry.tier,
+            "control": entry.control,
+            "implementation": entry.implementation,
             "tolerance": max(entry.default_tolerance or 1e-6, entry.least_tolerance),
             "color": style.look(entry.name).color,
         }

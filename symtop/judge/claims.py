@@ -87,7 +87,7 @@ def _agrees(*, declared: bool | None, measured: bool | None) -> str:
 
 def _order(method: Integrator, scene: Scene, quick: bool, traces: dict[str, np.ndarray]) -> Finding:
     declared = _yes_no_number(method.order)
-    if method.knob is None:
+    if method.control is None:
         return Finding("order", declared, "", "inapplicable", "it has no step and no tolerance")
     fitted = orders.measured_order(method, scene, quick=quick)
     traces["step_size"], traces["error"], traces["fitted"] = orders.settings_shown(fitted, SHOWN)
@@ -301,7 +301,7 @@ def _invariant(method: Integrator, run: long.LongRun) -> Finding:
 
 def _explicit(method: Integrator, run: long.LongRun) -> Finding:
     declared = _declared(method, "explicit")
-    if method.knob is None:
+    if method.control is None:
         return Finding("explicit", declared, "", "inapplicable", "it makes no steps")
     if run.iterations > 0.0:
         verdict = _agrees(declared=method.explicit, measured=False)
@@ -318,7 +318,7 @@ def _explicit(method: Integrator, run: long.LongRun) -> Finding:
 
 
 def _work(method: Integrator, run: long.LongRun) -> Finding:
-    if method.knob is None:
+    if method.control is None:
         return Finding("work", "", "", "inapplicable", "it makes no steps")
     solves = f" and {run.iterations:.2f} iterations" if run.iterations else ""
     why = f"{run.evaluations:.2f} force evaluations{solves} a step, in {_span(run)}"

@@ -106,8 +106,8 @@ def long_run(method: Integrator, scene: Scene, chart: str, *, quick: bool = Fals
         pilot = _run(method, scene, PILOT, step, PILOT + 1)
         cost = max(float(pilot.attrs["force_evaluations"]) / PILOT, 1.0)
         most = QUICK_STEPS if quick else STEPS
-        steps = min(most, EVALUATIONS[method.tier] / cost) * method.speed
-        if method.knob is None:
+        steps = min(most, EVALUATIONS[method.implementation] / cost) * method.speed
+        if method.control is None:
             steps = PILOT  # a formula has no steps: nothing adds up
         run = _run(method, scene, max(steps, PILOT), step, SAMPLES)
         if run.attrs["outcome"] == "ok" or not method.fixed_step:

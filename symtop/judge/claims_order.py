@@ -57,10 +57,10 @@ def observable(method: Integrator) -> str:
 
 def measured_order(method: Integrator, scene: Scene, *, quick: bool = False) -> Order:
     """Slopes of the errors of attitude, theta and energy, where they can be judged."""
-    if method.knob is None:
+    if method.control is None:
         raise SymtopError(f"{method.name} has neither a step nor a tolerance")
     fitted = _slopes(method, scene, NUTATIONS, quick)
-    if quick or not method.fixed_step or method.order is None or method.tier == "python":
+    if quick or not method.fixed_step or method.order is None or method.implementation == "python":
         return fitted
     for nutations in LONGER:
         if math.isfinite(fitted.fits[fitted.observed].slope):
@@ -73,7 +73,7 @@ def measured_order(method: Integrator, scene: Scene, *, quick: bool = False) -> 
 def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool) -> Order:
     horizon = nutations * scene.time_scale()
     count = 13 if not quick else 11 if method.fixed_step else 9
-    settings = ladder(method, scene, horizon, count, FINEST[method.tier])
+    settings = ladder(method, scene, horizon, count, FINEST[method.implementation])
     main = observable(method)
     table = error_table(scene, method, settings, horizon, observe=main)
     fitted = _fitted(method, scene, main, horizon, table)
@@ -117,7 +117,7 @@ class Limit(NamedTuple):
 
 def limit(method: Integrator, scene: Scene, power: int) -> Limit:
     """How far from the true motion a run ends in the limit of small steps, for a method whose order is `power`."""
-    fewest = STEPS.get(power, 200) // (1 if method.tier == "compiled" else 20)
+    fewest = STEPS.get(power, 200) // (1 if method.implementation == "compiled" else 20)
     ends = [_signed_error(method, scene, SHARE * scene.time_scale(), fewest * 2**k) for k in range(3)]
     once = [_without(power, ends[k], ends[k + 1]) for k in range(2)]
     size = [float(np.max(np.abs(value))) for value in (ends[2], once[1], _without(power + 1, once[0], once[1]))]

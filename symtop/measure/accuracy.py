@@ -30,10 +30,12 @@ def error_table(
     enough = False
     for setting in settings:
         if enough:
-            rows.append(dict.fromkeys(rows[-1], math.nan) | {"outcome": "not_run", "tier": method.tier})
+            rows.append(
+                dict.fromkeys(rows[-1], math.nan) | {"outcome": "not_run", "implementation": method.implementation}
+            )
             continue
         rows.append(error_row(scene, method, setting, horizon, observe))
-        enough = float(rows[-1]["force_evaluations"]) > ENOUGH[method.tier]
+        enough = float(rows[-1]["force_evaluations"]) > ENOUGH[method.implementation]
     return as_table(rows)
 
 
@@ -77,7 +79,8 @@ def error_row(
 
 
 _COUNTS = (
-    "step_size", "tolerance", "steps", "force_evaluations", "newton_iterations", "outcome", "reached_time", "tier",
+    "step_size", "tolerance", "steps", "force_evaluations", "newton_iterations", "outcome", "reached_time",
+    "implementation",
 )  # fmt: skip
 
 

@@ -45,7 +45,7 @@ class Win(NamedTuple):
     ratio: float  # of the times, `behind` over `best`; NaN if nothing is behind
 
 
-def cheapest(cell: xr.Dataset, target: float, quantity: str = "axis", tier: str | None = None) -> list[Place]:
+def cheapest(cell: xr.Dataset, target: float, quantity: str = "axis", implementation: str | None = None) -> list[Place]:
     """The cheapest timed run of each method that meets a target, cheapest first.
 
     `cell` is one scene and one horizon of the study's dataset.
@@ -55,11 +55,11 @@ def cheapest(cell: xr.Dataset, target: float, quantity: str = "axis", tier: str 
     good = (table[quantity].values <= target) & (table["outcome"].values == "ok")
     price = np.where(good & np.isfinite(seconds), seconds, np.inf)
     samples = cell["seconds_samples"].transpose("integrator", "setting", "batch").values
-    tiers = cell["tier"].transpose("integrator", ...).values.reshape(len(price), -1)[:, 0]
+    implementations = cell["implementation"].transpose("integrator", ...).values.reshape(len(price), -1)[:, 0]
     places = [
         Place(float(price[row, k]), str(name), k, samples[row, k])
         for row, (name, k) in enumerate(zip(cell["integrator"].values, map(int, price.argmin(axis=1)), strict=True))
-        if np.isfinite(price[row, k]) and tier in (None, str(tiers[row]))
+        if np.isfinite(price[row, k]) and implementation in (None, str(implementations[row]))
     ]
     return sorted(places, key=lambda place: place[:2])
 
@@ -76,9 +76,11 @@ def lead(first: Place, second: Place) -> Lead:
     return Lead(middle, bool(steady and (theirs > ours).all() and min(middle, ratio) >= MARGIN))
 
 
-def win(cell: xr.Dataset, target: float, tier: str = "compiled", without: tuple[str, ...] = ()) -> Win | None:
-    """The fastest method of a tier at a target, or None if none met it."""
-    places = [place for place in cheapest(cell, target, tier=tier) if place.integrator not in without]
+def win(cell: xr.Dataset, target: float, implementation: str = "compiled", without: tuple[str, ...] = ()) -> Win | None:
+    """The fastest compiled (or plain Python) method at a target, or None if none met it."""
+    places = [
+        place for place in cheapest(cell, target, implementation=implementation) if place.integrator not in without
+    ]
     if not places:
         return None
     best, *others = places

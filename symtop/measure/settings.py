@@ -38,7 +38,9 @@ TRIED = f"Not within {TRIES} runs"
 
 def least_tolerance(method: Integrator) -> float:
     """The least tolerance that an adaptive method is tried with."""
-    return max(method.least_tolerance, TEDIOUS if method.tier == "python" and method.explicit is False else 0.0)
+    return max(
+        method.least_tolerance, TEDIOUS if method.implementation == "python" and method.explicit is False else 0.0
+    )
 
 
 def limits(scene: Scene, method: Integrator, horizon: float) -> tuple[float, float]:
@@ -199,7 +201,7 @@ def search(
     It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess. No run is begun that is
     foreseen to take more than `patience` force evaluations.
     """
-    ends, patience = limits(scene, method, horizon), min(patience, MOST_EVALUATIONS[method.tier])
+    ends, patience = limits(scene, method, horizon), min(patience, MOST_EVALUATIONS[method.implementation])
     power = float(method.order or 2) if method.fixed_step else 1.0
     if guess is None:
         guess = 0.2 * scene.time_scale(horizon) * accuracy ** (1.0 / power) if method.fixed_step else 0.1 * accuracy

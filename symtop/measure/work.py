@@ -141,7 +141,7 @@ def work_table(
     for horizon in horizons:
         walk = Walk(scene, method, horizon, budget)
         expected = min(spent.values(), default=0.0) * (horizon / before if math.isfinite(before) else 1.0)
-        if method.knob is None:
+        if method.control is None:
             walk.run(math.nan)
             walk.stopped = "nothing to set"
         else:
@@ -154,15 +154,16 @@ def work_table(
         before = horizon if walk.rows else before
         tables.append([walk.rows[setting] for setting in sorted(walk.rows, reverse=True)])
         stops.append(walk.stopped)
-    return _stack(tables, method.tier).assign(stopped=("horizon", stops))
+    return _stack(tables, method.implementation).assign(stopped=("horizon", stops))
 
 
-def _stack(tables: Sequence[Sequence[Row]], tier: str) -> xr.Dataset:
+def _stack(tables: Sequence[Sequence[Row]], implementation: str) -> xr.Dataset:
     """One dataset over horizon and setting; settings that were not tried are NaN, their outcome "not_run"."""
     names = next(rows for rows in tables if rows)[0]
     blank = {
-        name: value if name == "tier" else "not_run" if name == "outcome" else math.nan for name, value in names.items()
-    } | {"tier": tier}
+        name: value if name == "implementation" else "not_run" if name == "outcome" else math.nan
+        for name, value in names.items()
+    } | {"implementation": implementation}
     size = max(len(rows) for rows in tables)
     filled = [as_table([*rows, *[blank] * (size - len(rows))]) for rows in tables]
     return xr.concat(filled, dim="horizon") if len(filled) > 1 else filled[0].expand_dims("horizon")

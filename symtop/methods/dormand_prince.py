@@ -183,7 +183,7 @@ def built_in() -> list[Integrator]:
             family="runge-kutta",
             summary="Dormand-Prince with SciPy's step control on the unreduced equations, compiled",
             solvers={"angles": solve},
-            knob="tolerance",
+            control="tolerance",
             order=5,
             explicit=True,
             symplectic=False,

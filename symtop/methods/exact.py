@@ -27,7 +27,7 @@ def built_in() -> list[Integrator]:
             family="exact",
             summary="closed form in elliptic functions, in double; one evaluation a sample",
             solvers={"attitude": solve},
-            knob=None,
+            control=None,
             explicit=True,
             symplectic=True,
             symmetric=True,

@@ -90,8 +90,8 @@ Solver = Callable[[SymmetricTop, Angles, Plan], Run]
 ModifiedEnergy = Callable[[View, Momenta, float], Array]  # of states (n, dimension), momenta of the start and h: (n,)
 
 FAMILIES = ("discrete-lagrangian", "splitting", "runge-kutta", "taylor", "library", "exact", "other")
-TIERS = ("compiled", "python")
-KNOBS = ("step_size", "tolerance", None)
+IMPLEMENTATIONS = ("compiled", "python")
+CONTROLS = ("step_size", "tolerance", None)
 ENERGY_ERRORS = ("kept", "bounded", None)
 CONSERVED = ("energy", "p_phi", "p_psi", "axis_length", "cayley_energy")  # what a method may claim to conserve
 SMALLEST_FIRST = {
@@ -122,8 +122,8 @@ class Setting(NamedTuple):
 class Integrator:
     """One integrator: its name, its claims, and how to run it.
 
-    `solvers` maps a chart (angles, axis, attitude) to a function. `knob` is what a user turns: ``step_size``,
-    ``tolerance`` or nothing. `tier` says what executes the inner loop, so that languages are never ranked
+    `solvers` maps a chart (angles, axis, attitude) to a function. `control` is what a user turns: ``step_size``,
+    ``tolerance`` or nothing. `implementation` says what executes the inner loop, so that languages are never ranked
     against each other unsaid. `summary` is a line about it, `about` a paragraph; the built-in ones have theirs from
     `about.md`. Raises SymtopError for a field that makes no sense.
     """
@@ -132,8 +132,8 @@ class Integrator:
     family: str
     summary: str = field(metadata={"words": True})
     solvers: Mapping[str, Solver] = field(repr=False)
-    knob: str | None = "step_size"
-    tier: str = "compiled"
+    control: str | None = "step_size"
+    implementation: str = "compiled"
     order: int | None = None
     explicit: bool | None = None
     symplectic: bool | None = None
@@ -146,7 +146,7 @@ class Integrator:
     modified_energy: ModifiedEnergy | None = None  # what it conserves to O(h^4) less the energy, in closed form
     sleeps_from: Callable[[float], float] | None = None  # spin of the sleeping top (I1 = I3 = mgl = 1) at a step h
     same_steps_as: str | None = None  # a compiled integrator that takes the same steps
-    speed: float = 1.0  # of a step, in units of others of its tier: 0.002 for arithmetic in software
+    speed: float = 1.0  # of a step, in units of others of its implementation: 0.002 for arithmetic in software
     about: str = field(default="", repr=False, compare=False, metadata={"words": True})  # a paragraph: what it is, when
 
     def __post_init__(self) -> None:
@@ -154,9 +154,9 @@ class Integrator:
         if self.order is not None:
             whole("order", self.order, 1)
         one_of("family", self.family, FAMILIES)
-        one_of("tier", self.tier, TIERS)
-        if self.knob not in KNOBS:
-            raise SymtopError(f"knob must be 'step_size', 'tolerance' or None, not {self.knob!r}")
+        one_of("implementation", self.implementation, IMPLEMENTATIONS)
+        if self.control not in CONTROLS:
+            raise SymtopError(f"control must be 'step_size', 'tolerance' or None, not {self.control!r}")
         if self.energy_error not in ENERGY_ERRORS:
             raise SymtopError(f"energy_error must be 'kept', 'bounded' or None, not {self.energy_error!r}")
         given = self.solvers if isinstance(self.solvers, Mapping) else {}
@@ -184,16 +184,16 @@ class Integrator:
     @property
     def fixed_step(self) -> bool:
         """Is a step what a user sets?"""
-        return self.knob == "step_size"
+        return self.control == "step_size"
 
     @property
     def adaptive(self) -> bool:
         """Is a tolerance what a user sets?"""
-        return self.knob == "tolerance"
+        return self.control == "tolerance"
 
     def setting(self, value: float) -> Setting:
         """A value of what a user sets."""
-        return Setting(self.knob, value)
+        return Setting(self.control, value)
 
     def charts(self) -> tuple[str, ...]:
         """The charts this integrator works in."""
@@ -222,8 +222,8 @@ class Integrator:
             **{trait: _CLAIM[getattr(self, trait)] for trait in ("explicit", "symplectic", "symmetric")},
             "conserves": "unknown" if self.conserves is None else ", ".join(sorted(self.conserves)) or "nothing",
             "charts": ", ".join(self.charts()),
-            "knob": self.knob or "none",
-            "tier": self.tier,
+            "control": self.control or "none",
+            "implementation": self.implementation,
             "summary": self.summary,
         }
 

@@ -198,7 +198,7 @@ def _entry(precision: str, solvers: dict[str, Solver]) -> Integrator:
         family="taylor",
         summary=_SUMMARIES[precision],
         solvers=solvers,
-        knob="tolerance",
+        control="tolerance",
         explicit=True,
         symplectic=False,
         symmetric=False,

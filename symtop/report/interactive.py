@@ -23,7 +23,7 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
         "family": method.family if method else "other",
         "color": style.color,
         "marker": style.marker,
-        "dashed": method is not None and method.tier == "python",
+        "dashed": method is not None and method.implementation == "python",
         "points": [[x, y, words] for x, y, words in points if _positive(x) and _positive(y)],
     }
 

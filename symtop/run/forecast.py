@@ -152,7 +152,7 @@ def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
     share, twice = min(SHARE * plan.horizon, MOST_NUTATIONS * period), min(2.0 * period, plan.horizon)
     if method.adaptive:
         cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
-        least = twice if cheap.tier == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
+        least = twice if cheap.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
         piece = max(share, least)
         partial = piece < min(period, 0.5 * plan.horizon)
         since = max(0.0, _closest_time(scene, period) - 0.5 * piece) if partial else 0.0
@@ -161,9 +161,9 @@ def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
         return max(expected, plan.tolerance), probe  # an error below what was asked for is luck
     step = plan.step_size
     share = min(share, MOST_STEPS * step)
-    allowed = max(STEPS[method.tier] * step, share)
+    allowed = max(STEPS[method.implementation] * step, share)
     if twice <= allowed:
-        piece = max(twice, share, AT_LEAST * STEPS[method.tier] * step)
+        piece = max(twice, share, AT_LEAST * STEPS[method.implementation] * step)
         probe = _probe(scene, method, chart, plan, min(plan.horizon, piece), step)
         return grown(probe, plan.horizon, straight=straight), probe
     coarse = twice / round(allowed / step)
@@ -187,7 +187,7 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Foreca
     marks = landmarks(scene)
     steps, passage = marks.period / plan.step_size, marks.rate * plan.step_size
     samples = marks.period * (plan.times.size - 1) / plan.horizon
-    if method.knob is None:
+    if method.control is None:
         return Forecast(0.0, 0.0, steps, samples, passage, "ok", plan.horizon)
     expected, probe = _expected(scene, method, chart, plan, marks)
     turns = plan.horizon / marks.period

@@ -33,7 +33,7 @@ COARSE = 1.0  # rad of precession in a step
 
 def warning(scene: Scene, method: Integrator, chart: str, plan: Plan) -> str:
     """Warn before the run if a large error is expected: one sentence with a remedy, else an empty one."""
-    if method.knob is None:
+    if method.control is None:
         return ""
     expected, marks = forecast(scene, method, chart, plan), landmarks(scene)
     reason = _unstable(scene, method, chart, plan, marks) or _cause(scene, method, chart, plan, marks, expected)

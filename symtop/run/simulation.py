@@ -151,7 +151,7 @@ def simulate(
         integrator=method.name,
         scene=chosen.name,
         chart=chart,
-        tier=method.tier,
+        implementation=method.implementation,
         horizon=end,
         step_size=plan.step_size,
         tolerance=plan.tolerance,

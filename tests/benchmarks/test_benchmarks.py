@@ -178,7 +178,7 @@ def _stored(times: dict[str, float], spread: float = 0.01) -> xr.Dataset:
             "package": ("integrator", names),
             "version": ("integrator", ["1"] * len(names)),
             "formulation": ("integrator", ["as it is"] * len(names)),
-            "tier": ("integrator", ["compiled"] * len(names)),
+            "implementation": ("integrator", ["compiled"] * len(names)),
         },
         coords={"scene": ["spheroid"], "integrator": [f"{name}-one" for name in names]},
     )

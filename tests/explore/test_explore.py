@@ -290,9 +290,9 @@ def test_a_person_can_use_it(site, tmp_path):
 
 
 def test_a_warning_is_shown_on_the_page(site, monkeypatch):
-    def worried(*args, guard, **knobs):
+    def worried(*args, guard, **controls):
         guard("the phase will be <lost>")
-        return symtop.simulate(*args, guard=False, **knobs)
+        return symtop.simulate(*args, guard=False, **controls)
 
     monkeypatch.setattr(answers, "simulate", worried)
     with Browser() as browser:

@@ -37,9 +37,9 @@ def forces_of_an_attempt(method: Integrator, chart: str) -> int:
 
 def bytes_a_step(method: Integrator) -> float:
     """Bytes that a run keeps for each further step, by Python's own count of what NumPy and Python allocate."""
-    few = 4000 if method.tier == "compiled" else 200
-    control = {"step_size": STEP} if method.knob == "step_size" else {}
-    if method.knob == "tolerance" and method.default_tolerance is None:
+    few = 4000 if method.implementation == "compiled" else 200
+    control = {"step_size": STEP} if method.control == "step_size" else {}
+    if method.control == "tolerance" and method.default_tolerance is None:
         control = {"tolerance": 1e-6}
     peaks, steps = [], []
     for count in (few, few, 6 * few):  # whatever is made once is made in the first run

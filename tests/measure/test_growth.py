@@ -126,8 +126,8 @@ def test_laws_of_growth_of_a_symplectic_method_and_of_runge_kutta():
     where = symtop.scene("spheroid")
     period = where.nutation_period
     found = {
-        name: history(where, symtop.integrator(name), horizon=6000.0 * period, samples=3001, **knob)
-        for name, knob in {
+        name: history(where, symtop.integrator(name), horizon=6000.0 * period, samples=3001, **control)
+        for name, control in {
             "stormer-verlet": {"step_size": period / 60.37},
             "strang": {"step_size": period / 60.37},
             "rk4": {"step_size": period / 60.37},  # a wrong frequency rules for the first 75 nutations, energy then

@@ -15,8 +15,8 @@ from symtop.model import charts
 from symtop.model.scenes import closed_form, grazing
 
 
-def judged(scene, name, **knobs):
-    run = symtop.simulate(scene, name, guard=False, **knobs)
+def judged(scene, name, **controls):
+    run = symtop.simulate(scene, name, guard=False, **controls)
     scene = symtop.scene(scene)
     error = charts.axis_distance(run["axis"].values, closed_form(scene).axis(run["time"].values))
     found = judgement(scene, run, error)
@@ -25,7 +25,7 @@ def judged(scene, name, **knobs):
 
 
 @pytest.mark.parametrize(
-    ("scene", "name", "knobs", "word", "says"),
+    ("scene", "name", "controls", "word", "says"),
     [
         ("goldstein", "strang", {"step_size": 0.01}, "accurate", "accurate to"),
         ("goldstein", "strang", {"step_size": 0.3}, "bounded_but_wrong", "while the energy stayed within"),
@@ -34,11 +34,11 @@ def judged(scene, name, **knobs):
         ("spheroid", "stormer-verlet", {"step_size": 1.0, "horizon": 50.0}, "left_chart", "stopped at"),
     ],
 )
-def test_each_fate_is_judged_with_its_time_and_cause(scene, name, knobs, word, says):
-    found = judged(scene, name, **knobs)
+def test_each_fate_is_judged_with_its_time_and_cause(scene, name, controls, word, says):
+    found = judged(scene, name, **controls)
     assert found.verdict == word, found
     assert says in found.sentence
-    assert 0.0 <= found.time <= knobs.get("horizon", symtop.scene(scene).horizon) * (1.0 + 1e-12)
+    assert 0.0 <= found.time <= controls.get("horizon", symtop.scene(scene).horizon) * (1.0 + 1e-12)
 
 
 def test_a_pole_passed_on_the_wrong_side_is_a_wrong_regime():

@@ -134,13 +134,13 @@ def _assert_same_steps(scene, tolerance, horizon, close, pair=dormand_prince.DOR
 
     plan, mine = _walk(scene, tolerance, horizon, pair)
     par, start = with_rates(scene.top, scene.start)
-    rhs, knobs = EulerLagrange(scene.top), {"rtol": tolerance, "atol": tolerance}
-    theirs = solve_ivp(rhs, (0.0, horizon), start, **knobs)
+    rhs, controls = EulerLagrange(scene.top), {"rtol": tolerance, "atol": tolerance}
+    theirs = solve_ivp(rhs, (0.0, horizon), start, **controls)
     assert mine.steps == theirs.t.size - 1
     assert mine.force_evaluations == theirs.nfev
     ends = _step_ends(scene, tolerance, horizon, pair)
     np.testing.assert_allclose(np.diff(ends, prepend=0.0), np.diff(theirs.t), rtol=close)
-    sampled = solve_ivp(rhs, (0.0, horizon), start, t_eval=plan.times, **knobs)
+    sampled = solve_ivp(rhs, (0.0, horizon), start, t_eval=plan.times, **controls)
     np.testing.assert_allclose(mine.states, to_angles(par, plan.times, sampled.y.T), atol=1e-9)
 
 
@@ -201,9 +201,9 @@ def test_blocks_do_not_show(monkeypatch):
 # --- libraries ------------------------------------------------------------------------------------------------------
 
 
-def _error(name, tolerance, quantity="axis", **knobs):
+def _error(name, tolerance, quantity="axis", **controls):
     scene = symtop.scene("spheroid")
-    run = symtop.simulate(scene, name, tolerance=tolerance, **knobs)
+    run = symtop.simulate(scene, name, tolerance=tolerance, **controls)
     assert run.attrs["outcome"] == "ok"
     truth = symtop.reference(scene, run["time"].values, precision="closed-form")
     return run, float(errors_against(scene, run, truth)[quantity].max())

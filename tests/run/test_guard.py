@@ -24,10 +24,10 @@ WRONG, RIGHT = 0.1, 1e-3  # rad
 MOST_FALSE = 0.05
 
 
-def said(scene, name, **knobs):
+def said(scene, name, **controls):
     """What the guard says of a run."""
     heard = []
-    symtop.simulate(scene, name, guard=heard.append, samples=11, **knobs)
+    symtop.simulate(scene, name, guard=heard.append, samples=11, **controls)
     return heard[0] if heard else ""
 
 
@@ -42,7 +42,7 @@ def judge_trials(count, seed):
     right = [one for one in trials if one.outcome == "ok" and one.error < RIGHT]
     assert len(wrong) > count / 30  # the trials are hard enough to mean something, and not too hard
     assert len(right) > count / 3
-    silent = [(one.integrator, one.scene, one.knob, one.error) for one in wrong if not one.warning]
+    silent = [(one.integrator, one.scene, one.control, one.error) for one in wrong if not one.warning]
     return silent, sum(bool(one.warning) for one in right) / len(right)
 
 
@@ -64,7 +64,7 @@ def test_no_wrong_answer_is_silent_in_two_thousand_runs():
 
 
 @pytest.mark.parametrize(
-    ("name", "knob"),
+    ("name", "control"),
     [
         ("stormer-verlet", {"step_size": 2e-3}),
         ("midpoint", {"step_size": 2e-3}),
@@ -75,25 +75,25 @@ def test_no_wrong_answer_is_silent_in_two_thousand_runs():
         ("exact", {}),
     ],
 )
-def test_a_good_run_is_met_with_silence_and_any_run_with_the_same_bits(name, knob):
-    assert said("spheroid", name, **knob) == ""
-    quiet, watched = (symtop.simulate("spheroid", name, samples=41, guard=guard, **knob) for guard in (False, True))
+def test_a_good_run_is_met_with_silence_and_any_run_with_the_same_bits(name, control):
+    assert said("spheroid", name, **control) == ""
+    quiet, watched = (symtop.simulate("spheroid", name, samples=41, guard=guard, **control) for guard in (False, True))
     assert quiet.attrs.pop("guard") == "off"
     assert watched.attrs.pop("guard") == ""
     assert watched.identical(quiet)
 
 
 def test_a_bad_run_is_the_same_run_with_a_warning():
-    knobs = {"step_size": 0.1, "samples": 41}
+    controls = {"step_size": 0.1, "samples": 41}
     with pytest.warns(symtop.SymtopWarning, match="expect an axis error") as caught:
-        watched = symtop.simulate("spheroid", "midpoint", **knobs)
+        watched = symtop.simulate("spheroid", "midpoint", **controls)
     assert len(caught) == 1
     assert "\n" not in str(caught[0].message)
     assert caught[0].filename == __file__  # the line that the user wrote
     assert watched.attrs.pop("guard") == str(caught[0].message)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        quiet = symtop.simulate("spheroid", "midpoint", guard=False, **knobs)
+        quiet = symtop.simulate("spheroid", "midpoint", guard=False, **controls)
     del quiet.attrs["guard"]
     assert watched.identical(quiet)
 
@@ -175,7 +175,7 @@ def test_each_cause_is_named():
 
 
 @pytest.mark.parametrize(
-    ("scene", "name", "knob", "horizon"),
+    ("scene", "name", "control", "horizon"),
     [
         ("spheroid", "midpoint", {"step_size": 0.05}, 40.0),
         ("goldstein", "stormer-verlet", {"step_size": 0.2}, 300.0),
@@ -185,12 +185,12 @@ def test_each_cause_is_named():
         ("cusp", "gauss-4", {"step_size": 0.3}, 300.0),
     ],
 )
-def test_a_remedy_is_a_remedy(scene, name, knob, horizon):
+def test_a_remedy_is_a_remedy(scene, name, control, horizon):
     """What the sentence advises silences the guard and makes the run right, and is not ten times too careful."""
-    warned = said(scene, name, horizon=horizon, **knob)
+    warned = said(scene, name, horizon=horizon, **control)
     advice = float(re.search(r"(?:step of about|tolerance) ([\d.e-]+)$", warned).group(1))
-    knob = dict.fromkeys(knob, advice)
-    run = symtop.simulate(scene, name, horizon=horizon, **knob)
+    control = dict.fromkeys(control, advice)
+    run = symtop.simulate(scene, name, horizon=horizon, **control)
     truth = closed_form(symtop.scene(scene)).axis(run["time"].values)
     error = float(charts.axis_distance(run["axis"].values, truth).max())
     assert 1e-5 < error < EXPECTED
@@ -214,10 +214,10 @@ def test_every_method_can_be_probed_and_is_told_what_it_can_do():
     """One forecast a method: finite, and silent at a fine setting."""
     where = symtop.scene("goldstein")
     for method in integrators().values():
-        knob = {"step_size": 0.01} if method.knob == "step_size" else {}
-        if method.knob == "tolerance" and method.default_tolerance is None:
-            knob = {"tolerance": 1e-6 if method.tier == "compiled" else 1e-5}
-        plan, _ = make_plan(where, method, **knob, horizon=3.0, samples=11)
+        control = {"step_size": 0.01} if method.control == "step_size" else {}
+        if method.control == "tolerance" and method.default_tolerance is None:
+            control = {"tolerance": 1e-6 if method.implementation == "compiled" else 1e-5}
+        plan, _ = make_plan(where, method, **control, horizon=3.0, samples=11)
         found = forecast.forecast(where, method, method.charts()[0], plan)
         assert found.outcome == "ok"
         assert found.axis_error < 1e-2

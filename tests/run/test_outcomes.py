@@ -16,7 +16,7 @@ HUGE = symtop.Scene("huge", symtop.SymmetricTop(1.0, 1.0, 1e30), symtop.Angles(t
 
 
 @pytest.mark.parametrize(
-    ("scene", "name", "knobs", "outcome"),
+    ("scene", "name", "controls", "outcome"),
     [
         ("spheroid", "stormer-verlet", {"step_size": 1.0, "horizon": 50.0}, "left_chart"),
         ("spheroid", "rk4", {"step_size": 0.4, "horizon": 40.0}, "left_chart"),
@@ -30,8 +30,8 @@ HUGE = symtop.Scene("huge", symtop.SymmetricTop(1.0, 1.0, 1e30), symtop.Angles(t
         ("spheroid", "taylor", {"budget": 3}, "out_of_budget"),
     ],
 )
-def test_every_outcome_is_produced_said_and_timed(scene, name, knobs, outcome):
-    run = symtop.simulate(scene, name, samples=201, guard=False, **knobs)
+def test_every_outcome_is_produced_said_and_timed(scene, name, controls, outcome):
+    run = symtop.simulate(scene, name, samples=201, guard=False, **controls)
     reached = run.attrs["reached_time"]
     assert run.attrs["outcome"] == outcome
     assert re.fullmatch(rf"stopped at t = {reached:.6g} of [\d.e+-]+: .+; .+", run.attrs["outcome_message"])
@@ -70,7 +70,7 @@ def test_implicit_steps_are_solved_where_nothing_moves_but_rounding(name, turn):
 
 
 @pytest.mark.parametrize(
-    ("scene", "name", "knobs"),
+    ("scene", "name", "controls"),
     [
         ("spheroid", "midpoint", {"step_size": 1e-300}),
         ("spheroid", "stormer-verlet", {"step_size": 5e-324}),
@@ -94,11 +94,11 @@ def test_implicit_steps_are_solved_where_nothing_moves_but_rounding(name, turn):
         (HUGE, "taylor", {}),
     ],
 )
-def test_absurd_runs_end_at_once_with_a_sentence(scene, name, knobs):
-    symtop.simulate("spheroid", name, guard=False, **({"step_size": 0.1} if "step_size" in knobs else _fine(name)))
+def test_absurd_runs_end_at_once_with_a_sentence(scene, name, controls):
+    symtop.simulate("spheroid", name, guard=False, **({"step_size": 0.1} if "step_size" in controls else _fine(name)))
     start, heard = time.process_time(), []  # of this process: others may be busy
     try:
-        run = symtop.simulate(scene, name, guard=heard.append, **knobs)
+        run = symtop.simulate(scene, name, guard=heard.append, **controls)
         said = run.attrs["outcome_message"] if run.attrs["outcome"] != "ok" else heard[0]
     except symtop.SymtopError as error:
         said = str(error)

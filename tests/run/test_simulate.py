@@ -32,8 +32,8 @@ def test_the_dataset_is_the_one_that_is_promised():
 
 def test_energy_and_momenta_start_at_their_exact_values():
     where = symtop.scene("goldstein-rising")
-    for name, knob in (("midpoint", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-6}), ("taylor", {})):
-        run = symtop.simulate(where, name, horizon=1.0, **knob)
+    for name, control in (("midpoint", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-6}), ("taylor", {})):
+        run = symtop.simulate(where, name, horizon=1.0, **control)
         assert float(run["energy"][0]) == pytest.approx(14.1, rel=1e-15)
         assert float(run["p_phi"][0]) == pytest.approx(3.4, rel=1e-15)
         assert float(run["p_psi"][0]) == pytest.approx(5.0, rel=1e-15)

@@ -85,14 +85,16 @@ def test_limits_over_a_family_end_at_verlets_and_rk4s():
     assert math.isnan(family_limits("cusp", integrator("midpoint"), 30.0, 2.0)[0])
 
 
-def hand_made(words, knob=(0.01, 0.1, 1.0), parameter=(0.3, 0.6, 5.0, 10.0), knob_name="step_size", scene_name="cusp"):
+def hand_made(
+    words, control=(0.01, 0.1, 1.0), parameter=(0.3, 0.6, 5.0, 10.0), knob_name="step_size", scene_name="cusp"
+):
     """A dataset with one integrator's map, from rows of words."""
     outcome = np.array([[VERDICTS.index(word) for word in line] for line in words], dtype=np.uint8)
     data = xr.Dataset(
         {
             "outcome": (("parameter", "setting"), outcome),
             "parameter_value": ("parameter", np.asarray(parameter, float)),
-            "knob": ("setting", np.asarray(knob, float)),
+            "control": ("setting", np.asarray(control, float)),
             "knob_name": knob_name,
         }
     )
@@ -189,7 +191,7 @@ def test_words_of_mechanisms_come_only_from_what_is_there():
 def test_the_full_grid_is_as_large_as_promised():
     cases = [case for case in runner.load("stability").cases(False) if case.scene == "cusp"]
     assert {case.integrator for case in cases} >= set(integrators())
-    full = [case for case in cases if integrator(case.integrator).knob == "step_size"]
+    full = [case for case in cases if integrator(case.integrator).control == "step_size"]
     for case in full:
         assert len(case.settings["ladder"]) >= 200
         assert len(case.settings["parameters"]) >= 120

@@ -436,7 +436,7 @@ def test_every_fixed_step_method_shows_its_trace():
     """Consistency: at small steps each turns by h omega, in whatever chart it works."""
     h = 0.02 / OMEGA
     for name, method in integrators().items():
-        if method.knob == "step_size":
+        if method.control == "step_size":
             measured = trace(method, STEADY, h)
             assert math.acos(measured.trace / (2.0 * math.sqrt(measured.determinant))) == pytest.approx(
                 0.02, rel=2e-3

@@ -177,8 +177,8 @@ def timed(name, far=0, place=0, targets=()):
 def test_contenders_are_the_runs_that_may_be_the_fastest():
     runs = [timed(name, targets=[0]) for name in "abcdpq"] + [timed("a", place=1, targets=[1]), timed("b", place=1)]
     cost = dict(zip(runs, (1.0, 1.5, 9.0, 10.0, 0.5, 500.0, 1.0, 1.0), strict=True))
-    tier = dict.fromkeys("abcd", "compiled") | dict.fromkeys("pq", "python")
-    near = contenders(runs, cost, tier)
+    implementation = dict.fromkeys("abcd", "compiled") | dict.fromkeys("pq", "python")
+    near = contenders(runs, cost, implementation)
     assert [(run.name, run.place) for run in near] == [("a", 0), ("b", 0)]  # p and the other a are alone in front
 
 
@@ -263,14 +263,14 @@ def test_a_chart_shows_timed_runs_against_seconds_and_every_run_against_work(tim
     )  # a time where there is one
 
 
-def cell(samples, errors=None, tiers=None):
+def cell(samples, errors=None, implementations=None):
     """One scene and one horizon of a dataset: a setting each, with the given samples."""
     samples = np.asarray(samples, float)
     count = len(samples)
     errors = np.full(count, 1e-7) if errors is None else np.asarray(errors)
     table = {
         "seconds": np.nanmin(samples, axis=1), "axis": errors, "outcome": np.full(count, "ok"),
-        "tier": np.array(tiers or ["compiled"] * count), "nutation_lag": np.zeros(count),
+        "implementation": np.array(implementations or ["compiled"] * count), "nutation_lag": np.zeros(count),
     }  # fmt: skip
     data = xr.Dataset({name: (("integrator", "setting"), values[:, None]) for name, values in table.items()})
     data["seconds_samples"] = (("integrator", "setting", "batch"), samples[:, None, :])
@@ -292,7 +292,9 @@ def test_a_lead_is_sure_only_if_every_round_agrees_and_it_is_more_than_a_hair():
 def test_the_cost_of_a_target_is_that_of_the_cheapest_timed_run_that_meets_it():
     rows = {"seconds": [0.5, 2.0, math.nan, 7.0], "axis": [1e-2, 1e-4, 1e-5, 1e-12], "outcome": ["ok"] * 4}
     data = xr.Dataset({name: (("integrator", "setting"), [values]) for name, values in rows.items()})
-    data = data.assign(tier=("integrator", ["compiled"]), seconds_samples=data["seconds"].expand_dims(batch=3))
+    data = data.assign(
+        implementation=("integrator", ["compiled"]), seconds_samples=data["seconds"].expand_dims(batch=3)
+    )
     data = data.assign_coords(integrator=["a"])
     assert [ranking.cheapest(data, target)[0].cost for target in (1e-1, 1e-3, 3e-5, 1e-12)] == [0.5, 2.0, 7.0, 7.0]
     assert ranking.cheapest(data, 1e-13) == []
@@ -326,9 +328,11 @@ def test_samples_are_pairs_only_within_a_round_and_the_last_common_rounds_count(
 
 
 def test_plain_python_is_ranked_apart_and_a_failure_does_not_win():
-    data = cell([[0.1] * 3, [1.0] * 3, [0.5] * 3], errors=[1e-7, 1e-7, 1e-4], tiers=["python", "compiled", "compiled"])
+    data = cell(
+        [[0.1] * 3, [1.0] * 3, [0.5] * 3], errors=[1e-7, 1e-7, 1e-4], implementations=["python", "compiled", "compiled"]
+    )
     assert ranking.win(data, 1e-6).best.integrator == "b"
-    assert ranking.win(data, 1e-6, tier="python").best.integrator == "a"
+    assert ranking.win(data, 1e-6, implementation="python").best.integrator == "a"
     assert ranking.win(data, 1e-9) is None
     data["outcome"][1, 0] = "left_chart"
     assert ranking.win(data, 1e-6) is None

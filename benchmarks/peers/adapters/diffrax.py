@@ -68,7 +68,7 @@ def peers() -> list[Integrator]:
             f"diffrax-{name.lower()}",
             _solver(diffrax, jax, name, stages),
             f"{ON_AXIS}, jitted; {SAME}",
-            tier="compiled",
+            implementation="compiled",
             order=order,
         )
         for name, (order, stages) in SOLVERS.items()

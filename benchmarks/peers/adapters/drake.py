@@ -1,7 +1,7 @@
 """Drake: a multibody plant, three revolute joints z-x-z with the body on the last, stepped by its error-controlled
 integrators.
 
-The mass is 1 and the centre of gravity a tenth of sqrt(I1) from the joint. The target accuracy is the knob; the
+The mass is 1 and the centre of gravity a tenth of sqrt(I1) from the joint. The target accuracy is the control; the
 largest step is a tenth of a nutation. Drake stops at every time it is asked for, so its accuracy is judged at its own
 steps.
 """
@@ -107,7 +107,7 @@ def peers() -> list[Integrator]:
             f"drake-{scheme.replace('_', '-')}",
             Chain(scheme),
             says,
-            tier="compiled",
+            implementation="compiled",
             order=order,
             chart="angles",
             least=LEAST,

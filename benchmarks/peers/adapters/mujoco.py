@@ -84,8 +84,8 @@ def peers() -> list[Integrator]:
 
     return [
         peer(
-            f"mujoco-{name.lower()}", _solver(mujoco, code), "a body on a ball joint; fixed step", tier="compiled",
-            knob="step_size", order=order, chart="attitude",
+            f"mujoco-{name.lower()}", _solver(mujoco, code), "a body on a ball joint; fixed step",
+            implementation="compiled", control="step_size", order=order, chart="attitude",
         )
         for name, (code, order) in INTEGRATORS.items()
     ]  # fmt: skip

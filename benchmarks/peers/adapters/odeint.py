@@ -47,7 +47,7 @@ def peers() -> list[Integrator]:
             f"scipy-odeint-{language}",
             _solver(field),
             f"odeint, {ON_AXIS}, right-hand side in {language}; {SAME}",
-            tier="compiled",
+            implementation="compiled",
             least=LEAST_TOLERANCE,
         )
         for language, field in (("python", python_field), ("numba", compiled_field))

@@ -66,4 +66,4 @@ def peers() -> list[Integrator]:
     import rebound
 
     says = f"{ON_AXIS}, right-hand side in C; eps_rel = eps_abs = the tolerance"
-    return [peer("rebound-bs", BulirschStoer(rebound), says, tier="compiled")]
+    return [peer("rebound-bs", BulirschStoer(rebound), says, implementation="compiled")]

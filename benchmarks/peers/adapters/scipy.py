@@ -42,7 +42,7 @@ def peers() -> list[Integrator]:
             f"scipy-{method.lower()}-{language}",
             _solver(method, field),
             f"solve_ivp, {ON_AXIS}, right-hand side in {language}; {SAME}",
-            tier="python",
+            implementation="python",
             order=order,
             least=LEAST.get(method, LEAST_TOLERANCE),
         )

@@ -56,7 +56,7 @@ def peers() -> list[Integrator]:
             f"cvode-{family.lower()}",
             _solver(cvode, family),
             f"{ON_AXIS}, right-hand side in numba; {SAME}",
-            tier="compiled",
+            implementation="compiled",
         )
         for family in ("Adams", "BDF")
     ]

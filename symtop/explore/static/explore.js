@@ -55,11 +55,11 @@ function chooseScene(name) {
 
 function chooseIntegrator(name) {
   values.integrator = name;
-  const { summary, knob, tolerance } = chosen();
+  const { summary, control, tolerance } = chosen();
   $("summary").textContent = summary;
-  rows.step_size.row.hidden = knob !== "step_size";
-  rows.tolerance.row.hidden = knob !== "tolerance";
-  if (knob === "tolerance") rows.tolerance.set(tolerance);
+  rows.step_size.row.hidden = control !== "step_size";
+  rows.tolerance.row.hidden = control !== "tolerance";
+  if (control === "tolerance") rows.tolerance.set(tolerance);
   ask();
 }
 
