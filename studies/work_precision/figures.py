@@ -89,7 +89,7 @@ def _curve(runs: xr.Dataset, quantity: str, cost: str, floor: float) -> tuple[An
 
 
 def _front(axis: Any, cell: xr.Dataset, implementation: str, cost: str, floor: float) -> list[str]:
-    """Draw the front of the methods of a implementation; returns the names of those on it."""
+    """Draw the front of the compiled (or plain Python) methods; returns the names of those on it."""
     x, y = cell[cost].values, np.maximum(cell["axis"].values, floor)
     on = pareto(x, y)
     if not on.any():

@@ -66,7 +66,7 @@ def timed_runs(data: xr.Dataset, compared: Collection[str] = ()) -> list[TimedRu
 def contenders(
     runs: Sequence[TimedRun], cost: Mapping[TimedRun, float], implementation: Mapping[str, str]
 ) -> list[TimedRun]:
-    """The runs that are near the fastest of their kind, compiled or plain Python, for some horizon and target, which is one of them."""
+    """The runs near the fastest, compiled or plain Python, for some horizon and target; that one is among them."""
     rivals: dict[tuple[str, int, int], list[TimedRun]] = {}
     for run in sorted(runs, key=lambda run: cost[run]):
         for number in run.targets:
