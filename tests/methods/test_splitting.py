@@ -14,13 +14,12 @@ from symtop.measure.order import power_law
 from symtop.measure.step_map import one_step, symplectic_defect
 from symtop.methods import coefficients as tables
 from symtop.methods import splitting_space as space
-from symtop.methods.coefficients import Table
 from symtop.methods.registry import Plan
 from symtop.methods.splitting import built_in, composition
 from symtop.model import charts
 from symtop.model.scenes import closed_form
 
-TABLES = {name: value for name, value in vars(tables).items() if isinstance(value, Table)}
+TABLES = {name: method.table for name, method in tables.METHODS.items()}
 METHODS = {method.name: method for method in built_in()}
 STRANG = tables.STRANG
 
@@ -40,7 +39,7 @@ def quadrature_defect(table, order):
     return max(abs(math.fsum(np.array(table.kick) * times**k) - 1.0 / (k + 1)) for k in range(order))
 
 
-QUADRATURE = {"ABA_8_6_4": 8, "ABA_10_6_4": 10, "ABA_10_4": 10, "TAKAHASHI_IMADA": 2}  # others: their order
+QUADRATURE = {"aba-8-6-4": 8, "aba-10-6-4": 10, "aba-10-4": 10, "takahashi-imada": 2}  # others: their order
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -55,7 +54,7 @@ def test_tables_sum_to_one_read_the_same_from_both_ends_and_integrate_polynomial
     assert quadrature_defect(wrong, order) > 1e-10
 
 
-@pytest.mark.parametrize("name", ["YOSHIDA_4", "SUZUKI_4", "KAHAN_LI_6", "KAHAN_LI_8", "SUZUKI_UMENO_8"])
+@pytest.mark.parametrize("name", ["yoshida-4", "suzuki-4", "kahan-li-6", "kahan-li-8", "suzuki-umeno-8"])
 def test_compositions_of_steps_meet_the_conditions_on_odd_powers(name):
     table = TABLES[name]
     sums = [math.fsum(g**k for g in table.drift) for k in range(3, table.order, 2)]
@@ -151,7 +150,7 @@ def tables_rule(table):
 def test_order_ten_on_the_spheroid_shows_in_extended_precision():
     steps = np.array([92, 100, 109, 119, 130, 142])
     scene = symtop.scene("spheroid")
-    error = [extended_error(tables.METHODS["sofroniou-spaletta-10"].table, scene, int(n)) for n in steps]
+    error = [extended_error(TABLES["sofroniou-spaletta-10"], scene, int(n)) for n in steps]
     fit = power_law(8.0 / steps, error)
     assert abs(fit.slope - 10.0) < 0.3, (str(fit), error)
 
