@@ -43,38 +43,24 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_HOME = {
-    "Advice": "advise",
-    "Angles": "model.top",
-    "Case": "runner.study",
-    "ClosedForm": "model.closed_form",
-    "Integrator": "methods.registry",
-    "Momenta": "model.top",
-    "Picture": "runner.study",
-    "Plan": "methods.registry",
-    "Run": "methods.registry",
-    "Scene": "model.scenes",
-    "Study": "runner.study",
-    "SymmetricTop": "model.top",
-    "SymtopError": "base.validate",
-    "SymtopWarning": "base.validate",
-    "Table": "runner.study",
-    "citation": "methods.citations",
-    "composition": "methods.splitting",
-    "discrete_lagrangian": "methods.discrete_lagrangian",
-    "errors": "measure.errors",
-    "integrator": "methods.registry",
-    "integrators": "methods.registry",
-    "long_run": "run.long_run",
-    "recommend": "advise",
-    "reference": "run.reference",
-    "register": "methods.registry",
-    "register_scene": "model.scenes",
-    "runge_kutta": "methods.runge_kutta",
-    "scene": "model.scenes",
-    "scenes": "model.scenes",
-    "simulate": "run.simulation",
+_NAMES = {  # by the module that holds them
+    "advise": "Advice recommend",
+    "base.validate": "SymtopError SymtopWarning",
+    "measure.errors": "errors",
+    "methods.citations": "citation",
+    "methods.discrete_lagrangian": "discrete_lagrangian",
+    "methods.registry": "Integrator Plan Run integrator integrators register",
+    "methods.runge_kutta": "runge_kutta",
+    "methods.splitting": "composition",
+    "model.closed_form": "ClosedForm",
+    "model.scenes": "Scene register_scene scene scenes",
+    "model.top": "Angles Momenta SymmetricTop",
+    "run.long_run": "long_run",
+    "run.reference": "reference",
+    "run.simulation": "simulate",
+    "runner.study": "Case Picture Study Table",
 }
+_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 __all__ = ["__version__", *_HOME]  # noqa: PLE0604  (strings all)
 
