@@ -22,7 +22,7 @@ from symtop.methods.registry import Integrator, Plan, solve
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles
-from symtop.model.view import View, view
+from symtop.model.view import View
 from symtop.run.linear_stability import trace, with_momenta
 
 RUNS_AWAY = 4.0  # times the displacement; an island that a resonance has bent is at most three times as long as wide
@@ -34,7 +34,7 @@ def _run(method: Integrator, scene: Scene, start: Angles, plan: Plan) -> tuple[s
     """The outcome of a run from `start`, and what its samples show."""
     chart = method.chart_for("axis")
     run = solve(method, chart, scene.top, start, plan)
-    return run.outcome, view(chart, scene.top, run.states, run.p_phi, run.p_psi)
+    return run.outcome, View(chart, scene.top, run.states, run.p_phi, run.p_psi)
 
 
 def survives(method: Integrator, scene: Scene, centre: float, displacement: float, h: float, steps: int) -> bool:

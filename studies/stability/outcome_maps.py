@@ -27,7 +27,7 @@ from symtop.methods.registry import Integrator, Plan, solve
 from symtop.model import charts, scenes
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles
-from symtop.model.view import View, view
+from symtop.model.view import View
 from symtop.run.simulation import sample_times
 
 NOT_RUN = 255  # stored where a map has no run
@@ -108,7 +108,7 @@ def row(runs: RowPlan, scene: Scene) -> Judged:
         if outcome[k] == 0 and not np.isfinite(run.states).all():
             outcome[k] = OUTCOMES.index("not_finite")
     with np.errstate(all="ignore"):
-        return _judged(scene, view(chart, scene.top, states, *momenta), runs.phases, outcome)
+        return _judged(scene, View(chart, scene.top, states, *momenta), runs.phases, outcome)
 
 
 def _judged(scene: Scene, seen: View, phases: Array, outcome: NDArray[np.int64]) -> Judged:

@@ -37,8 +37,8 @@ from symtop.methods.space import field_axis, field_frame, frame_to_attitude, obs
 from symtop.model.top import Angles, SymmetricTop
 
 STAGES = (1, 2, 3, 4, 5, 6)
-DIGITS = 40
-SWEEPS = 100
+DIGITS = 40  # of the multiprecision that coefficients are computed in
+SWEEPS = 100  # most of them in a step; 14 are the most that a step of sensible size takes
 STILL = 5  # L_z has no slope, so its increments stay zero: left out, they save a sixth of the sums on (e, L)
 ROUND_OFF = 1e-14  # a correction that stopped falling above this, in units of |e| = 1 and |L|, has not converged
 

@@ -251,8 +251,8 @@ def _expand(form: PreciseForm) -> tuple[bool, float, Cubic, tuple[_Frame, ...]]:
         depth = curve.swing * grows * (form.K / scale) ** 2  # abs(u - u_near) = depth angle^2
         near_unit = ctx.sqrt(least / 2) / sum(near_real) if least else ctx.sqrt(depth / 2) / sum(near_imag)
         far_unit = ctx.sqrt(most / 2) / sum(far_real)
-        here = (floor.twist * crown[1 + near] + crown.twist * floor[1 + near]) / 2  # b - a u_near
-        lean = (float(here), float(-side * form.facing * form.a * depth / sum(bend) ** 2))
+        leaning = (floor.twist * crown[1 + near] + crown.twist * floor[1 + near]) / 2  # b - a u_near
+        lean = (float(leaning), float(-side * form.facing * form.a * depth / sum(bend) ** 2))
         steepness = float(-side * form.Omega * depth * scale / form.K / sum(bend))
         near_half = _Half(_floats(near_real, near_unit), _floats(near_imag, near_unit), growths[near])
         far_half = _Half(_floats(far_real, far_unit), _floats(far_imag, far_unit), growths[1 - near])

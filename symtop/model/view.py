@@ -45,6 +45,7 @@ def space_momenta(chart: str, states: Any) -> tuple[Any, Any]:
 class View:
     """States of one chart, shape (..., dimension), with the momenta p_phi and p_psi that the run showed, shape (...).
 
+    The momenta are needed for the energy alone.
     Angles are as the chart has them: unbounded in `angles`, modulo a turn elsewhere (`charts.unwrapped` makes them
     continuous). All quantities have the shape (...), or (..., 3) and (..., 4) for vectors and quaternions.
     """
@@ -119,8 +120,3 @@ class View:
         if self.chart == "angles":
             return self.p_theta * self.p_theta / (2.0 * self.top.I1) + self.top.potential(self.theta, momenta)
         return space_energy(self.top, self.axis, self.momentum, 0.0)
-
-
-def view(chart: str, top: SymmetricTop, states: Any, p_phi: Any = None, p_psi: Any = None) -> View:
-    """A reader of states (..., dimension) of a chart; the momenta (...) are needed for the energy alone."""
-    return View(chart, top, states, p_phi, p_psi)

@@ -23,7 +23,7 @@ from symtop.methods.registry import Integrator, Plan, integrator, solve
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import view
+from symtop.model.view import View
 
 STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these, 0.05 to 3 ms
 AT_LEAST = 0.25  # of them a probe takes in any case, up to the whole run
@@ -114,7 +114,7 @@ def _probe(
     run = solve(method, chart, scene.top, start, piece)
     with np.errstate(all="ignore"):
         error = charts.axis_distance(
-            view(chart, scene.top, np.asarray(run.states)).axis, form.axis(since + piece.times)
+            View(chart, scene.top, np.asarray(run.states)).axis, form.axis(since + piece.times)
         )
     error[~np.isfinite(error)] = math.inf
     outcome = "not_finite" if run.outcome == "ok" and not np.isfinite(error).all() else run.outcome

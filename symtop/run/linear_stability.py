@@ -26,7 +26,7 @@ from symtop.base.numbers import sign_changes
 from symtop.methods.registry import Integrator, Plan, Run, integrator, solve
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
-from symtop.model.view import view
+from symtop.model.view import View
 
 NUDGE = 1e-6  # rad: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
 TILT = 1e-5  # rad, of the sleeping top
@@ -87,7 +87,7 @@ def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None, 
         start = with_momenta(top, theta + NUDGE, momenta)
         run = few_steps(method, chart, top, start, h)
         with np.errstate(over="ignore"):  # the run may have blown up
-            y = np.asarray(view(chart, top, run.states).theta) - theta
+            y = np.asarray(View(chart, top, run.states).theta) - theta
         if run.outcome != "ok" or not np.isfinite(y).all():
             return NO_TRACE
         t, d, c = _recurrence(y, symmetric=bool(method.symmetric))

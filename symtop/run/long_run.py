@@ -35,7 +35,7 @@ from symtop.methods.registry import Integrator
 from symtop.methods.registry import integrator as find_integrator
 from symtop.model.scenes import Scene
 from symtop.model.scenes import scene as find_scene
-from symtop.model.view import view
+from symtop.model.view import View
 from symtop.run import modified_energy as modified
 from symtop.run.simulation import MOST_STEPS
 
@@ -107,7 +107,7 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
             "modified_energy": curve.rest(*modified.section(chart, states), values) / energy_unit,
             "p_phi": (momenta[:, 0] - start.p_phi) / momentum_unit,
             "p_psi": (momenta[:, 1] - start.p_psi) / momentum_unit,
-            "theta": view(chart, scene.top, states).theta,
+            "theta": View(chart, scene.top, states).theta,
         }
 
     return gauge

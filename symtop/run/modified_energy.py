@@ -24,7 +24,7 @@ import numpy as np
 
 from symtop.methods.registry import Integrator, integrator
 from symtop.model.scenes import Scene
-from symtop.model.view import axis_of, view
+from symtop.model.view import View, axis_of
 
 Array = np.ndarray
 HARMONICS = 40
@@ -32,7 +32,7 @@ HARMONICS = 40
 
 def energy(scene: Scene, chart: str, states: Array) -> Array:
     """The energy of kernel states (n, dimension) with the momenta of the start, less its constant parts."""
-    return np.asarray(view(chart, scene.top, states).nutation_energy(scene.top.momenta(scene.start)))
+    return np.asarray(View(chart, scene.top, states).nutation_energy(scene.top.momenta(scene.start)))
 
 
 def modified_energy(scene: Scene, method: "str | Integrator", chart: str, states: Array, h: float) -> Array:
@@ -40,7 +40,7 @@ def modified_energy(scene: Scene, method: "str | Integrator", chart: str, states
     plain, correction = energy(scene, chart, states), integrator(method).modified_energy
     if correction is None:
         return plain
-    return plain + correction(view(chart, scene.top, states), scene.top.momenta(scene.start), h)
+    return plain + correction(View(chart, scene.top, states), scene.top.momenta(scene.start), h)
 
 
 def section(chart: str, states: Array) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ from symtop.methods.registry import Integrator, Plan, Run, integrator, solve
 from symtop.model import charts
 from symtop.model.scenes import OBSERVABLES, Scene, closed_form, scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import view
+from symtop.model.view import View
 from symtop.run.guard import warning
 
 MOST_STEPS = 20_000_000_000  # ten minutes of the fastest kernel
@@ -221,7 +221,7 @@ def as_dataset(scene: Scene, chart: str, plan: Plan, run: Run) -> xr.Dataset:
 
 def _columns(scene: Scene, chart: str, plan: Plan, run: Run) -> dict[str, Any]:
     """The variables of a run by name; phi and psi made continuous where the chart has them modulo a turn."""
-    seen = view(chart, scene.top, run.states, run.p_phi, run.p_psi)
+    seen = View(chart, scene.top, run.states, run.p_phi, run.p_psi)
     angles = {"phi": seen.phi} if seen.psi is None else {"phi": seen.phi, "psi": seen.psi}
     if chart != "angles":
         truth = closed_form(scene)(plan.times)

@@ -6,7 +6,7 @@ import pytest
 import symtop
 from symtop.methods.registry import Plan, solve
 from symtop.model.charts import CHARTS, DIMENSIONS
-from symtop.model.view import axis_of, space_momenta, view
+from symtop.model.view import View, axis_of, space_momenta
 from symtop.run.reference import reference
 
 TOP, START = symtop.scene("spheroid").top, symtop.scene("spheroid").start
@@ -15,7 +15,7 @@ TOP, START = symtop.scene("spheroid").top, symtop.scene("spheroid").start
 def shown(chart, steps=800, h=0.005):
     method = symtop.integrator("stormer-verlet-blanes-moan-6" if chart == "angles" else "srkn-14-6")
     run = solve(method, chart, TOP, START, Plan.steps(h, np.arange(0, steps + 1, 40)))
-    return view(chart, TOP, run.states, run.p_phi, run.p_psi)
+    return View(chart, TOP, run.states, run.p_phi, run.p_psi)
 
 
 @pytest.mark.parametrize("chart", CHARTS)
@@ -47,7 +47,7 @@ def test_the_charts_agree_on_the_momentum_of_the_nutation_and_on_the_energy_with
 @pytest.mark.parametrize("chart", CHARTS)
 def test_a_stack_of_runs_is_read_as_its_runs(chart):
     one = shown(chart)
-    both = view(
+    both = View(
         chart, TOP, np.stack([one.states, one.states[::-1]]), *(np.stack([p, p[::-1]]) for p in (one.p_phi, one.p_psi))
     )
     for name in ("axis", "theta", "p_theta", "energy"):

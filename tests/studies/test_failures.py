@@ -22,7 +22,7 @@ from symtop.methods.registry import Plan, integrator, integrators, solve
 from symtop.model import charts, scenes
 from symtop.model.scenes import Scene, closed_form, grazing, sleeping
 from symtop.model.top import Angles, SymmetricTop, effective_force
-from symtop.model.view import axis_of, view
+from symtop.model.view import View, axis_of
 from symtop.run.linear_stability import (
     few_steps,
     linear_limits,
@@ -449,7 +449,7 @@ def test_few_steps_energies_are_the_scenes():
         method = integrator(name)
         chart = method.chart_for("axis")
         done = few_steps(method, chart, scene.top, scene.start, 1e-3)
-        assert view(chart, scene.top, done.states, done.p_phi, done.p_psi).energy == pytest.approx(
+        assert View(chart, scene.top, done.states, done.p_phi, done.p_psi).energy == pytest.approx(
             scene.top.energy(scene.start), rel=1e-6
         )
 
