@@ -24,7 +24,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -80,8 +80,16 @@ class Advice:
         return "\n".join([self.reason, *runner, *self.fails])
 
 
-@dataclass(frozen=True)
-class _Trial:
+class _Question(NamedTuple):
+    """What is asked for."""
+
+    scene: Scene
+    accuracy: float
+    quantity: str
+    horizon: float
+
+
+class _Trial(NamedTuple):
     """A candidate with its setting, the error expected at the horizon, and the wall time of the whole run."""
 
     met: settings.Met
@@ -89,12 +97,8 @@ class _Trial:
     seconds: float
     confidence: str  # a key of CONFIDENCE
 
-    @property
-    def name(self) -> str:
-        return self.met.integrator.name
-
     def words(self) -> str:
-        return f"{self.name} with {self.met.integrator.setting(self.met.setting).label}"
+        return f"{self.met.integrator.name} with {self.met.integrator.setting(self.met.setting).label}"
 
 
 def regime(scene: Scene) -> np.ndarray:
@@ -129,17 +133,18 @@ def recommend(
     horizon = scene.horizon if horizon is None else positive("horizon", horizon)
     data = None if results is None else _stored(Path(results) / STORED_STUDY)
     limit = settings.judgeable(scene, quantity, horizon)
+    question = _Question(scene, accuracy, quantity, horizon)
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
-        return _advice(scene, accuracy, quantity, horizon, [], (), source)
-    guesses, source = _candidates(scene, accuracy, quantity, horizon, data)
+        return _advice(question, [], (), source)
+    guesses, source = _candidates(question, data)
     source += f" ({Path(results) / STORED_STUDY})" if results is not None else ""
     trials: list[_Trial] = []
     fails: dict[str, list[str]] = {}
     methods, patience = integrators(), math.inf
     # Methods of high order first: they are the cheapest at most accuracies, and their cost ends the other searches.
     for name in sorted(guesses, key=lambda name: -(methods[name].order or 0)):
-        trial = _try(scene, methods[name], accuracy, quantity, horizon, guesses[name], patience)
+        trial = _try(question, methods[name], guesses[name], patience)
         if isinstance(trial, _Trial):
             trials.append(trial)
             patience = min(patience, TOO_DEAR * trial.met.evaluations)
@@ -150,14 +155,14 @@ def recommend(
     for number, trial in enumerate(trials):
         if number >= FINALISTS and ranked:
             break
-        confirmed = _confirm(scene, trial, accuracy, quantity, horizon)
+        confirmed = _confirm(question, trial)
         if isinstance(confirmed, _Trial):
             ranked.append(confirmed)
         else:
-            fails.setdefault(confirmed, []).append(trial.name)
+            fails.setdefault(confirmed, []).append(trial.met.integrator.name)
     ranked.sort(key=lambda trial: trial.seconds)
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
-    return _advice(scene, accuracy, quantity, horizon, ranked, sentences, source)
+    return _advice(question, ranked, sentences, source)
 
 
 def _stored(file: Path) -> xr.Dataset:
@@ -167,9 +172,8 @@ def _stored(file: Path) -> xr.Dataset:
     try:
         return datasets.read(file)
     except SymtopError as error:
-        raise SymtopError(
-            f"{file} cannot be read ({error.__cause__}); run symtop study work_precision --fresh"
-        ) from error
+        remedy = "run symtop study work_precision --fresh"
+        raise SymtopError(f"{file} cannot be read ({error.__cause__}); {remedy}") from error
 
 
 def _usable(quantity: str) -> dict[str, Integrator]:
@@ -182,10 +186,9 @@ def _usable(quantity: str) -> dict[str, Integrator]:
     }
 
 
-def _candidates(
-    scene: Scene, accuracy: float, quantity: str, horizon: float, data: xr.Dataset | None
-) -> tuple[dict[str, float | None], str]:
+def _candidates(question: _Question, data: xr.Dataset | None) -> tuple[dict[str, float | None], str]:
     """Names of methods to try, each with a first guess of its setting, and a phrase on their origin."""
+    scene, accuracy, quantity, horizon = question
     usable = _usable(quantity)
     everyone: dict[str, float | None] = dict.fromkeys(usable)
     if data is None or quantity not in data:
@@ -219,16 +222,9 @@ def _setting(row: xr.Dataset, scene: Scene, stored: Scene) -> float:
     return step * scale if math.isfinite(scale) and scale > 0.0 else step
 
 
-def _try(
-    scene: Scene,
-    method: Integrator,
-    accuracy: float,
-    quantity: str,
-    horizon: float,
-    guess: float | None,
-    patience: float,
-) -> "_Trial | str":
+def _try(question: _Question, method: Integrator, guess: float | None, patience: float) -> "_Trial | str":
     """A candidate's setting and cost from short runs, or the reason why it has none."""
+    scene, accuracy, quantity, horizon = question
     period = scene.nutation_period
     short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
@@ -241,11 +237,12 @@ def _try(
     return _Trial(met, met.error / law, settings.seconds(scene, met, quantity, horizon), "extrapolated")
 
 
-def _confirm(scene: Scene, trial: _Trial, accuracy: float, quantity: str, horizon: float) -> "_Trial | str":
+def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
     """The trial run to the whole horizon with its setting corrected, or the reason why it fails there.
 
     A trial that would need too many evaluations is returned as it is.
     """
+    scene, accuracy, quantity, horizon = question
     short = trial.met
     if short.evaluations * horizon / short.horizon > settings.MOST_EVALUATIONS[short.integrator.implementation]:
         return trial
@@ -256,28 +253,21 @@ def _confirm(scene: Scene, trial: _Trial, accuracy: float, quantity: str, horizo
     return _Trial(met, met.error, settings.seconds(scene, met, quantity, horizon), confidence)
 
 
-def _advice(
-    scene: Scene,
-    accuracy: float,
-    quantity: str,
-    horizon: float,
-    ranked: Sequence[_Trial],
-    fails: tuple[str, ...],
-    source: str,
-) -> Advice:
+def _advice(question: _Question, ranked: Sequence[_Trial], fails: tuple[str, ...], source: str) -> Advice:
+    scene, accuracy, quantity, horizon = question
     goal = f"{quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}"
-    question: dict[str, Any] = {"scene": scene.name, "quantity": quantity, "accuracy": accuracy, "horizon": horizon}
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}. The closed form, integrator exact, takes no steps."
-        nothing: dict[str, Any] = {"integrator": None, "step_size": None, "tolerance": None, "confidence": "none"}
-        return Advice(**question, **nothing, expected_error=math.nan, seconds=math.nan, reason=reason, fails=fails)
+        return Advice(
+            scene.name, quantity, accuracy, horizon, integrator=None, step_size=None, tolerance=None,
+            expected_error=math.nan, seconds=math.nan, confidence="none", reason=reason, fails=fails,
+        )  # fmt: skip
     best = ranked[0]
     worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
     step = best.met.integrator.fixed_step
     return Advice(
-        **question, integrator=best.name, step_size=best.met.setting if step else None,
-        tolerance=None if step else best.met.setting, expected_error=best.error, seconds=best.seconds,
-        confidence=best.confidence, reason=f"{best.words()} meets {goal}: {worth}; {source}.",
-        runner_up="".join(runners), fails=fails,
+        scene.name, quantity, accuracy, horizon, best.met.integrator.name, best.met.setting if step else None,
+        None if step else best.met.setting, best.error, best.seconds, best.confidence,
+        reason=f"{best.words()} meets {goal}: {worth}; {source}.", runner_up="".join(runners), fails=fails,
     )  # fmt: skip

@@ -3,18 +3,11 @@
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from symtop.base.validate import SymtopError
 from symtop.cli.common import completing, json_option, plugin_option, warn
-
-if TYPE_CHECKING:
-    import numpy as np
-    import xarray as xr
-
-    from symtop.measure.verdicts import Judgement
 
 
 @click.command(short_help="Run one integrator on one scene; show its errors.")
@@ -65,34 +58,28 @@ def run(
 
         single.draw(chosen, data, truth, error, figure)
     series = {name: error[name].dropna("time").values for name in QUANTITIES if name in error}
-    series = {name: values for name, values in series.items() if values.size}
-    click.echo(_run_json(data, verdict, series) if as_json else _run_text(data, verdict, series))
+    largest = {
+        name: {"largest": float(values.max()), "last": float(values[-1])}
+        for name, values in series.items()
+        if values.size
+    }
+    if as_json:
+        names = ("outcome", "outcome_message", "reached_time", "steps", "force_evaluations")
+        findings = {**{name: data.attrs[name] for name in names}, "judgement": verdict._asdict(), "errors": largest}
+        click.echo(json.dumps(findings, indent=1))
+    else:
+        click.echo(
+            "{title}: {outcome_message}\n{steps} steps, {force_evaluations} force evaluations".format(**data.attrs)
+        )
+        if data.attrs["outcome"] == "ok":
+            click.echo(f"judged against the truth: {verdict.verdict}, {verdict.sentence}")
+        for name, values in largest.items():
+            click.echo(f"  {QUANTITIES[name]:<30} largest {values['largest']:.3e}   last {values['last']:.3e}")
     for file in () if as_json else (output, figure):
         if file is not None:
             click.echo(f"written to {file}")
     if data.attrs["outcome"] != "ok":
         sys.exit(3)
-
-
-def _run_json(data: "xr.Dataset", verdict: "Judgement", series: "dict[str, np.ndarray]") -> str:
-    names = ("outcome", "outcome_message", "reached_time", "steps", "force_evaluations")
-    largest = {name: {"largest": float(values.max()), "last": float(values[-1])} for name, values in series.items()}
-    run = {name: data.attrs[name] for name in names}
-    return json.dumps({**run, "judgement": verdict._asdict(), "errors": largest}, indent=1)
-
-
-def _run_text(data: "xr.Dataset", verdict: "Judgement", series: "dict[str, np.ndarray]") -> str:
-    from symtop.measure.errors import QUANTITIES
-
-    lines = [
-        f"{data.attrs['title']}: {data.attrs['outcome_message']}",
-        f"{data.attrs['steps']} steps, {data.attrs['force_evaluations']} force evaluations",
-    ]
-    if data.attrs["outcome"] == "ok":
-        lines.append(f"judged against the truth: {verdict.verdict}, {verdict.sentence}")
-    for name, values in series.items():
-        lines.append(f"  {QUANTITIES[name]:<30} largest {float(values.max()):.3e}   last {float(values[-1]):.3e}")
-    return "\n".join(lines)
 
 
 @click.command(short_help="Run up to billions of steps in little memory.")

@@ -99,7 +99,8 @@ def answer(chosen: Setup) -> dict[str, Any]:
     ran = time.perf_counter()
     times = run["time"].values
     truth = closed_form(chosen.scene).quaternion(times)
-    attitude = _attitude(run)
+    angles = (run[name].values for name in ("theta", "phi", "psi"))
+    attitude = run["quaternion"].values if "quaternion" in run else charts.quaternion_from_angles(*angles)
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
         arrays = {
             "time": times,
@@ -123,13 +124,6 @@ def answer(chosen: Setup) -> dict[str, Any]:
         "largest": {name: _largest(arrays[name]) for name in (*CONSTANTS, "axis_error")},
         "arrays": packed,
     }
-
-
-def _attitude(run: xr.Dataset) -> charts.Array:
-    if "quaternion" in run:
-        quaternions: charts.Array = run["quaternion"].values
-        return quaternions
-    return charts.quaternion_from_angles(run["theta"].values, run["phi"].values, run["psi"].values)
 
 
 def _packed(values: Any) -> str:

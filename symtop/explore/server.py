@@ -31,24 +31,15 @@ LONGEST_BODY = 65_536  # bytes of a POST request
 POLICY = "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
 
-def _run(chosen: answers.Setup) -> tuple[bytes, str]:
-    return json.dumps(answers.answer(chosen)).encode(), "application/json"
-
-
-def _netcdf(chosen: answers.Setup) -> tuple[bytes, str]:
+def _netcdf(chosen: answers.Setup) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        path = datasets.write(answers.dataset(chosen, str), Path(folder) / "explored.nc")
-        return path.read_bytes(), "application/x-netcdf"
+        return datasets.write(answers.dataset(chosen, str), Path(folder) / "explored.nc").read_bytes()
 
 
-def _script(chosen: answers.Setup) -> tuple[bytes, str]:
-    return answers.script(chosen).encode(), "text/x-python; charset=utf-8"
-
-
-ACTIONS: dict[str, Callable[[answers.Setup], tuple[bytes, str]]] = {
-    "/run": _run,
-    "/netcdf": _netcdf,
-    "/script": _script,
+ACTIONS: dict[str, tuple[Callable[[answers.Setup], bytes], str]] = {
+    "/run": (lambda chosen: json.dumps(answers.answer(chosen)).encode(), "application/json"),
+    "/netcdf": (_netcdf, "application/x-netcdf"),
+    "/script": (lambda chosen: answers.script(chosen).encode(), "text/x-python; charset=utf-8"),
 }
 
 
@@ -91,8 +82,8 @@ class Handler(BaseHTTPRequestHandler):
             if length > LONGEST_BODY:
                 self._refuse(413, f"a question must be at most {LONGEST_BODY} bytes, not {length}")
                 return
-            chosen = answers.setup(_parsed(self.rfile.read(length)))
-            body, kind = ACTIONS[self.path](chosen)
+            action, kind = ACTIONS[self.path]
+            body = action(answers.setup(_parsed(self.rfile.read(length))))
         except SymtopError as error:
             # The page shows the sentence in place of a run, as an ordinary answer; a file cannot be replaced by it.
             self._refuse(200 if self.path == "/run" else 400, str(error))
