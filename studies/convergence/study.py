@@ -3,9 +3,9 @@
 import math
 
 import xarray as xr
-from symtop.measure.settings import step_ladder
 
 from symtop.measure.accuracy import error_table
+from symtop.measure.settings import step_ladder
 from symtop.methods.registry import integrator, integrators
 from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes

@@ -9,10 +9,10 @@ import math
 
 import numpy as np
 import xarray as xr
-from symtop.measure.settings import seek
 
 from symtop.measure.growth import growth, horizon, lost_at
 from symtop.measure.phase import nutation_phase
+from symtop.measure.settings import seek
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.measure.verdicts import NO_GAP, barriers, judge
+from symtop.measure.verdicts import barriers, judge, pole_passed
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.registry import Integrator, Plan, solve
 from symtop.model import charts, scenes
@@ -122,11 +122,7 @@ def _judged(scene: Scene, seen: View, phases: Array, outcome: NDArray[np.int64])
         early[k], late[k] = taken[: taken.size // 2].max(initial=0.0), taken[taken.size // 2 :].max(initial=0.0)
     error = np.fmax.reduce(charts.axis_distance(seen.axis, true_axis(scene, phases)), axis=1)
     error[outcome != 0] = math.nan
-    start = scene.top.momenta(scene.start)
-    least, passed = NO_GAP * scene.momentum_scale, np.zeros(len(outcome), dtype=bool)
-    for gap, now in ((start.north, seen.p_phi - seen.p_psi), (start.south, seen.p_phi + seen.p_psi)):
-        if abs(gap) > least:
-            passed |= (now * gap < 0.0).any(axis=1)
+    passed = pole_passed(scene, seen.p_phi, seen.p_psi).any(axis=1)
     low, high = np.fmin.reduce(seen.theta, axis=1), np.fmax.reduce(seen.theta, axis=1)
     return Judged(judge(_barriers(scene), outcome, error, low, high, early, late, passed), error)
 

@@ -81,12 +81,11 @@ def judge(
     return verdicts
 
 
-def _pole_passed(scene: Scene, run: xr.Dataset) -> NDArray[np.bool_]:
-    """At which samples the axis has passed a pole on the side that its momenta forbid."""
+def pole_passed(scene: Scene, p_phi: Any, p_psi: Any) -> NDArray[np.bool_]:
+    """At which samples (...) of momenta the axis has passed a pole on the side that those of the start forbid."""
     momenta = scene.top.momenta(scene.start)
     least = NO_GAP * scene.momentum_scale
-    passed = np.zeros(run.sizes["time"], dtype=bool)
-    p_phi, p_psi = run["p_phi"].values, run["p_psi"].values
+    passed = np.zeros(np.shape(p_phi), dtype=bool)
     for gap, now in ((momenta.north, p_phi - p_psi), (momenta.south, p_phi + p_psi)):
         if abs(gap) > least:
             passed |= now * gap < 0.0
@@ -103,7 +102,7 @@ def verdict(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> str:
     half = energy.size // 2
     index = judge(
         barriers(scene), ended, np.max(axis_error), theta.min(), theta.max(),
-        energy[:half].max(), energy[half:].max(), _pole_passed(scene, run).any(),
+        energy[:half].max(), energy[half:].max(), pole_passed(scene, run["p_phi"].values, run["p_psi"].values).any(),
     )  # fmt: skip
     return VERDICTS[int(index)]
 
@@ -126,7 +125,7 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         return Judgement(word, float(times[-1]), f"accurate to {worst:.2g} rad up to t = {times[-1]:.6g}")
     theta = run["theta"].values
     beyond = ~((theta >= truth.highest - truth.margin) & (theta <= truth.lowest + truth.margin))
-    passed = _pole_passed(scene, run)
+    passed = pole_passed(scene, run["p_phi"].values, run["p_psi"].values)
     energy = np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     events: dict[str, Any] = {
         "wrong_regime": beyond | passed,

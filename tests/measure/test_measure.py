@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop.measure.settings import ladder
 
 import symtop
 from symtop.measure import verdicts
@@ -14,6 +13,7 @@ from symtop.measure.conservation import trend
 from symtop.measure.errors import errors_against
 from symtop.measure.growth import growth
 from symtop.measure.order import order
+from symtop.measure.settings import ladder
 from symtop.measure.timing import Timing, timings
 from symtop.run.reference import reference
 from symtop.run.simulation import sample_times
