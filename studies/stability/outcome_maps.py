@@ -60,8 +60,7 @@ class RowPlan(NamedTuple):
 
     method: Integrator
     settings: tuple[float, ...]  # steps in nutation periods, or tolerances
-    steps: tuple[int, ...]  # of each run; empty unless the step is fixed
-    marks: tuple[NDArray[np.int64], ...]  # in steps; empty unless the step is fixed
+    marks: tuple[NDArray[np.int64], ...]  # steps to each sample, the last to the end; empty unless the step is fixed
     phases: Array  # (runs, SAMPLES), NaN beyond the last sample of a run
 
 
@@ -70,15 +69,14 @@ def row_plan(method: Integrator, settings: Sequence[float], periods: float) -> R
     phases = np.full((len(settings), SAMPLES), math.nan)
     if not method.fixed_step:
         phases[:] = sample_times(periods, SAMPLES, 1.0)[0]
-        return RowPlan(method, tuple(settings), (), (), phases)
-    steps, marks = [], []
+        return RowPlan(method, tuple(settings), (), phases)
+    marks = []
     for k, value in enumerate(settings):
         count = math.ceil(periods / value - 1e-9)
         times, places, _ = sample_times(count * value, SAMPLES, 1.0, count)
-        steps.append(count)
         marks.append(places)
         phases[k, : times.size] = places * value
-    return RowPlan(method, tuple(settings), tuple(steps), tuple(marks), phases)
+    return RowPlan(method, tuple(settings), tuple(marks), phases)
 
 
 class Judged(NamedTuple):
@@ -96,10 +94,7 @@ def row(runs: RowPlan, scene: Scene) -> Judged:
     shape = runs.phases.shape
     states, momenta = np.full((*shape, charts.DIMENSIONS[chart]), math.nan), np.full((2, *shape), math.nan)
     for k, value in enumerate(runs.settings):
-        if runs.steps:
-            plan = Plan.steps(value * period, runs.marks[k], runs.steps[k] * (value * period))
-        else:
-            plan = Plan.until(runs.phases[k] * period, value)
+        plan = Plan.steps(value * period, runs.marks[k]) if runs.marks else Plan.until(runs.phases[k] * period, value)
         run = solve(runs.method, chart, scene.top, scene.start, plan)
         count = len(run.p_phi)
         states[k, :count] = run.states

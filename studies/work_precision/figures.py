@@ -25,13 +25,6 @@ COSTS = {"seconds": "wall time of one run (s)", "force_evaluations": "force eval
 LEAST = 1e-15  # the lowest error that is drawn, where the reference has no bound
 MOST_TIMES = 1000.0  # the fastest method's time: the right end of a profile
 SHARED = {"width": 11.5, "sharex": True, "sharey": True}
-SHORT = {
-    "stormer-verlet": "verlet", "takahashi-imada": "takahashi", "suzuki-umeno-8": "umeno-8",
-    "sofroniou-spaletta-10": "sofroniou-10", "taylor-longdouble": "taylor-long", "rk45-compiled": "rk45-comp",
-    "stormer-verlet-yoshida-4": "verlet-y4", "stormer-verlet-suzuki-4": "verlet-s4", "galerkin-simpson": "galerkin",
-    "midpoint-unreduced": "midpoint-u", "trapezoidal-unreduced": "trapezoidal-u",
-    "stormer-verlet-blanes-moan-6": "verlet-bm6",
-}  # fmt: skip
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
@@ -123,11 +116,12 @@ def _winners(data: xr.Dataset) -> Picture:
         strength, label, color = 0.0, "none", GREY
         if won is not None:
             name = won.best.integrator
-            strength, label = (0.35, f"~{SHORT.get(name, name)}") if won.level else (0.95, SHORT.get(name, name))
+            strength, label = (0.35, f"~{name}") if won.level else (0.95, name)
             shade = strength * np.array(to_rgb(look(name).color)) + (1.0 - strength)
             axis.fill_between([column - 0.49, column + 0.49], row - 0.46, row + 0.46, color=shade, lw=0)
             color = "white" if shade @ np.array([0.3, 0.59, 0.11]) < 0.55 else "black"
-        axis.text(column, row, label, ha="center", va="center", fontsize=7.5, color=color)
+        size = min(8.0, 130.0 / len(label))
+        axis.text(column, row, label, ha="center", va="center", fontsize=size, color=color)
     for axis, span in zip(axes[0], words.spans(data), strict=True):
         axis.set(
             xlim=(-0.5, len(TARGETS) - 0.5), ylim=(len(scenes) - 0.5, -0.5), yticks=range(len(scenes)),

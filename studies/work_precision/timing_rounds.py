@@ -63,14 +63,12 @@ def timed_runs(data: xr.Dataset, compared: Collection[str] = ()) -> list[TimedRu
     return runs
 
 
-def contenders(
-    runs: Sequence[TimedRun], cost: Mapping[TimedRun, float], implementation: Mapping[str, str]
-) -> list[TimedRun]:
+def contenders(runs: Sequence[TimedRun], cost: Mapping[TimedRun, float], kind: Mapping[str, str]) -> list[TimedRun]:
     """The runs near the fastest, compiled or plain Python, for some horizon and target; that one is among them."""
     rivals: dict[tuple[str, int, int], list[TimedRun]] = {}
     for run in sorted(runs, key=lambda run: cost[run]):
         for number in run.targets:
-            rivals.setdefault((implementation[run.name], run.far, number), []).append(run)
+            rivals.setdefault((kind[run.name], run.far, number), []).append(run)
     near = [[run for run in group[:MOST_NEAR] if cost[run] <= WITHIN * cost[group[0]]] for group in rivals.values()]
     return list(dict.fromkeys(run for group in near if len(group) > 1 for run in group))
 
@@ -93,9 +91,10 @@ def timing_rounds(
         return dict(zip(chosen, timings(calls, *effort, seed), strict=True))
 
     once = measured(runs, first, 0)
-    implementation = {name: method.implementation for name, method in methods.items()}
-    twice = measured(contenders(runs, {run: timing.best for run, timing in once.items()}, implementation), further, 1)
-    differing = [run for run, timing in twice.items() if differ(once[run].best, timing.best)]
+    kind = {name: method.implementation for name, method in methods.items()}
+    twice = measured(contenders(runs, {run: timing.best for run, timing in once.items()}, kind), further, 1)
+    pairs = {run: sorted((once[run].best, timing.best)) for run, timing in twice.items()}
+    differing = [run for run, (less, more) in pairs.items() if more > (1.0 + NOISY) * less]
     again = measured(differing, further, 2)
 
     row = {name: k for k, name in enumerate(methods)}
@@ -113,8 +112,3 @@ def timing_rounds(
         spread=table["seconds_samples"].median("batch") / best - 1.0,
         first_call=("integrator", [firsts[name] for name in row]),
     )
-
-
-def differ(one: float, other: float) -> bool:
-    """Do two times of the same run differ by more than `NOISY`?"""
-    return max(one, other) > (1.0 + NOISY) * min(one, other)

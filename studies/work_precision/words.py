@@ -38,13 +38,9 @@ def seconds(value: float) -> str:
     return f"{value * 1e6:.3g} us" if value < 1e-3 else f"{value * 1e3:.3g} ms" if value < 1.0 else f"{value:.3g} s"
 
 
-def of_implementation(data: xr.Dataset, implementation: str) -> list[str]:
+def of_implementation(data: xr.Dataset, kind: str) -> list[str]:
     """The names of the compiled methods, or of those in plain Python."""
-    return [
-        str(name)
-        for name in data["integrator"].values
-        if implementation in data["implementation"].sel(integrator=name).values
-    ]
+    return [str(name) for name in data["integrator"].values if kind in data["implementation"].sel(integrator=name)]
 
 
 def level(won: ranking.Win) -> str:

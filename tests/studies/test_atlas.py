@@ -60,7 +60,7 @@ def test_adaptive_methods_are_mapped_over_their_tolerance():
 
 def test_rows_share_phases_and_are_not_commensurate_with_the_nutation():
     runs = row_plan(integrator("strang"), [0.01, 0.25, 2.0], 12.0)
-    assert runs.steps == (1200, 48, 6)
+    assert [marks[-1] for marks in runs.marks] == [1200, 48, 6]
     assert np.isnan(runs.phases[2]).sum() == 49 - 7
     phases = np.sort(np.mod(runs.phases[0], 1.0))
     assert np.max(np.diff(phases)) < 0.125
