@@ -25,7 +25,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from symtop.base.fingerprint import Reasons, file_label, file_reasons, hashed
+from symtop.base.fingerprint import Reasons, file_label, hashed
 from symtop.base.imports import closure, files_of, root_of
 
 Parts = Callable[[Any], Iterable[Any]]
@@ -93,10 +93,6 @@ class Walk:
     def closure(self) -> frozenset[Path]:
         """The files that count, and those that they import."""
         return closure(self.files)
-
-    def reasons(self) -> Reasons:
-        """Values and files."""
-        return self.values() | file_reasons(self.closure())
 
     def _note(self, *values: str) -> None:
         self._values.setdefault(self.label, []).extend(values)

@@ -1,14 +1,13 @@
 """What a case's numbers depend on, found without running it: a mapping from labels to hashes (`base.fingerprint`).
 
 A case is measured by a function of its study, on a scene, with one integrator or several. Each of them is walked. The
-registry finds the families of integrators by name and not by an import statement: it leads to none of them, and a case
-depends on the files of the integrators it runs and on no others. Editing `methods/gauss.py` makes the cases of the
-Gauss methods stale and no other. A file counts as a whole: two kernels in one file go stale together.
+registry imports the families of integrators by name and leads to none of them: a case depends on the files of the
+integrators that it runs. Editing `methods/gauss.py` makes the cases of the Gauss methods stale and no other.
 
-Which integrators a case runs is what its study declares (`Study.uses`), or the one it names and any that the code of
-its measure may look up: literal names in a file that asks for integrators or runs, and all of them where a file asks
-the registry by its own choice. `simulate` and the registry choose nothing: they look up what they are given, and what
-is reached only through them (the guard, which runs pieces of a method) makes a sentence and no number.
+A case runs the integrators that its study declares (`Study.uses`), or the one it names and any that the code of its
+measure may look up: literal names in a file that asks for integrators or runs, and all of them where a file asks the
+registry by its own choice. `simulate` and the registry look up what they are given, and what is reached only through
+them (the guard, which runs pieces of a method) makes a sentence and no number.
 """
 
 import ast

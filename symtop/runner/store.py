@@ -164,6 +164,7 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
                 return
             if os.fstat(file.fileno()).st_nlink == 0:  # its holder removed it while we waited
                 continue
+            os.utime(file.fileno())  # since when it is held
             try:
                 yield True
             finally:

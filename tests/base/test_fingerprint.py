@@ -14,7 +14,7 @@ import pytest
 
 import symtop
 from symtop.base import cache, fingerprint, imports, signals
-from symtop.base.fingerprint import changes, digest, merged
+from symtop.base.fingerprint import changes, digest, file_reasons, merged
 from symtop.base.walk import Walk
 from symtop.methods import compiled
 from symtop.runner import depends
@@ -50,7 +50,7 @@ def test_a_script_counts_by_the_functions_and_globals_that_are_reached(tmp_path)
     (tmp_path / "script.py").write_text(SCRIPT)
     walk = Walk("measure")
     walk.add(loaded(tmp_path / "script.py", "fingerprint_script").measure)
-    reasons = walk.reasons()
+    reasons = walk.values() | file_reasons(walk.closure())
     assert set(walk.values()) == {
         "measure", "function script.py:measure", "function script.py:part", "constant script.py:STEPS",
         "constant script.py:gauss.STILL",
@@ -157,7 +157,7 @@ def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_co
         exec(text, space)
         walk = Walk("measure")
         walk.add(space["measure"])
-        return walk.reasons()
+        return walk.values()
 
     plain = made(2, 1, "words", "comment")
     assert made(2, 1, "other words", "another comment") == plain
