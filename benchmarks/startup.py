@@ -33,10 +33,7 @@ def measure(repeats: int = 3) -> dict[str, float]:
     plan = Plan.steps(scene.horizon / steps, [steps], scene.horizon)
     solve = symtop.integrator("midpoint").solvers["angles"]
     whole, kernel = timings(
-        [
-            lambda: symtop.simulate(scene, "midpoint", step_size=STEP),
-            lambda: solve(scene.top, scene.start, plan),
-        ],
+        [lambda: symtop.simulate(scene, "midpoint", step_size=STEP), lambda: solve(scene.top, scene.start, plan)],
         batches=15,
     )
     return {

@@ -10,36 +10,28 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from symtop.advise import Advice as Advice
-    from symtop.advise import recommend as recommend
-    from symtop.base.validate import SymtopError as SymtopError
-    from symtop.base.validate import SymtopWarning as SymtopWarning
+    from symtop.advise import Advice as Advice, recommend as recommend
+    from symtop.base.validate import SymtopError as SymtopError, SymtopWarning as SymtopWarning
     from symtop.measure.errors import errors as errors
     from symtop.methods.citations import citation as citation
     from symtop.methods.discrete_lagrangian import discrete_lagrangian as discrete_lagrangian
-    from symtop.methods.registry import Integrator as Integrator
-    from symtop.methods.registry import Plan as Plan
-    from symtop.methods.registry import Run as Run
-    from symtop.methods.registry import integrator as integrator
-    from symtop.methods.registry import integrators as integrators
-    from symtop.methods.registry import register as register
+    from symtop.methods.registry import (
+        Integrator as Integrator,
+        Plan as Plan,
+        Run as Run,
+        integrator as integrator,
+        integrators as integrators,
+        register as register,
+    )
     from symtop.methods.runge_kutta import runge_kutta as runge_kutta
     from symtop.methods.splitting import composition as composition
     from symtop.model.closed_form import ClosedForm as ClosedForm
-    from symtop.model.scenes import Scene as Scene
-    from symtop.model.scenes import register_scene as register_scene
-    from symtop.model.scenes import scene as scene
-    from symtop.model.scenes import scenes as scenes
-    from symtop.model.top import Angles as Angles
-    from symtop.model.top import Momenta as Momenta
-    from symtop.model.top import SymmetricTop as SymmetricTop
+    from symtop.model.scenes import Scene as Scene, register_scene as register_scene, scene as scene, scenes as scenes
+    from symtop.model.top import Angles as Angles, Momenta as Momenta, SymmetricTop as SymmetricTop
     from symtop.run.long_run import long_run as long_run
     from symtop.run.reference import reference as reference
     from symtop.run.simulation import simulate as simulate
-    from symtop.runner.study import Case as Case
-    from symtop.runner.study import Picture as Picture
-    from symtop.runner.study import Study as Study
-    from symtop.runner.study import Table as Table
+    from symtop.runner.study import Case as Case, Picture as Picture, Study as Study, Table as Table
 
 __version__ = "0.1.0"
 

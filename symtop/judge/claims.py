@@ -22,8 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.base.validate import SymtopError
-from symtop.judge import claims_long as long
-from symtop.judge import claims_order as orders
+from symtop.judge import claims_long as long, claims_order as orders
 from symtop.judge.ledger import CLAIMS, Finding, Ledger, undecided
 from symtop.measure import step_map as maps
 from symtop.methods.registry import Integrator

@@ -23,8 +23,7 @@ from symtop.measure.order import Fit, order
 from symtop.measure.settings import ladder
 from symtop.methods.registry import Integrator
 from symtop.model import charts
-from symtop.model.scenes import Scene, closed_form
-from symtop.model.scenes import scene as find_scene
+from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.simulation import simulate
 
 Array = NDArray[np.float64]

@@ -19,8 +19,7 @@ from symtop.base.numbers import EPSILON
 from symtop.base.validate import one_of
 from symtop.measure.trajectory import CONSTANTS, checked, completed, refuse_other_order, scene_of
 from symtop.model import charts
-from symtop.model.scenes import Scene
-from symtop.model.scenes import scene as find_scene
+from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.reference import PRECISIONS, reference
 
 QUANTITIES: dict[str, str] = {

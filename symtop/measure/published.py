@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.model.scenes import closed_form
-from symtop.model.scenes import scene as find_scene
+from symtop.model.scenes import closed_form, scene as find_scene
 from symtop.run.reference import reference
 
 REMARK = "an asymmetric free body: tests the solver beside us, not symtop"

@@ -191,5 +191,5 @@ def built_in() -> list[Integrator]:
             conserves=frozenset(),
             least_tolerance=LEAST_TOLERANCE,
             reference="dormand-prince-1980",
-        ),
+        )
     ]

@@ -178,5 +178,5 @@ def built_in() -> list[Integrator]:
             order=4,
             summary="classical Runge-Kutta method on the unreduced equations",
             reference="kutta-1901",
-        ),
+        )
     ]

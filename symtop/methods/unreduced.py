@@ -26,8 +26,7 @@ import numpy as np
 from symtop.base.validate import SymtopError
 from symtop.methods.angles import BareTop, chart_outcome, require_chart
 from symtop.methods.compiled import register_jitable
-from symtop.methods.discrete_lagrangian import built_in as reduced_methods
-from symtop.methods.discrete_lagrangian import rule_of
+from symtop.methods.discrete_lagrangian import built_in as reduced_methods, rule_of
 from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver
 from symtop.methods.newton import Correction, newton

@@ -11,8 +11,7 @@ from symtop.base.validate import SymtopError
 from symtop.methods.registry import Integrator, integrators
 from symtop.model.scenes import Scene, scenes
 from symtop.report import interactive, markdown
-from symtop.runner import run as runner
-from symtop.runner import store
+from symtop.runner import run as runner, store
 
 TITLE = "Integrators on the heavy symmetric top"
 INTRODUCTION = (

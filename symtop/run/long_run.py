@@ -31,10 +31,8 @@ from symtop.methods.compiled import code_of
 from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.loop import Loop, Position
 from symtop.methods.outcomes import OK, OUTCOMES, sentence
-from symtop.methods.registry import Integrator
-from symtop.methods.registry import integrator as find_integrator
-from symtop.model.scenes import Scene
-from symtop.model.scenes import scene as find_scene
+from symtop.methods.registry import Integrator, integrator as find_integrator
+from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.view import View
 from symtop.run import modified_energy as modified
 from symtop.run.simulation import MOST_STEPS

@@ -31,8 +31,7 @@ from symtop.base.numbers import EPSILON, TINY
 from symtop.base.validate import SymtopError, SymtopWarning, one_of
 from symtop.methods import taylor
 from symtop.model import charts
-from symtop.model.scenes import Scene, closed_form, scenes
-from symtop.model.scenes import scene as find_scene
+from symtop.model.scenes import Scene, closed_form, scene as find_scene, scenes
 from symtop.run.kept import kept
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")

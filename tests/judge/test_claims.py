@@ -13,8 +13,7 @@ from click.testing import CliRunner
 
 import symtop
 from symtop.cli.main import main
-from symtop.judge import claims
-from symtop.judge import claims_long as long
+from symtop.judge import claims, claims_long as long
 from symtop.judge.claims import judge
 from symtop.judge.claims_order import limit
 from symtop.judge.ledger import CLAIMS, VERDICTS, Finding, read
@@ -23,8 +22,7 @@ from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss,
 from symtop.methods.registry import Integrator, Run
 from symtop.model import charts
 from symtop.report import style
-from symtop.runner import plugins
-from symtop.runner import run as runner
+from symtop.runner import plugins, run as runner
 from tests.conftest import random_scenes
 
 registry = importlib.import_module("symtop.methods.registry")

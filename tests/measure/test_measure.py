@@ -94,8 +94,7 @@ def test_errors_of_momenta_and_energy_are_relative_to_their_documented_scales():
 
 
 @pytest.mark.parametrize(
-    ("name", "evaluations"),
-    [("stormer-verlet", 1), ("strang", 1), ("chin-4a", 2), ("srkn-14-6", 14), ("rk4", 4)],
+    ("name", "evaluations"), [("stormer-verlet", 1), ("strang", 1), ("chin-4a", 2), ("srkn-14-6", 14), ("rk4", 4)]
 )
 def test_force_evaluations_are_counted(name, evaluations):
     run = symtop.simulate("goldstein", name, step_size=0.05, horizon=5.0)

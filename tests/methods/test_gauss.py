@@ -8,8 +8,7 @@ import pytest
 import symtop
 from symtop.measure.conservation import residuals, trend
 from symtop.measure.growth import growth
-from symtop.measure.step_map import one_step as map_of
-from symtop.measure.step_map import symplectic_defect
+from symtop.measure.step_map import one_step as map_of, symplectic_defect
 from symtop.methods.fixed_step import FixedStep
 from symtop.methods.gauss import STAGES, gauss_rule, march_axis, march_frame
 from symtop.methods.registry import integrator

@@ -13,8 +13,7 @@ from mpmath import mp, mpf, workdps
 
 import symtop
 from symtop.model.precise_form import PreciseForm
-from symtop.run.reference import _cache_path, check_times
-from symtop.run.reference import reference as reference_function
+from symtop.run.reference import _cache_path, check_times, reference as reference_function
 
 
 @pytest.fixture

@@ -30,10 +30,7 @@ def test_simulate_adds_less_than_two_milliseconds():
     plan = Plan(np.array([8.0]), 8.0, 0.01, np.array([800]), np.nan)
     solve = symtop.integrator("midpoint").solvers["angles"]
     whole, kernel = timings(
-        [
-            lambda: symtop.simulate(where, "midpoint", step_size=0.01),
-            lambda: solve(where.top, where.start, plan),
-        ]
+        [lambda: symtop.simulate(where, "midpoint", step_size=0.01), lambda: solve(where.top, where.start, plan)]
     )
     assert whole.best - kernel.best < 2e-3
 

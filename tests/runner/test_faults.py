@@ -20,8 +20,7 @@ from symtop.base import datasets
 from symtop.base.validate import SymtopError
 from symtop.cli.main import main
 from symtop.methods import compiled
-from symtop.runner import run as runner
-from symtop.runner import store, work
+from symtop.runner import run as runner, store, work
 from tests.commands import PROBE, contents, ended, leftovers, stop, symtop
 from tests.kills import survive
 

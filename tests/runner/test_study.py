@@ -24,11 +24,9 @@ from symtop.methods import registry
 from symtop.methods.fixed_step import inside
 from symtop.methods.registry import Integrator, is_built_in
 from symtop.report import style
-from symtop.runner import check, depends, store
-from symtop.runner import run as runner
+from symtop.runner import check, depends, run as runner, store
 from symtop.runner.study import Case
-from tests.commands import PROBE, ended
-from tests.commands import symtop as symtop_command
+from tests.commands import PROBE, ended, symtop as symtop_command
 
 PLUGIN = """\
 import symtop

@@ -18,8 +18,7 @@ from symtop.methods.registry import integrator, integrators
 from symtop.model.scenes import closed_form, scene
 from symtop.report.style import OUTCOME_COLORS
 from symtop.run.reference import reference
-from symtop.runner import run as runner
-from symtop.runner import store
+from symtop.runner import run as runner, store
 from symtop.runner.study import Case
 
 STEPS = [0.011, 0.053, 0.17, 0.31, 0.83]

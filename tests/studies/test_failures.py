@@ -8,12 +8,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from symtop_studies.stability.failures import (
-    sampled_energy_error,
-    separatrix_horizon,
-    survives,
-    surviving_displacement,
-)
+from symtop_studies.stability.failures import sampled_energy_error, separatrix_horizon, survives, surviving_displacement
 from symtop_studies.stability.solver_tolerance import solver_sweep, textbook_midpoint
 
 import symtop

@@ -6,14 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from symtop_studies.notebook.derivations import (
-    easy_way,
-    energies,
-    hard_way,
-    notebook_top,
-    nutation_cubic,
-    with_alpha,
-)
+from symtop_studies.notebook.derivations import easy_way, energies, hard_way, notebook_top, nutation_cubic, with_alpha
 from symtop_studies.notebook.tables import (
     SOLVER,
     SOLVER_TOLERANCE,

@@ -15,13 +15,7 @@ from symtop_studies.oscillators.oscillator import (
     notebook_positions,
     rule_sums,
 )
-from symtop_studies.oscillators.tables import (
-    Column,
-    convergence,
-    damped_top_table,
-    decay,
-    notebook_history,
-)
+from symtop_studies.oscillators.tables import Column, convergence, damped_top_table, decay, notebook_history
 
 import symtop
 from symtop.measure.order import power_law

@@ -9,8 +9,7 @@ from symtop_studies.drift import tables, words
 from symtop_studies.notebook import words as notebook_words
 from symtop_studies.notebook.tables import SOLVER, Column
 from symtop_studies.stability import words as stability_words
-from symtop_studies.truth import tables as truth_tables
-from symtop_studies.truth import words as truth_words
+from symtop_studies.truth import tables as truth_tables, words as truth_words
 
 import symtop
 from symtop.measure import conservation, published

@@ -6,9 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.work_precision import energy, opening
-from symtop_studies.work_precision import timing_rounds as rounds_module
-from symtop_studies.work_precision import words as work_words
+from symtop_studies.work_precision import energy, opening, timing_rounds as rounds_module, words as work_words
 from symtop_studies.work_precision.timing_rounds import Effort, TimedRun, contenders, timed_runs, timing_rounds
 
 import symtop
@@ -19,8 +17,7 @@ from symtop.measure.work import TARGETS, Walk, least_work, spans, work_table
 from symtop.model import charts
 from symtop.model.scenes import closed_form
 from symtop.run.reference import reference
-from symtop.runner import depends, store
-from symtop.runner import run as runner
+from symtop.runner import depends, run as runner, store
 from symtop.runner.study import Case, Study
 
 
