@@ -120,11 +120,13 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     """``njit`` with the disk cache.
 
     Division by zero gives infinity, as in C: the kernel's outcome says what became of it.
-    A kernel with functions typed at a prompt, which have no source file, compiles without the cache.
+    A kernel with functions typed at a prompt, which have no source file, compiles without the cache. The constructor of
+    a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
     """
     kernel = njit(**OPTIONS)(function)
     walk = code_of(function)
-    if all(Path(part.__code__.co_filename).is_file() for part in walk.functions):
+    written = [part for part in walk.functions if not part.__module__.startswith("namedtuple_")]
+    if all(Path(part.__code__.co_filename).is_file() for part in written):
         folder = cache_root() / "kernels" / digest(walk.values())
         touch(folder)
         kernel._cache = _Cache(function, folder)
