@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import pytest
 from click.testing import CliRunner
@@ -49,9 +50,9 @@ def test_the_flags_are_the_claims(name, order, flags):
 def test_one_integrator_is_shown_in_full():
     page = printed("integrators", "midpoint")
     assert page.startswith("midpoint: discrete Lagrangian, midpoint rule\n")
-    assert "conserves   p_phi, p_psi\n" in page
-    assert "charts      angles\n" in page
-    assert "source      marsden-west-2001\n" in page
+    assert re.search(r"^conserves +p_phi, p_psi$", page, re.MULTILINE)
+    assert re.search(r"^charts +angles$", page, re.MULTILINE)
+    assert re.search(r"^source +marsden-west-2001$", page, re.MULTILINE)
     assert "@article{marsden-west-2001," in page
     (record,) = json.loads(printed("integrators", "rk45", "--json"))
     assert float(record["least tolerance"]) > 1e-15
