@@ -203,7 +203,7 @@ def test_an_edited_callee_makes_a_new_kernel_and_a_comment_makes_none(tmp_path):
     shutil.copytree(imports.PACKAGE, tmp_path / "symtop", ignore=skip)
     before = kernels_of(tmp_path, tmp_path / "cache")
     assert before["files"]
-    for name in ("measure/errors.py", "measure/modified_energy.py", "explore/answers.py", "methods/gauss.py",
+    for name in ("measure/errors.py", "run/modified_energy.py", "explore/answers.py", "methods/gauss.py",
                  "methods/loop.py", "methods/compiled.py", "base/walk.py"):  # fmt: skip
         file = tmp_path / "symtop" / name
         text = file.read_text()
