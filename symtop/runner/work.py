@@ -137,6 +137,7 @@ def _last_resort(seconds: float, trace: Path) -> Iterator[None]:
 def begin_worker(parent: int) -> None:
     """Initialise a worker of a pool: ignore interrupts, and exit when the parent process has ended."""
     _expendable.append(True)
+    scripts.install()  # settings of a case may hold records of a study's own
     tqdm.set_lock(threading.RLock())  # its own would be a semaphore of the system, left behind when a worker is ended
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
