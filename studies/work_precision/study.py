@@ -53,7 +53,8 @@ def follow_up(data: xr.Dataset) -> list[Case]:
     for name in data["scene"].values:
         runs = timed_runs(data.sel(scene=name), COMPARED)
         names = list(dict.fromkeys(run.name for run in runs))
-        settings = {"runs": [list(run) for run in runs], "integrators": names, "periods": periods, **EFFORT[periods == PERIODS[True]]}
+        settings = {"runs": [list(run) for run in runs], "integrators": names, "periods": periods}
+        settings |= EFFORT[periods == PERIODS[True]]
         grid.append(Case(str(name), "together", settings, timed=True))
     return grid
 
