@@ -37,6 +37,7 @@ OPTIONS = {"error_model": "numpy"}  # division by zero gives infinity, as in C
 INLINED = {"forceinline": True}
 
 _stands_for: dict[int, list[object]] = {}  # id of a function: what numba compiles in its place
+_registered: set[Callable[..., Any]] = set()
 _known = [0]  # entries of numba's registry that `_stands_for` knows
 _pruned: list[Path] = []
 
@@ -46,9 +47,13 @@ def register_jitable(function: Callable[..., Any]) -> Any:
     """Let kernels call a plain function, inlined wherever they do.
 
     Left to itself LLVM keeps the larger ones, such as the drift of a splitting, as calls that pass their results
-    through memory: 1.3 times the time of a step.
+    through memory: 1.3 times the time of a step. A function is registered once: numba would add another overload each
+    time, and what a kernel is made of would hang on how many loops a process has built before.
     """
-    return _register(**INLINED)(function)
+    if function not in _registered:
+        _registered.add(function)
+        _register(**INLINED)(function)
+    return function
 
 
 def _overloads(function: FunctionType) -> Iterator[object]:

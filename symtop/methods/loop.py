@@ -58,6 +58,7 @@ class March(NamedTuple):
     outcome: int  # index into OUTCOMES
 
 
+@register_jitable
 def accumulate(state: Any, low: Any, dstate: Any) -> Any:
     """(state + low) + dstate as a new pair of high and low parts; exact (Knuth's two-sum).
 
@@ -74,6 +75,7 @@ def accumulate(state: Any, low: Any, dstate: Any) -> Any:
     return total, low
 
 
+@register_jitable
 def accumulate_plainly(state: Any, low: Any, dstate: Any) -> Any:
     """What everybody else's loop does: every step rounds, and what it rounds off is lost. For comparison only."""
     for i in range(len(state)):
@@ -81,10 +83,12 @@ def accumulate_plainly(state: Any, low: Any, dstate: Any) -> Any:
     return state, low
 
 
+@register_jitable
 def _as_given(par: Any, rule: Any, state: Any, h: float) -> Any:
     return state
 
 
+@register_jitable
 def _as_stepped(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     return state
 
@@ -138,7 +142,7 @@ def driver(  # noqa: C901  (one loop, read in one piece)
     add: Callable[..., Any] = accumulate,
 ) -> Loop:
     """The loop around one kernel family; `add` is how increments are summed."""
-    for part in (begin, increment, observe, enter, present, add):
+    for part in (begin, increment, observe, enter, present):
         register_jitable(part)
 
     def prepare(par, rule, state, h):  # type: ignore[no-untyped-def]

@@ -140,6 +140,14 @@ def test_a_checkpoint_knows_a_method_by_what_it_holds_and_not_by_its_name():
     assert identity(dataclasses.replace(plain, summary="said otherwise")) == identity(plain)
 
 
+def test_a_checkpoint_does_not_depend_on_what_a_process_did_before():
+    h = WHERE.nutation_period / 100.37
+    before = longrun._identity(WHERE, symtop.integrator("midpoint"), h, 500, True)
+    for name in ("galerkin-simpson", "gauss-4", "stormer-verlet"):  # each builds another loop round shared functions
+        chart_of(symtop.integrator(name))[1].loop.plain.__wrapped__()
+    assert longrun._identity(WHERE, symtop.integrator("midpoint"), h, 500, True) == before
+
+
 def _root() -> str:
     return str(Path(symtop.__file__).resolve().parents[1])
 
