@@ -8,7 +8,7 @@ import time
 
 import symtop
 from symtop.measure.timing import timings
-from symtop.methods.registry import Plan
+from symtop.methods.plan import Plan
 
 STEP = 0.01
 FIRST = f"import symtop; symtop.simulate('spheroid', 'midpoint', step_size={STEP})"

@@ -11,7 +11,7 @@ import numpy as np
 
 import symtop
 from symtop.measure.timing import timings
-from symtop.methods.registry import Plan
+from symtop.methods.plan import Plan
 from symtop.model import charts
 
 HORIZON = 8.0

@@ -15,10 +15,9 @@ if TYPE_CHECKING:
     from symtop.measure.errors import errors as errors
     from symtop.methods.citations import citation as citation
     from symtop.methods.discrete_lagrangian import discrete_lagrangian as discrete_lagrangian
+    from symtop.methods.plan import Plan as Plan, Run as Run
     from symtop.methods.registry import (
         Integrator as Integrator,
-        Plan as Plan,
-        Run as Run,
         integrator as integrator,
         integrators as integrators,
         register as register,
@@ -41,7 +40,8 @@ _NAMES = {  # by the module that holds them
     "measure.errors": "errors",
     "methods.citations": "citation",
     "methods.discrete_lagrangian": "discrete_lagrangian",
-    "methods.registry": "Integrator Plan Run integrator integrators register",
+    "methods.plan": "Plan Run",
+    "methods.registry": "Integrator integrator integrators register",
     "methods.runge_kutta": "runge_kutta",
     "methods.splitting": "composition",
     "model.closed_form": "ClosedForm",

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numba import carray, cfunc, njit, types
 
-from symtop.methods.registry import Array, Integrator, Plan, Run, Solver
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Array, Integrator, Solver
 from symtop.methods.space import on_axis
 from symtop.model.top import Angles, SymmetricTop
 

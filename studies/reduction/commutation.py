@@ -25,8 +25,9 @@ from scipy.optimize import newton
 
 from symtop.methods.discrete_lagrangian import rule_of
 from symtop.methods.galerkin import is_galerkin
+from symtop.methods.plan import Plan
 from symtop.methods.quadrature import Quadrature
-from symtop.methods.registry import Integrator, Plan
+from symtop.methods.registry import Integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 

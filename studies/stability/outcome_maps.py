@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from symtop.measure.verdicts import barriers, judge, pole_passed
 from symtop.methods.outcomes import OUTCOMES
-from symtop.methods.registry import Integrator, Plan, solve
+from symtop.methods.plan import Plan
+from symtop.methods.registry import Integrator, solve
 from symtop.model import charts, scenes
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles

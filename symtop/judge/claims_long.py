@@ -100,7 +100,7 @@ def _run(method: Integrator, scene: Scene, steps: float, step: float, samples: i
 
 def long_run(method: Integrator, scene: Scene, chart: str, *, quick: bool = False) -> LongRun:
     """A million steps of a compiled method in one of its charts, fewer where that would take minutes."""
-    method = method.only(chart)
+    method = method.row(chart)
     for finer in FINER:  # a motion that passes close to a pole needs shorter steps
         step = scene.time_scale() / (STEPS_A_NUTATION * finer)
         pilot = _run(method, scene, PILOT, step, PILOT + 1)
@@ -194,7 +194,7 @@ def passages(method: Integrator) -> list[Passage]:
     """What happens at a pole, in every chart of the method."""
     rows = []
     for chart in method.charts():
-        only = method.only(chart)
+        only = method.row(chart)
         ends, errors_there = [], []
         for finer in (1.0, 2.0):
             step, tolerance = POLE.horizon / (POLE_STEPS * finer), max(10.0 ** (-5.0 - finer), method.least_tolerance)

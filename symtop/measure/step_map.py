@@ -29,7 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.base.validate import SymtopError
-from symtop.methods.registry import Integrator, Plan, Run
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Integrator
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop

@@ -14,7 +14,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from symtop.methods.registry import Integrator, Run
+from symtop.methods.plan import Run
+from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import make_plan
 

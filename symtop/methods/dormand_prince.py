@@ -22,7 +22,8 @@ from symtop.methods.angles import chart_outcome
 from symtop.methods.compiled import compile_kernel, register_jitable, set_item
 from symtop.methods.euler_lagrange import LEAST_TOLERANCE, as_run, field_angles, with_rates
 from symtop.methods.outcomes import NOT_FINITE, OK, OUT_OF_BUDGET, OUTCOMES, STEP_TOO_SMALL
-from symtop.methods.registry import Integrator, Plan, Run
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Integrator
 from symtop.methods.runge_kutta import later_stages, store, weighted
 from symtop.model.top import Angles, SymmetricTop
 

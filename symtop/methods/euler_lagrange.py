@@ -18,7 +18,8 @@ import numpy as np
 
 from symtop.methods.angles import BareTop, require_chart
 from symtop.methods.compiled import register_jitable
-from symtop.methods.registry import Array, Run
+from symtop.methods.plan import Run
+from symtop.methods.registry import Array
 from symtop.model.top import Angles, SymmetricTop
 
 LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws the line

@@ -5,7 +5,8 @@ Source: Klein and Sommerfeld, Theory of the Top, chapter 6; see `symtop.model.cl
 
 import numpy as np
 
-from symtop.methods.registry import Integrator, Plan, Run
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Integrator
 from symtop.model.closed_form import ClosedForm
 from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import space_momenta

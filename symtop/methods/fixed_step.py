@@ -6,7 +6,8 @@ from typing import Any
 
 from symtop.methods.loop import Loop, March
 from symtop.methods.outcomes import OUTCOMES
-from symtop.methods.registry import Array, Plan, Run, Solver
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Array, Solver
 from symtop.model.top import Angles, SymmetricTop
 
 Prepare = Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]

@@ -4,88 +4,32 @@ Traits are data. They are *claims* until measured; `None` means that nobody has 
 made by a family (`discrete_lagrangian`, `composition`, ...) from a table of numbers, or by hand around any
 function ``solve(top, start, plan) -> Run``. Nothing is decided by an integrator's name: what a measurement needs to
 know of a method is a field of its record.
+
+A method in one of its charts is a *row* of a comparison, ``rk4[axis]``: method and chart are two factors, and a
+comparison of ``rk4[angles]`` with ``strang[axis]`` changes both. `rows` lists them; `integrator` knows them by name.
 """
 
 import importlib
 import importlib.metadata
-import math
+import re
 import threading
 import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from symtop.base.validate import SymtopError, SymtopWarning, finite, label, one_of, positive, whole
 from symtop.base.walk import by_name
 from symtop.methods.about import paragraphs
+from symtop.methods.plan import Plan, Run
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View
 
 Array = NDArray[np.float64]
-
-
-class Plan(NamedTuple):
-    """What a solver is asked for: the sample times, and the step or the tolerance to reach them with.
-
-    A fixed-step solver makes marks[-1] steps of `step_size` and keeps the states after marks[0], marks[1], ... of
-    them; `times` are the same instants. An adaptive solver has no marks: it keeps the states at `times`, which need not
-    be ends of its steps. The first sample may be the start itself (mark 0, time 0).
-
-    A fixed step may be negative: probes of reversibility ask for one step of -h, and then `times` and `horizon` are
-    negative too. A solver that cannot do that raises SymtopError and is judged by the motion with all rates reversed.
-    """
-
-    times: Array  # (samples,) increasing in size, the first may be 0
-    horizon: float  # elapsed time of the whole run
-    step_size: float  # nan for an adaptive method
-    marks: NDArray[np.int64]  # (samples,) whole steps, increasing; empty for an adaptive method
-    tolerance: float  # nan for a fixed-step method
-    budget: float | None = None  # of an adaptive method: force evaluations or Taylor steps; None for its own limit
-
-    @classmethod
-    def steps(cls, h: float, marks: ArrayLike, horizon: float | None = None) -> Self:
-        """Steps of h, sampled after `marks` of them; `horizon` if it is not their product to the last bit."""
-        whole_steps = np.asarray(marks, dtype=np.int64)
-        end = float(whole_steps[-1]) * h if horizon is None else horizon
-        return cls(np.multiply(whole_steps, h, dtype=float), end, h, whole_steps, math.nan)
-
-    @classmethod
-    def until(cls, times: ArrayLike, tolerance: float, budget: float | None = None) -> Self:
-        """To the last of `times` at a tolerance (nan for a method that has none), sampled at all of them."""
-        samples = np.asarray(times, dtype=float)
-        return cls(samples, float(samples[-1]), math.nan, np.empty(0, dtype=np.int64), tolerance, budget)
-
-    def most(self, limit: float) -> float:
-        """The budget, or a method's own limit where nobody gave one."""
-        return limit if self.budget is None else self.budget
-
-
-class Run(NamedTuple):
-    """What a solver returns: states of its chart at the sample times, NaN after a failure.
-
-        chart      a state
-        angles     theta, p_theta, phi, psi                   radians; phi and psi count whole turns
-        axis       e_x, e_y, e_z, L_x, L_y, L_z               both vectors in the space frame
-        attitude   w, x, y, z of q, and L_x, L_y, L_z         q turns body vectors into space vectors
-
-    p_phi and p_psi are recomputed from the trajectory (by the discrete Legendre transform, or as L_z and L.e) and never
-    copied from the start, so that a method that loses them shows it.
-    """
-
-    states: Array  # (samples, 4, 6 or 7)
-    p_phi: Array  # (samples,)
-    p_psi: Array  # (samples,)
-    steps: int
-    force_evaluations: int
-    newton_iterations: int
-    outcome: str
-    reached: float
-
-
 Solver = Callable[[SymmetricTop, Angles, Plan], Run]
 ModifiedEnergy = Callable[[View, Momenta, float], Array]  # of states (n, dimension), momenta of the start and h: (n,)
 
@@ -99,7 +43,14 @@ SMALLEST_FIRST = {
     "axis": ("axis", "angles", "attitude"),
     "attitude": ("angles", "attitude"),
 }  # the charts that show it, in order of preference
+_ROW = re.compile(r"(.+)\[(\w*)\]")
 _CLAIM = {True: "yes", False: "no", None: "unknown"}
+
+
+def split_name(name: str) -> tuple[str, str]:
+    """The method and the chart in the name of a row, ``rk4[axis]``; the chart is empty in any other name."""
+    row = _ROW.fullmatch(name) if isinstance(name, str) else None
+    return (row[1], row[2]) if row else (name, "")
 
 
 class Setting(NamedTuple):
@@ -150,7 +101,10 @@ class Integrator:
     about: str = field(default="", repr=False, compare=False, metadata={"words": True})  # a paragraph: what it is, when
 
     def __post_init__(self) -> None:
-        label("name", self.name)
+        name, chart = split_name(self.name)
+        label("name", name)
+        if chart and tuple(self.solvers) != (chart,):
+            raise SymtopError(f"name {self.name!r} needs one solver, of {chart}, not of {', '.join(self.solvers)}")
         if self.order is not None:
             whole("order", self.order, 1)
         one_of("family", self.family, FAMILIES)
@@ -209,9 +163,15 @@ class Integrator:
                 return chart
         raise SymtopError(f"{self.name} works in {', '.join(self.solvers)} and cannot show the {observe}")
 
-    def only(self, chart: str) -> "Integrator":
-        """The same integrator with nothing but its solver of one chart."""
-        return replace(self, solvers={chart: self.solvers[chart]})
+    @property
+    def method(self) -> str:
+        """The name without a chart."""
+        return split_name(self.name)[0]
+
+    def row(self, chart: str) -> "Integrator":
+        """The same integrator with nothing but its solver of one chart, named ``method[chart]``."""
+        name = f"{self.method}[{one_of(f'chart of {self.method}', chart, self.solvers)}]"
+        return self if name == self.name else replace(self, name=name, solvers={chart: self.solvers[chart]})
 
     def record(self) -> dict[str, str]:
         """What tables show of this integrator: its claims in words, by column."""
@@ -285,6 +245,8 @@ def register(entry: Integrator, *, replace: bool = False) -> Integrator:
     """Add an integrator to the registry; a name that is taken is refused unless `replace` is true."""
     if not isinstance(entry, Integrator):
         raise SymtopError(f"register needs an Integrator, not {entry!r}")
+    if entry.method != entry.name:
+        raise SymtopError(f"register needs an integrator and not one of its rows, {entry.name!r}")
     _load()
     if entry.name in _registry and not replace:
         raise SymtopError(f"integrator {entry.name!r} is already registered; choose another name or pass replace=True")
@@ -295,7 +257,7 @@ def register(entry: Integrator, *, replace: bool = False) -> Integrator:
 def is_built_in(name: str) -> bool:
     """Does every process know this integrator without being told?"""
     _load()
-    return name in _shipped
+    return split_name(name)[0] in _shipped
 
 
 class _Integrators(dict[str, Integrator]):
@@ -318,8 +280,25 @@ def integrators() -> dict[str, Integrator]:
 
 @by_name
 def integrator(name: "str | Integrator") -> Integrator:
-    """The integrator of that name; an Integrator is returned as it is."""
+    """The integrator of that name, or the row: ``rk4[axis]`` works in no other chart. An Integrator is returned as is.
+
+    Raises SymtopError for an unknown name, with the nearest ones, and for a chart that the method does not have.
+    """
     if isinstance(name, Integrator):
         return name
     _load()
-    return _registry[one_of("integrator", name, _registry)]
+    method, chart = split_name(name)
+    entry = _registry[one_of("integrator", method, _registry)]
+    return entry.row(chart) if chart else entry
+
+
+@by_name
+def rows(observe: str | None = None) -> list[Integrator]:
+    """Every method in each of its charts, or in those that show the "nutation", the "axis" or the "attitude"."""
+    showing = None if observe is None else SMALLEST_FIRST[one_of("observe", observe, SMALLEST_FIRST)]
+    return [
+        entry.row(chart)
+        for entry in integrators().values()
+        for chart in entry.charts()
+        if showing is None or chart in showing
+    ]

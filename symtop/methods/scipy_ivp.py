@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 
 from symtop.methods.euler_lagrange import LEAST_TOLERANCE, accelerations, as_run, with_rates
-from symtop.methods.registry import Integrator, Plan, Run, Solver
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Integrator, Solver
 from symtop.model.top import Angles, SymmetricTop
 
 EVALUATIONS = 20_000_000  # a run's limit: about two minutes

@@ -20,7 +20,8 @@ import numpy as np
 
 from symtop.base.multiprecision import context
 from symtop.base.validate import SymtopError
-from symtop.methods.registry import Array, Integrator, Plan, Run, Solver
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Array, Integrator, Solver
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import space_momenta

@@ -25,6 +25,7 @@ class Look(NamedTuple):
     color: str
     marker: str
     size: float = 5.0
+    fill: str = "full"  # of the marker, matplotlib's fillstyle: the chart of a row
 
 
 # Shades of a family: light enough to tell apart, of one hue so that families stay together.
@@ -75,16 +76,22 @@ OUTCOME_COLORS = {
 }  # fmt: skip
 
 
+FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, by chart
+
+
 def look(name: str) -> Look:
-    """Colour and marker of an integrator.
+    """Colour and marker of an integrator, or of a row: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
 
     Those that ship with symtop have a fixed look. An added one gets a shade of its family and a marker that no shipped
     one of these shades has; which of them depends on its name alone, not on what else is registered.
     """
+    from symtop.methods.registry import integrators, split_name
+
+    name, chart = split_name(name)
+    if chart:
+        return look(name)._replace(fill=FILLS[chart])
     if name in _LOOKS:
         return _LOOKS[name]
-    from symtop.methods.registry import integrators
-
     registered = integrators()
     shades = _SHADES[registered[name].family if name in registered else "other"]
     free = [Look(shade, marker) for marker in _MARKERS for shade in shades]

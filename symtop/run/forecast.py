@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.base.numbers import GOLDEN
-from symtop.methods.registry import Integrator, Plan, integrator, solve
+from symtop.methods.plan import Plan
+from symtop.methods.registry import Integrator, integrator, solve
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop

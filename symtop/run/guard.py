@@ -18,7 +18,8 @@ and `simulate` dithers samples that would fall on the same phases.
 import math
 
 from symtop.methods.outcomes import sentence
-from symtop.methods.registry import Integrator, Plan
+from symtop.methods.plan import Plan
+from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.forecast import Forecast, Landmarks, forecast, landmarks
 from symtop.run.linear_stability import trace

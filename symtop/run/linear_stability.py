@@ -23,7 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.base.numbers import sign_changes
-from symtop.methods.registry import Integrator, Plan, Run, integrator, solve
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Integrator, integrator, solve
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View

@@ -18,7 +18,8 @@ from symtop.base import datasets
 from symtop.base.numbers import GOLDEN
 from symtop.base.validate import SymtopError, SymtopWarning, one_of, positive, whole
 from symtop.methods.outcomes import OUTCOMES, sentence
-from symtop.methods.registry import Integrator, Plan, Run, integrator, solve
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Integrator, integrator, solve
 from symtop.model import charts
 from symtop.model.scenes import OBSERVABLES, Scene, closed_form, scene
 from symtop.model.top import Angles, SymmetricTop
@@ -117,8 +118,8 @@ def simulate(
     where the chart does not show them), ``axis(time, component)``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, and
     ``quaternion`` where the chart has one. Samples after a failure are NaN; ``outcome``, ``outcome_message`` and
     ``reached_time`` say what happened, ``guard`` what was expected to. `observe` ("nutation", "axis", "attitude";
-    default: what the scene is watched for) picks the smallest chart of the integrator that shows it. A run of fewer
-    steps than `samples` shows every step.
+    default: what the scene is watched for) picks the smallest chart of the integrator that shows it; a row, such as
+    ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step.
 
     Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
     error is expected; the run is the same either way. Give a function to be handed the sentence instead, or False for
@@ -130,11 +131,13 @@ def simulate(
     """
     chosen, method = _scene(scene), _integrator(integrator)
     end = chosen.horizon if horizon is None else positive("horizon", horizon)
-    watched = chosen.observes if observe is None else one_of("observe", observe, OBSERVABLES)
     count = whole("samples", samples, 2)
     if count > MOST_SAMPLES:
         raise SymtopError(f"samples must be at most {MOST_SAMPLES}, not {count}")
-    chart = method.chart_for(watched)
+    if observe is None and method.name != method.method:
+        chart = method.charts()[0]
+    else:
+        chart = method.chart_for(chosen.observes if observe is None else one_of("observe", observe, OBSERVABLES))
     limit = None if budget is None else positive("budget", budget)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, horizon=end, samples=count, budget=limit)
     caution = warning(chosen, method, chart, plan) if guard is not False else "off"

@@ -21,14 +21,20 @@ from symtop.base import datasets, fingerprint, imports
 from symtop.base.fingerprint import Reasons
 from symtop.base.walk import Walk
 from symtop.methods import registry
-from symtop.methods.registry import Integrator, integrators
+from symtop.methods.registry import Integrator, integrators, rows, split_name
 from symtop.model.scenes import scenes
 from symtop.run import simulation
 from symtop.runner import plugins
 from symtop.runner.study import Case, Study
 
 EVERY = "*"  # in place of an integrator's or a scene's name: all of them
-ASKING = {"integrator", "integrators", "registry", "simulate"}  # names whose import means that a file may run a method
+ASKING = {
+    "integrator",
+    "integrators",
+    "rows",
+    "registry",
+    "simulate",
+}  # names whose import means that a file may run a method
 RESOLVERS = frozenset(Path(str(module.__file__)).resolve() for module in (simulation, registry))
 
 
@@ -50,7 +56,7 @@ def _may_run_any(file: Path) -> bool:
     and an argument of the function around it, which its caller chooses.
     """
     names = _asks_for(file)
-    if names & {"integrators", "registry"}:
+    if names & {"integrators", "rows", "registry"}:
         return True
     tree = _tree(file)
     imported = [alias for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names]
@@ -90,7 +96,7 @@ def basis(measure: Callable[..., Any]) -> Basis:
     walk.add(measure)
     asking = [file for file in imports.closure(walk.files, RESOLVERS) - RESOLVERS if _asks_for(file)]
     names = walk.strings.union(*map(_strings, asking)) & integrators().keys()
-    if integrators in walk.functions or any(map(_may_run_any, asking)):
+    if {integrators, rows} & walk.functions or any(map(_may_run_any, asking)):
         names.add(EVERY)
     return Basis(walk.values(), walk.closure(), frozenset(names))
 
@@ -114,7 +120,7 @@ def used(study: Study, case: Case) -> list[str]:
     else:
         names = {case.integrator, *case.settings.get("integrators", ()), *basis(study.measure).names}
     known = integrators().keys()
-    return sorted(known if EVERY in names else names & known)
+    return sorted(known if EVERY in names else {split_name(name)[0] for name in names} & known)
 
 
 def settings_key(study: Study, case: Case) -> str:

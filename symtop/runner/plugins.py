@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from symtop.base import fingerprint
-from symtop.methods.registry import integrators, is_built_in
+from symtop.methods.registry import integrators, is_built_in, split_name
 from symtop.model.scenes import added_scenes, scenes
 from symtop.runner import scripts
 
@@ -39,4 +39,5 @@ def reasons(names: Iterable[str]) -> fingerprint.Reasons:
 
 def is_local(name: str) -> bool:
     """Was this integrator or scene registered by hand in this process, so that no other process can know it?"""
+    name = split_name(name)[0]
     return name not in _owners and (name in added_scenes() or (name in integrators() and not is_built_in(name)))

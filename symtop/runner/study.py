@@ -79,8 +79,9 @@ class Case:
 
     @property
     def label(self) -> str:
-        """A name that is safe in a file."""
-        return "--".join(filter(None, (self.scene, self.integrator, self.group))).replace("/", "_")
+        """A name that is safe in a file: ``spheroid--rk4@axis`` for the row rk4[axis]."""
+        parts = "--".join(filter(None, (self.scene, self.integrator, self.group)))
+        return parts.replace("/", "_").replace("[", "@").replace("]", "")
 
 
 @dataclass(frozen=True)

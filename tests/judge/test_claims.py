@@ -19,7 +19,8 @@ from symtop.judge.claims_order import limit
 from symtop.judge.ledger import CLAIMS, VERDICTS, Finding, read
 from symtop.measure.growth import behaviour
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
-from symtop.methods.registry import Integrator, Run
+from symtop.methods.plan import Run
+from symtop.methods.registry import Integrator
 from symtop.model import charts
 from symtop.report import style
 from symtop.runner import plugins, run as runner

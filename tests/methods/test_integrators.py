@@ -91,7 +91,7 @@ def test_the_step_map_is_symplectic(name, where):
 def explicit_euler(top, start, plan):
     """Order 1, not symplectic, not symmetric: what the structure tests must catch."""
     par, (theta, p, phi, psi) = reduced(top, start)
-    from symtop.methods.registry import Run
+    from symtop.methods.plan import Run
     from symtop.model.top import effective_force
 
     h = plan.step_size

@@ -13,7 +13,7 @@ from symtop.measure.accuracy import error_table
 from symtop.measure.order import power_law
 from symtop.measure.step_map import one_step, symplectic_defect
 from symtop.methods import coefficients as tables, splitting_space as space
-from symtop.methods.registry import Plan
+from symtop.methods.plan import Plan
 from symtop.methods.splitting import built_in, composition
 from symtop.model import charts
 from symtop.model.scenes import closed_form

@@ -5,7 +5,7 @@ import pytest
 
 import symtop
 from symtop.measure.timing import timings
-from symtop.methods.registry import Plan
+from symtop.methods.plan import Plan
 
 STEPS = 20_000
 

@@ -331,7 +331,7 @@ BAD = """
 import itertools, os, time
 import numpy as np
 import symtop
-from symtop.methods.registry import Run
+from symtop.methods.plan import Run
 
 def raises(top, start, plan):
     raise RuntimeError("no luck")

@@ -13,7 +13,8 @@ from symtop_studies.stability.solver_tolerance import solver_sweep, textbook_mid
 
 import symtop
 from symtop.methods.discrete_lagrangian import rule_of
-from symtop.methods.registry import Plan, integrator, integrators, solve
+from symtop.methods.plan import Plan
+from symtop.methods.registry import integrator, integrators, solve
 from symtop.model import charts, scenes
 from symtop.model.scenes import Scene, closed_form, grazing, sleeping
 from symtop.model.top import Angles, SymmetricTop, effective_force

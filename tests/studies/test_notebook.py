@@ -23,8 +23,8 @@ import symtop
 from symtop.base.validate import SymtopError
 from symtop.measure.order import power_law
 from symtop.methods.euler_lagrange import accelerations, momenta
+from symtop.methods.plan import Plan
 from symtop.methods.quadrature import RULES
-from symtop.methods.registry import Plan
 from symtop.report import solid
 from symtop.run.modified_energy import modified_energy
 

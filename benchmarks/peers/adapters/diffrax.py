@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.peers.common import ON_AXIS, SAME, peer, run_of, start_of
-from symtop.methods.registry import Integrator, Plan, Run, Solver
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Integrator, Solver
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "diffrax"

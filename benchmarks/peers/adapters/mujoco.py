@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.peers.common import peer
-from symtop.methods.registry import Integrator, Plan, Run, Solver
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Integrator, Solver
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop
 

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.peers.common import ON_AXIS, c_field, peer, run_of, start_of
-from symtop.methods.registry import Integrator, Plan, Run
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Integrator
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "rebound"

@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.peers.common import ON_AXIS, SAME, compiled_field, peer, python_field, run_of, start_of
 from symtop.methods.dormand_prince import LEAST_TOLERANCE
-from symtop.methods.registry import Integrator, Plan, Run, Solver
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Integrator, Solver
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "scipy"

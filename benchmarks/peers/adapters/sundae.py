@@ -9,7 +9,8 @@ import types
 from typing import Any
 
 from benchmarks.peers.common import ON_AXIS, SAME, filling_field, peer, run_of, start_of, with_start
-from symtop.methods.registry import Integrator, Plan, Run, Solver
+from symtop.methods.plan import Plan, Run
+from symtop.methods.registry import Integrator, Solver
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "scikit-sundae"

@@ -1,0 +1,67 @@
+"""What a solver is asked for, a `Plan`, and what it returns, a `Run`."""
+
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+class Plan(NamedTuple):
+    """What a solver is asked for: the sample times, and the step or the tolerance to reach them with.
+
+    A fixed-step solver makes marks[-1] steps of `step_size` and keeps the states after marks[0], marks[1], ... of
+    them; `times` are the same instants. An adaptive solver has no marks: it keeps the states at `times`, which need not
+    be ends of its steps. The first sample may be the start itself (mark 0, time 0).
+
+    A fixed step may be negative: probes of reversibility ask for one step of -h, and then `times` and `horizon` are
+    negative too. A solver that cannot do that raises SymtopError and is judged by the motion with all rates reversed.
+    """
+
+    times: Array  # (samples,) increasing in size, the first may be 0
+    horizon: float  # elapsed time of the whole run
+    step_size: float  # nan for an adaptive method
+    marks: NDArray[np.int64]  # (samples,) whole steps, increasing; empty for an adaptive method
+    tolerance: float  # nan for a fixed-step method
+    budget: float | None = None  # of an adaptive method: force evaluations or Taylor steps; None for its own limit
+
+    @classmethod
+    def steps(cls, h: float, marks: ArrayLike, horizon: float | None = None) -> Self:
+        """Steps of h, sampled after `marks` of them; `horizon` if it is not their product to the last bit."""
+        whole_steps = np.asarray(marks, dtype=np.int64)
+        end = float(whole_steps[-1]) * h if horizon is None else horizon
+        return cls(np.multiply(whole_steps, h, dtype=float), end, h, whole_steps, math.nan)
+
+    @classmethod
+    def until(cls, times: ArrayLike, tolerance: float, budget: float | None = None) -> Self:
+        """To the last of `times` at a tolerance (nan for a method that has none), sampled at all of them."""
+        samples = np.asarray(times, dtype=float)
+        return cls(samples, float(samples[-1]), math.nan, np.empty(0, dtype=np.int64), tolerance, budget)
+
+    def most(self, limit: float) -> float:
+        """The budget, or a method's own limit where nobody gave one."""
+        return limit if self.budget is None else self.budget
+
+
+class Run(NamedTuple):
+    """What a solver returns: states of its chart at the sample times, NaN after a failure.
+
+        chart      a state
+        angles     theta, p_theta, phi, psi                   radians; phi and psi count whole turns
+        axis       e_x, e_y, e_z, L_x, L_y, L_z               both vectors in the space frame
+        attitude   w, x, y, z of q, and L_x, L_y, L_z         q turns body vectors into space vectors
+
+    p_phi and p_psi are recomputed from the trajectory (by the discrete Legendre transform, or as L_z and L.e) and never
+    copied from the start, so that a method that loses them shows it.
+    """
+
+    states: Array  # (samples, 4, 6 or 7)
+    p_phi: Array  # (samples,)
+    p_psi: Array  # (samples,)
+    steps: int
+    force_evaluations: int
+    newton_iterations: int
+    outcome: str
+    reached: float
