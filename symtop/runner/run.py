@@ -49,8 +49,8 @@ class Round:
     def stored(cls, study: Study, results: Path, *, quick: bool, full: bool) -> Self:
         """The cases of a study with what is stored of them; of the second round only if the first one is done."""
         cases = cls(study, results.resolve())
-        if not cases.add(study.grid(quick=quick, full=full), fresh=False) and study.follow_up is not None:
-            cases.add(study.follow_up(cases.combined()), fresh=False)
+        if not cases.add(study.grid(quick=quick, full=full), fresh=False):
+            cases.follow_up(fresh=False)
         return cases
 
     def add(self, cases: Iterable[Case], *, fresh: bool) -> dict[Path, Case]:
@@ -60,6 +60,10 @@ class Round:
         if not fresh:
             self._look(new)
         return {path: case for path, case in new.items() if path not in self.done}
+
+    def follow_up(self, *, fresh: bool) -> dict[Path, Case]:
+        """Take the second round in, made from what the first one found; returns those that have to be computed."""
+        return {} if self.study.follow_up is None else self.add(self.study.follow_up(self.combined()), fresh=fresh)
 
     def _look(self, paths: Iterable[Path]) -> None:
         loaded = {path: data for path in paths if (data := store.load_case(path)) is not None}
@@ -92,8 +96,7 @@ class Round:
 
 def _stamp(study: Study, digests: Iterable[str], save: Save | None) -> str:
     """Hash of what the findings depend on: the cases, the script and the code that combines, draws and judges."""
-    processor = "" if study.follow_up is None else datasets.provenance()["processor"]  # the second round is timed
-    return fingerprint.hashed(*digests, processor, depends.script_digest(file_of(study.name), store, save))
+    return fingerprint.hashed(*digests, depends.script_digest(file_of(study.name), store, save))
 
 
 def _drawn(study: Study, results: Path, stamp: str) -> dict[str, Any] | None:
@@ -126,14 +129,14 @@ def run(study: Study, results: Path, *, quick: bool = False, full: bool = False,
     missing = cases.add(study.grid(quick=quick, full=full), fresh=fresh)
     stamp = _stamp(study, sorted(path.name for path in cases.paths), save)
     before = _drawn(study, results, stamp)
-    if before is not None and not missing:
+    later = None if missing else cases.follow_up(fresh=fresh)  # not known before the first round is done
+    if before is not None and later == {}:
         return {**before, "computed": 0, "seconds": time.monotonic() - began}
     with Workers(jobs) if workers is None else contextlib.nullcontext(workers) as hired:
         try:
             cases.compute(missing, hired, seconds, fresh=fresh, quiet=quiet)
-            if study.follow_up is not None:
-                later = cases.add(study.follow_up(cases.combined()), fresh=fresh)
-                cases.compute(later, hired, seconds, fresh=fresh, quiet=quiet)
+            later = cases.follow_up(fresh=fresh) if later is None else later
+            cases.compute(later, hired, seconds, fresh=fresh, quiet=quiet)
         except BaseException:
             hired.close()  # before what its processes have left is removed
             store.tidy(results, study)
