@@ -111,13 +111,9 @@ def regime(scene: Scene) -> np.ndarray:
 
 
 def recommend(
-    scene: "str | Scene",
-    *,
-    accuracy: float,
-    quantity: str = "axis",
-    horizon: float | None = None,
+    scene: "str | Scene", *, accuracy: float, quantity: str = "axis", horizon: float | None = None,
     results: str | Path | None = None,
-) -> Advice:
+) -> Advice:  # fmt: skip
     """The cheapest integrator, with its step or tolerance, that keeps the error of `quantity` below `accuracy`.
 
     `accuracy` is the largest absolute error of `quantity` over the run: radians for ``axis``, ``attitude`` and

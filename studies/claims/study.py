@@ -43,9 +43,5 @@ STUDY = Study(
         "does not claim is measured all the same. The second figure shows whether the defect of a step is real or an "
         "error of measuring it."
     ),
-    cases=cases,
-    measure=measure,
-    pictures=figures.pictures,
-    tables=words.tables,
-    verdict=words.verdict,
-)
+    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+)  # fmt: skip

@@ -54,9 +54,5 @@ STUDY = Study(
         "top, the step is too large for the order to show; where it flattens at the bottom, the error has reached "
         "rounding or the grey band, below which the reference cannot judge."
     ),
-    cases=cases,
-    measure=measure,
-    pictures=figures.pictures,
-    tables=words.tables,
-    verdict=words.verdict,
-)
+    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+)  # fmt: skip

@@ -80,10 +80,5 @@ STUDY = Study(
         "discrete methods have a larger but bounded energy error and conserve the momenta to rounding; a Runge-Kutta "
         "method begins with a smaller error and loses energy and momenta in time."
     ),
-    cases=cases,
-    full=full,
-    measure=measure,
-    pictures=figures.pictures,
-    tables=words.tables,
-    verdict=words.verdict,
-)
+    cases=cases, full=full, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+)  # fmt: skip

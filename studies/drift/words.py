@@ -31,9 +31,6 @@ HORIZON_COLUMNS = {
 }  # fmt: skip
 
 
-# ---- tables ----------------------------------------------------------------------------------------------------------
-
-
 def tables(data: xr.DataTree) -> list[Table]:
     """Largest residuals, trends and growth exponents; drift by rounding; losses of phase."""
     groups = {name: group.to_dataset() for name, group in data.children.items()}
@@ -89,9 +86,6 @@ def law(cell: xr.Dataset, name: str) -> str:
     changes = np.isfinite(time) and above_rounding
     change = f"; t^{before:.2f} to t^{after:.2f} at t = {time:.3g}" if changes else ""
     return f"{_exponent(cell, name)}, {cell[f'{name}_law'].item()}{change}"
-
-
-# ---- sentences of captions and of the verdict ------------------------------------------------------------------------
 
 
 def holding(histories: xr.Dataset) -> str:
@@ -155,8 +149,6 @@ def predictions(runs: Mapping[str, xr.Dataset]) -> str:
         text += f" The prediction is right to {max(hits):.2g} % for {len(hits)} of {len(off)} methods."
     return text + (f" Off by more than {CLOSE:.0%}: {', '.join(missed)}." if missed else "")
 
-
-# ---- verdict ---------------------------------------------------------------------------------------------------------
 
 LOSING = {"drift": "drifts", "growing": "grows by no single law", "random walk": "walks randomly"}
 

@@ -9,11 +9,11 @@ import xarray as xr
 from symtop.measure.conservation import CONSTANTS
 from symtop.model.charts import axis_distance, axis_from_angles
 from symtop.model.scenes import scene
-from symtop.report import solid, style
+from symtop.report import style
 from symtop.report.figures import largest_so_far
 from symtop.runner.study import Picture
 
-from . import words
+from . import solid, words
 from .tables import ALPHA, FILMED, MODIFIED, SOLVER, STEPS_A_NUTATION, Column
 
 PARTS = {"spheroid": "first part", "goldstein": "second part"}  # of the notebook
@@ -121,7 +121,7 @@ def _residual_line(axis: Any, run: xr.Dataset, constant: str) -> None:
 
 def draw_spheres(data: xr.Dataset) -> Picture:
     """The path that the notebook drew and the path of the axis, a quarter turn apart."""
-    figure, axes = solid.solid_panels(1, 2, size=5.0)
+    figure, axes = style.panels(1, 2, height=4.6, subplot_kw={"projection": "3d"})
     for axis, name in zip(axes.flat, PARTS, strict=True):
         run = data.sel(scene=name, integrator=SOLVER)
         drawn = axis_from_angles(run[Column.SOLVER_THETA].values, run[Column.SOLVER_PHI].values + 0.5 * math.pi)

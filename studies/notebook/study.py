@@ -48,9 +48,5 @@ STUDY = Study(
     title="The notebook",
     question="Does it reproduce the notebook that it began with, and why do the discrete methods win there?",
     how_to_read=words.HOW_TO_READ,
-    cases=cases,
-    measure=measure,
-    pictures=figures.pictures,
-    tables=words.tables,
-    verdict=words.verdict,
-)
+    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+)  # fmt: skip

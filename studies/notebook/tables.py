@@ -14,12 +14,13 @@ import xarray as xr
 
 from symtop.measure.conservation import residuals
 from symtop.methods.registry import integrator, integrators
+from symtop.methods.scipy_ivp import integrated
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.run.modified_energy import modified_energy
 from symtop.run.simulation import simulate
 
-from .derivations import Rates, easy_way, energies, hard_way, nutation_cubic, six_variables, with_alpha
+from .derivations import easy_way, energies, hard_way, nutation_cubic, six_variables, with_alpha
 
 SOLVER = "lsoda"  # the default solver of the notebook's system is of this family
 SOLVER_TOLERANCE = 2.6e-7  # chosen: at it LSODA keeps as many figures as the notebook reports; its own is not known
@@ -76,17 +77,10 @@ def residual_history(scene: Scene, name: str, setting: float, samples: int = SAM
     return xr.Dataset(columns)
 
 
-def _integrated(rates: Rates, start: Sequence[float], times: charts.Array, solver: str, tolerance: float) -> Any:
-    from scipy.integrate import solve_ivp  # 0.6 s to import
-
-    span = (0.0, float(times[-1]))
-    return solve_ivp(rates, span, start, method=solver, rtol=tolerance, atol=tolerance, t_eval=times).y
-
-
 def notebook_path(scene: Scene, samples: int = 1201) -> xr.Dataset:
     """theta, theta' and phi by the notebook's solver on its six variables, and the truth; dimension ``path``."""
     times = np.linspace(0.0, scene.horizon, samples)
-    hard = _integrated(hard_way(scene), six_variables(scene), times, "LSODA", SOLVER_TOLERANCE)
+    hard = integrated(hard_way(scene), six_variables(scene), times, "LSODA", SOLVER_TOLERANCE)
     truth = closed_form(scene)(times)
     solver = {Column.SOLVER_THETA: hard[1], Column.SOLVER_PHI: hard[0], Column.SOLVER_RATE: hard[4]}
     true = {Column.TRUE_THETA: truth.theta, Column.TRUE_PHI: truth.phi, Column.TRUE_RATE: truth.theta_dot}
@@ -97,8 +91,8 @@ def notebook_path(scene: Scene, samples: int = 1201) -> xr.Dataset:
 def both_derivations(scene: Scene, samples: int = SAMPLES) -> xr.Dataset:
     """The two derivations integrated at 1e-13, their distance, and the two energies; dimension ``both``."""
     times, six = np.linspace(0.0, scene.horizon, samples), six_variables(scene)
-    hard = _integrated(hard_way(scene), six, times, "DOP853", 1e-13)
-    easy = _integrated(easy_way(scene), (*six[:3], six[4]), times, "DOP853", 1e-13)
+    hard = integrated(hard_way(scene), six, times, "DOP853", 1e-13)
+    easy = integrated(easy_way(scene), (*six[:3], six[4]), times, "DOP853", 1e-13)
     truth = closed_form(scene)(times)
     true = np.array([truth.phi, truth.theta, truth.psi])
     E, E1, spin = energies(scene, hard)

@@ -17,17 +17,17 @@ Source: Marsden and West, Acta Numerica 10 (2001) 357, part three.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.base.validate import SymtopError
 from symtop.methods import unreduced
 from symtop.methods.compiled import register_jitable
 from symtop.methods.euler_lagrange import accelerations, with_rates
 from symtop.methods.loop import March, Marks, driver
 from symtop.methods.quadrature import RULES, quadrature
+from symtop.methods.scipy_ivp import integrated
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
@@ -112,20 +112,10 @@ def _four_equations(scene: Scene, friction: Friction) -> Rates:
     return rates
 
 
-def _integrated(rates: Rates, start: Sequence[float], times: Array, solver: str, tolerance: float) -> Array:
-    from scipy.integrate import solve_ivp  # 0.6 s to import
-
-    done = solve_ivp(rates, (0.0, float(times[-1])), start, method=solver, rtol=tolerance, atol=tolerance, t_eval=times)
-    if not done.success:
-        raise SymtopError(f"the damped top cannot be integrated to t = {times[-1]:g}: {done.message}")
-    states: Array = done.y
-    return states
-
-
 def six_variables(scene: Scene, friction: Friction, times: Array, solver: str, tolerance: float) -> Array:
     """(theta, phi, psi, theta', phi', psi') by one of SciPy's solvers, shape (6, times); SymtopError if it fails."""
     start = with_rates(scene.top, scene.start)[1]
-    return _integrated(_six_equations(scene, friction), start, times, solver, tolerance)
+    return integrated(_six_equations(scene, friction), start, times, solver, tolerance)
 
 
 def damped_truth(scene: Scene, friction: Friction, times: Array) -> tuple[Array, float]:
@@ -133,5 +123,5 @@ def damped_truth(scene: Scene, friction: Friction, times: Array) -> tuple[Array,
     at, solver = scene.start, ("DOP853", 1e-13)
     six = six_variables(scene, friction, times, *solver)
     start = (at.theta, at.phi, at.psi, scene.top.I1 * at.theta_dot)
-    four = _integrated(_four_equations(scene, friction), start, times, *solver)
+    four = integrated(_four_equations(scene, friction), start, times, *solver)
     return six, float(np.max(np.abs(six[:3] - four[:3])))

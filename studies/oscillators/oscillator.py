@@ -24,13 +24,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symtop.methods.compiled import register_jitable
 from symtop.methods.loop import driver
 from symtop.methods.quadrature import RULES, quadrature
+from symtop.model.charts import Array
 
-Array = NDArray[np.float64]
 ONE_SIDED = "force-at-one-end"  # the midpoint rule with the whole force in F_d^-, a negative control of order 1
 
 

@@ -48,9 +48,5 @@ STUDY = Study(
     title="Oscillators and friction",
     question="What becomes of a discrete Lagrangian when energy is taken away?",
     how_to_read=words.HOW_TO_READ,
-    cases=cases,
-    measure=measure,
-    pictures=figures.pictures,
-    tables=words.tables,
-    verdict=words.verdict,
-)
+    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+)  # fmt: skip

@@ -71,11 +71,7 @@ STUDY = Study(
     title="Reduction",
     question="What does modelling less buy?",
     how_to_read=words.HOW_TO_READ,
-    cases=cases,
-    measure=measure,
-    pictures=figures.pictures,
-    tables=words.tables,
-    verdict=words.verdict,
+    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
     timed=True,
     uses=uses,
-)
+)  # fmt: skip

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from symtop.methods.splitting_space import cayley_sleeps_from, strang_sleeps_from
 from symtop.report.style import BLUE, GREEN, GREY, VERMILLION, Look, legend_below, look, panels
 from symtop.runner.study import Picture
 
@@ -91,10 +92,8 @@ def _sleep(axis: Any, data: xr.Dataset) -> None:
         x, y = cell[Column.SLEEPING_STEP].values, cell[Column.SLEEPING_THRESHOLD].values
         axis.plot(x, y, style.marker, color=style.color, ms=style.size, label=name)
     x = np.linspace(0.02, 1.0, 60)
-    axis.plot(x, np.sqrt(4.0 + x * x), label=r"$a^2 = 4 + h^2$", **GUIDE)
-    spins = np.linspace(1.9, 2.0, 400)
-    from_step = [spins[np.argmin(np.abs(spins * np.tan(spins * h / 4.0) - h))] for h in x]
-    axis.plot(x, from_step, ls=(0, (5, 3)), label=r"$a \tan(a h/4) = h$", **GUIDE)
+    axis.plot(x, [cayley_sleeps_from(h) for h in x], label=r"$a^2 = 4 + h^2$", **GUIDE)
+    axis.plot(x, [strang_sleeps_from(h) for h in x], ls=(0, (5, 3)), label=r"$a \tan(a h/4) = h$", **GUIDE)
     axis.set(xlabel="step h", ylabel=r"least spin that sleeps, $a = I_3\omega_3$", title="the sleeping top")
 
 

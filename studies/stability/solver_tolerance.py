@@ -7,9 +7,8 @@ through past steps and follows its last correction to first order, so that it re
 iterations. Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, section VIII.6.
 """
 
-import functools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,9 +49,7 @@ def _textbook_midpoint(par, theta, p, h, tolerance, iterations, marks, samples):
     return True
 
 
-@functools.cache
-def _compiled_textbook() -> Any:
-    return compile_kernel(_textbook_midpoint)
+_march = compile_kernel(_textbook_midpoint)
 
 
 class SolverError(NamedTuple):
@@ -68,7 +65,7 @@ def textbook_midpoint(scene: Scene, h: float, steps: int, tolerance: float, iter
     par, state = reduced(scene.top, scene.start)
     marks = np.unique(np.linspace(0, steps, SAMPLES).astype(np.int64))
     samples = np.full((marks.size, 2), math.nan)
-    _compiled_textbook()(par, state[0], state[1], h, tolerance, iterations, marks, samples)
+    _march(par, state[0], state[1], h, tolerance, iterations, marks, samples)
     return _energy_error(scene, samples)
 
 

@@ -89,9 +89,5 @@ STUDY = Study(
     title="Stability",
     question="Where does each method fail, and how?",
     how_to_read=words.HOW_TO_READ,
-    cases=cases,
-    measure=measure,
-    pictures=figures.pictures,
-    tables=words.tables,
-    verdict=words.sentences,
-)
+    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.sentences,
+)  # fmt: skip

@@ -51,9 +51,5 @@ STUDY = Study(
         "the shade above it reaches up to the bound that the reference claims. A valid bound lies above the measured "
         "error; a useful one lies close to it. Points of other figures within ten times of the bound are drawn hollow."
     ),
-    cases=cases,
-    measure=measure,
-    pictures=figures.pictures,
-    tables=words.tables,
-    verdict=words.verdict,
-)
+    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+)  # fmt: skip

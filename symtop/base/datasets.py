@@ -15,7 +15,7 @@ import shutil
 import subprocess
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -87,6 +87,16 @@ def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
     if isinstance(data, xr.Dataset):
         return {"": data}
     return {node.path.strip("/"): node.to_dataset(inherit=False) for node in data.subtree}
+
+
+def over_time(times: Any, columns: Mapping[str, Any]) -> xr.Dataset:
+    """Columns (times,) or (times, 3 or 4) over ``time`` and ``component`` (x, y, z) or ``part`` (w, x, y, z)."""
+    variables = {
+        name: ("time" if np.ndim(values) == 1 else ("time", {3: "component", 4: "part"}[np.shape(values)[1]]), values)
+        for name, values in columns.items()
+    }
+    parts = {"part": ["w", "x", "y", "z"]} if "quaternion" in columns else {}
+    return xr.Dataset(variables, {"time": times, "component": ["x", "y", "z"], **parts})
 
 
 def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree:

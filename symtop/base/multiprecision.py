@@ -7,18 +7,12 @@ digits. A context from here belongs to the thread that asks for it and has the d
 import threading
 from typing import Any
 
-
-class _Contexts(threading.local):
-    def __init__(self) -> None:
-        self.by_digits: dict[int, Any] = {}
-
-
-_contexts = _Contexts()
+_contexts = threading.local()  # its attributes are the thread's own
 
 
 def context(digits: int) -> Any:
     """An mpmath context with that many decimal digits. Made once a thread, in 1.7 ms."""
-    mine = _contexts.by_digits
+    mine: dict[Any, Any] = vars(_contexts)
     if digits not in mine:
         from mpmath.ctx_mp import MPContext  # mpmath costs 0.1 s to import
 

@@ -11,6 +11,7 @@ import click
 
 from symtop.base.validate import SymtopError
 from symtop.cli.common import completing, facts, json_option, plugin_option, table, terminal_width
+from symtop.report import markdown as tables
 
 if TYPE_CHECKING:
     from symtop.methods.registry import Integrator
@@ -27,16 +28,12 @@ def _show(records: list[Record], short: list[Record], chosen: Record | None, pag
     if as_json:
         click.echo(json.dumps(records if chosen is None else [chosen], indent=1))
     elif wide:
-        click.echo(table(*_columns(records)))
+        click.echo(table(*tables.columns(records)))
     elif chosen is not None:
         click.echo(page(chosen, terminal_width()))
     else:
-        click.echo(table(*_columns(short), terminal_width()))
+        click.echo(table(*tables.columns(short), terminal_width()))
         click.echo(textwrap.fill(note, terminal_width()))
-
-
-def _columns(records: list[Record]) -> tuple[list[str], list[list[str]]]:
-    return list(records[0]), [list(record.values()) for record in records]
 
 
 @click.command(short_help="List the integrators, or show one in full.")
@@ -53,12 +50,11 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool) -> 
     symtop integrators midpoint
     """
     from symtop.methods import registry
-    from symtop.report import markdown as markdown_
 
     methods = [registry.integrator(name)] if name is not None else list(registry.integrators().values())
     records: list[Record] = [method.record() for method in methods]
     if markdown and not as_json:
-        click.echo(markdown_.table(*_columns(records)))
+        click.echo(tables.table(*tables.columns(records)))
         return
     short: list[Record] = [
         {"name": method.name, "order": str(method.order or "?"), "flags": _flags(method), "summary": method.summary}
@@ -123,13 +119,11 @@ def _numbers(scene: "Scene") -> Record:
     momenta = top.momenta(start)
     return {
         **scene.record(),
-        "top": {name: getattr(top, name) for name in ("I1", "I3", "mgl")},
-        "start": {
-            name: getattr(start, name) for name in ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
-        },
+        "top": {name: getattr(top, name) for name in top.__slots__},
+        "start": {name: getattr(start, name) for name in start.__slots__},
         "momenta": {"p_phi": momenta.p_phi, "p_psi": momenta.p_psi},
         "theta": sorted(math.acos(min(1.0, max(-1.0, cosine))) for cosine in top.turning_cosines(start)),
-    }  # fmt: skip
+    }
 
 
 def _scene_page(numbers: Record, width: int) -> str:

@@ -6,7 +6,9 @@ A command imports heavy packages inside its function, so that ``symtop --help`` 
 """
 
 import sys
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -78,11 +80,12 @@ def study(
     if limit is not None:
         positive("limit", limit)
     folder = Path(results) / "quick" if quick else Path(results)
-    job = command.Job(command.choose(names, every=every), folder, quick, full, fresh, limit, as_json, why)
-    task = None if status else command.check_all if check else command.run_all
-    code = command.show_status(job) if task is None else command.conduct(task, job, jobs, scheduler)
-    if code:
-        sys.exit(code)
+    shared: Any = {"studies": command.choose(names, every=every), "results": folder, "as_json": as_json}
+    shared |= {"quick": quick, "full": full}
+    if status:
+        sys.exit(command.show_status(why=why, **shared))
+    task = partial(command.check_all, everything=fresh) if check else partial(command.run_all, fresh=fresh, limit=limit)
+    sys.exit(command.conduct(partial(task, **shared), jobs, scheduler))
 
 
 @main.command(short_help="Gather the findings of all studies into one page.")
@@ -100,7 +103,3 @@ def report(results: str) -> None:
         warn(f"{folder} holds no findings; the report is made of those in {folder / 'quick'}")
         folder /= "quick"
     click.echo(f"report: {page.write(folder)}")
-
-
-if __name__ == "__main__":
-    main()

@@ -38,10 +38,6 @@ class Setup:
     method: Integrator
     setting: float | None
 
-    def control(self, name: str) -> float | None:
-        """The setting, if it is the one called `name`; None otherwise."""
-        return self.setting if self.method.control == name else None
-
     @property
     def budget(self) -> float | None:
         """The most work of an adaptive run, which ends there and says so; None for a fixed step."""
@@ -80,9 +76,10 @@ def setup(fields: Mapping[str, Any]) -> Setup:
 
 def dataset(chosen: Setup, warn: Callable[[str], object]) -> xr.Dataset:
     """The run as `simulate` returns it; `warn` gets the sentence of the guard, if it has one."""
+    controls = {} if chosen.setting is None else chosen.method.setting(chosen.setting).kwargs()
     return simulate(
-        chosen.scene, chosen.method, step_size=chosen.control("step_size"), tolerance=chosen.control("tolerance"),
-        observe="attitude", samples=chosen.samples, guard=warn, budget=chosen.budget,
+        chosen.scene, chosen.method, **controls, observe="attitude", samples=chosen.samples, guard=warn,
+        budget=chosen.budget,
     )  # fmt: skip
 
 
@@ -166,9 +163,7 @@ def catalogue() -> dict[str, Any]:
 
     offered = [
         {
-            "name": entry.name,
-            "purpose": entry.purpose,
-            "horizon": entry.horizon,
+            **{name: getattr(entry, name) for name in ("name", "purpose", "horizon")},
             "period": float(np.nan_to_num(entry.nutation_period, posinf=0.0)),
             **{name: getattr(entry.top, name) for name in TOP},
             **{name: getattr(entry.start, name) for name in START},
@@ -177,11 +172,7 @@ def catalogue() -> dict[str, Any]:
     ]
     methods = [
         {
-            "name": entry.name,
-            "family": entry.family,
-            "summary": entry.summary,
-            "control": entry.control,
-            "implementation": entry.implementation,
+            **{name: getattr(entry, name) for name in ("name", "family", "summary", "control", "implementation")},
             "tolerance": max(entry.default_tolerance or 1e-6, entry.least_tolerance),
             "color": style.look(entry.name).color,
         }

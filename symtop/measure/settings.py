@@ -33,9 +33,6 @@ FAILED = "No run ended well"
 TRIED = f"Not within {TRIES} runs"
 
 
-# ---- limits and ladders ----------------------------------------------------------------------------------------------
-
-
 def least_tolerance(method: Integrator) -> float:
     """The least tolerance that an adaptive method is tried with."""
     return max(
@@ -85,9 +82,6 @@ def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, mos
     return tolerance_ladder(method, count) if method.adaptive else [math.nan]
 
 
-# ---- the search ------------------------------------------------------------------------------------------------------
-
-
 def between(fine: float, low: float, coarse: float, high: float, goal: float) -> float:
     """The setting between two whose errors are `low` and `high` at which the line through both in logs has `goal`.
 
@@ -101,16 +95,9 @@ def between(fine: float, low: float, coarse: float, high: float, goal: float) ->
 
 
 def seek(
-    run: Callable[[float], tuple[float, float]],
-    guess: float,
-    target: float,
-    ends: tuple[float, float],
-    power: float,
-    *,
-    fixed_step: bool = True,
-    patience: float = math.inf,
-    least: float = LEAST,
-) -> float | str:
+    run: Callable[[float], tuple[float, float]], guess: float, target: float, ends: tuple[float, float], power: float,
+    *, fixed_step: bool = True, patience: float = math.inf, least: float = LEAST,
+) -> float | str:  # fmt: skip
     """The coarsest setting found whose error is at most the target, if possible `least` of it, or why there is none.
 
     `run` takes a setting and returns the error, infinite after a failure, and the force evaluations of a run. `ends`
@@ -188,14 +175,9 @@ def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
 
 
 def search(
-    scene: Scene,
-    method: Integrator,
-    accuracy: float,
-    quantity: str,
-    horizon: float,
-    guess: float | None = None,
+    scene: Scene, method: Integrator, accuracy: float, quantity: str, horizon: float, guess: float | None = None,
     patience: float = math.inf,
-) -> Met | str:
+) -> Met | str:  # fmt: skip
     """The coarsest setting found that meets the accuracy over the horizon, or the reason why there is none.
 
     It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess. No run is begun that is

@@ -26,17 +26,15 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.base.validate import SymtopError
 from symtop.methods.plan import Plan, Run
 from symtop.methods.registry import Integrator
 from symtop.model import charts
+from symtop.model.charts import Array
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.simulation import solve_plan
-
-Array = NDArray[np.float64]
 
 WIDEST = 0.04  # the first differencing width, in radians and units of the momenta
 WIDTHS = 5
@@ -140,8 +138,7 @@ def generic_start(scene: Scene) -> Angles:
     if not math.isfinite(scene.nutation_period):
         return scene.start
     motion = closed_form(scene)(np.array([0.3711 * scene.nutation_period]))
-    names = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
-    return Angles(*(float(getattr(motion, name)[0]) for name in names))
+    return Angles(*(float(value[0]) for value in motion))
 
 
 def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Angles]:

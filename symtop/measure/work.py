@@ -20,15 +20,12 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.accuracy import as_table, error_row
-from symtop.measure.errors import QUANTITIES
-from symtop.measure.phase import FREQUENCIES
 from symtop.measure.settings import ROUNDED, between, coarse_setting, limits
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 
 Row = dict[str, Any]
 
-QUANTITY_LABELS = {**QUANTITIES, **FREQUENCIES}  # the eight quantities an accuracy is asked in
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 DECADES = 1.9  # of error between neighbours of the first walk
 NOTCHES = 2.5  # decades of tolerance likewise
@@ -160,10 +157,7 @@ def work_table(
 def _stack(tables: Sequence[Sequence[Row]], implementation: str) -> xr.Dataset:
     """One dataset over horizon and setting; settings that were not tried are NaN, their outcome "not_run"."""
     names = next(rows for rows in tables if rows)[0]
-    blank = {
-        name: value if name == "implementation" else "not_run" if name == "outcome" else math.nan
-        for name, value in names.items()
-    } | {"implementation": implementation}
+    blank = dict.fromkeys(names, math.nan) | {"outcome": "not_run", "implementation": implementation}
     size = max(len(rows) for rows in tables)
     filled = [as_table([*rows, *[blank] * (size - len(rows))]) for rows in tables]
     return xr.concat(filled, dim="horizon") if len(filled) > 1 else filled[0].expand_dims("horizon")

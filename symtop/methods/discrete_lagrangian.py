@@ -96,20 +96,10 @@ def _node_sums(rule: Any, theta: float, d: float, sin_start: float, cos_start: f
         product_start_slope += left * a * double
         product_end_slope += right * a * double
     return _Sums(
-        high,
-        low,
-        high - low,
-        square_sine,
-        4.0 * (square - shift * shift),
-        sine_start,
-        sine_end,
-        product_start,
-        product_end,
-        sine_start_slope,
-        sine_end_slope,
-        product_start_slope,
-        product_end_slope,
-    )
+        high, low, high - low, square_sine, 4.0 * (square - shift * shift),
+        sine_start, sine_end, product_start, product_end,
+        sine_start_slope, sine_end_slope, product_start_slope, product_end_slope,
+    )  # fmt: skip
 
 
 @register_jitable
@@ -268,14 +258,9 @@ def midpoint_energy(seen: View, momenta: Momenta, h: float) -> Array:
 
 
 def discrete_lagrangian(
-    name: str,
-    nodes: Sequence[float],
-    weights: Sequence[float],
-    *,
-    order: int | None = None,
-    summary: str = "",
+    name: str, nodes: Sequence[float], weights: Sequence[float], *, order: int | None = None, summary: str = "",
     reference: str = "marsden-west-2001",
-) -> Integrator:
+) -> Integrator:  # fmt: skip
     """A variational integrator from a quadrature rule on [0, 1]: two tuples make a method.
 
     The rule is symmetric if it reads the same from both ends; a rule that integrates t exactly has order 2.
@@ -288,13 +273,9 @@ def discrete_lagrangian(
         family="discrete-lagrangian",
         summary=summary or f"discrete Lagrangian with nodes {rule.nodes} and weights {rule.weights}",
         solvers={"angles": FixedStep(march, rule, reduced, fresh, implicit=True, each_step=at_start)},
-        order=order,
-        explicit=False,
-        symplectic=True,
-        symmetric=symmetric,
-        conserves=frozenset({"p_phi", "p_psi"}),
+        order=order, explicit=False, symplectic=True, symmetric=symmetric, conserves=frozenset({"p_phi", "p_psi"}),
         reference=reference,
-    )
+    )  # fmt: skip
     return replace(method, modified_energy=midpoint_energy) if is_midpoint(method) else method
 
 

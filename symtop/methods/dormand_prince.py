@@ -184,13 +184,11 @@ def built_in() -> list[Integrator]:
             family="runge-kutta",
             summary="Dormand-Prince with SciPy's step control on the unreduced equations, compiled",
             solvers={"angles": solve},
-            control="tolerance",
-            order=5,
-            explicit=True,
-            symplectic=False,
+            control="tolerance", order=5,
+            explicit=True, symplectic=False,
             symmetric=False,
             conserves=frozenset(),
             least_tolerance=LEAST_TOLERANCE,
             reference="dormand-prince-1980",
         )
-    ]
+    ]  # fmt: skip

@@ -28,11 +28,9 @@ def built_in() -> list[Integrator]:
             family="exact",
             summary="closed form in elliptic functions, in double; one evaluation a sample",
             solvers={"attitude": solve},
-            control=None,
-            explicit=True,
-            symplectic=True,
-            symmetric=True,
+            control=None, explicit=True,
+            symplectic=True, symmetric=True,
             conserves=frozenset({"energy", "p_phi", "p_psi"}),
             reference="klein-sommerfeld-1910",
         )
-    ]
+    ]  # fmt: skip

@@ -253,14 +253,12 @@ def built_in() -> list[Integrator]:
             family="discrete-lagrangian",
             summary="Galerkin discrete Lagrangian, parabola in time and Simpson's rule",
             solvers={"angles": FixedStep(march, Iteration(), reduced, 2, implicit=True, each_step=1)},
-            order=4,
-            explicit=False,
-            symplectic=True,
-            symmetric=True,
+            order=4, explicit=False,
+            symplectic=True, symmetric=True,
             conserves=frozenset({"p_phi", "p_psi"}),
             reference="marsden-west-2001",
         )
-    ]
+    ]  # fmt: skip
 
 
 def is_galerkin(method: Integrator) -> bool:

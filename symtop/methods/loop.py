@@ -134,13 +134,10 @@ class Loop:
 
 
 def driver(  # noqa: C901  (one loop, read in one piece)
-    begin: Callable[..., Any],
-    increment: Callable[..., Any],
-    observe: Callable[..., Any],
-    enter: Callable[..., Any] = _as_given,
-    present: Callable[..., Any] = _as_stepped,
+    begin: Callable[..., Any], increment: Callable[..., Any], observe: Callable[..., Any],
+    enter: Callable[..., Any] = _as_given, present: Callable[..., Any] = _as_stepped,
     add: Callable[..., Any] = accumulate,
-) -> Loop:
+) -> Loop:  # fmt: skip
     """The loop around one kernel family; `add` is how increments are summed."""
     for part in (begin, increment, observe, enter, present):
         register_jitable(part)

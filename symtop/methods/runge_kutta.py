@@ -128,15 +128,9 @@ def _explicit(a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[list[li
 
 
 def runge_kutta(
-    name: str,
-    a: Sequence[Sequence[float]],
-    b: Sequence[float],
-    c: Sequence[float] | None = None,
-    *,
-    order: int | None = None,
-    summary: str = "",
-    reference: str = "",
-) -> Integrator:
+    name: str, a: Sequence[Sequence[float]], b: Sequence[float], c: Sequence[float] | None = None, *,
+    order: int | None = None, summary: str = "", reference: str = "",
+) -> Integrator:  # fmt: skip
     """An explicit Runge-Kutta method from its Butcher tableau.
 
     `a` has one row a stage, either the entries below the diagonal (the first row empty) or whole rows with zeros from
@@ -159,13 +153,9 @@ def runge_kutta(
             "angles": FixedStep(march_angles, rule, with_rates, 1, implicit=False, present=to_angles),
             "axis": FixedStep(march_axis, rule, on_axis, 1, implicit=False),
         },
-        order=order,
-        explicit=True,
-        symplectic=False,
-        symmetric=False,
-        conserves=frozenset(),
+        order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
         reference=reference,
-    )
+    )  # fmt: skip
 
 
 def built_in() -> list[Integrator]:

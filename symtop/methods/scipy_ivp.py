@@ -15,14 +15,15 @@ Radau leaves out. The right-hand side is plain Python on floats, three times fas
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from symtop.base.validate import SymtopError
 from symtop.methods.euler_lagrange import LEAST_TOLERANCE, accelerations, as_run, with_rates
 from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator, Solver
+from symtop.methods.registry import Array, Integrator, Solver
 from symtop.model.top import Angles, SymmetricTop
 
 EVALUATIONS = 20_000_000  # a run's limit: about two minutes
@@ -85,6 +86,21 @@ def solver(method: str) -> Solver:
     return solve
 
 
+def integrated(rates: Callable[..., Any], start: Sequence[float], times: Array, method: str, tolerance: float) -> Array:
+    """Any equations by ``solve_ivp`` at the given times, the first 0: shape (variables, times).
+
+    `tolerance` is both the relative and the absolute one. Raises SymtopError if the solver does not reach the end.
+    """
+    from scipy.integrate import solve_ivp  # 0.6 s to import
+
+    span = (0.0, float(times[-1]))
+    done = solve_ivp(rates, span, start, method=method, rtol=tolerance, atol=tolerance, t_eval=times)
+    if not done.success:
+        raise SymtopError(f"{method} cannot integrate to t = {times[-1]:g}: {done.message}")
+    states: Array = done.y
+    return states
+
+
 def _judge(stepper: Any, calls: int, budget: float) -> str:
     if not np.isfinite(stepper.y).all():
         return "not_finite"
@@ -99,17 +115,12 @@ def _entry(method: str, summary: str, order: int | None, reference: str, *, expl
         family="library",
         summary=f"SciPy's {method} ({summary}) on the unreduced Euler-Lagrange equations",
         solvers={"angles": solver(method)},
-        control="tolerance",
-        implementation="python",
-        order=order,
-        explicit=explicit,
-        symplectic=False,
-        symmetric=False,
-        conserves=frozenset(),
+        control="tolerance", implementation="python", order=order, explicit=explicit, symplectic=False,
+        symmetric=False, conserves=frozenset(),
         least_tolerance=LEAST_TOLERANCE,
         reference=reference,
         same_steps_as="rk45-compiled" if method == "RK45" else None,
-    )
+    )  # fmt: skip
 
 
 def built_in() -> list[Integrator]:

@@ -40,18 +40,10 @@ _KICK_DRIFT_KICK: dict[tuple[str, str], tuple[ModifiedEnergy, Callable[[float], 
 
 
 def composition(
-    name: str,
-    drift: Sequence[float],
-    kick: Sequence[float],
-    gradient: Sequence[float] | None = None,
-    *,
-    chart: str = "angles",
-    rotation: str = "exact",
-    processor: float = 0.0,
-    order: int | None = None,
-    summary: str = "",
-    reference: str = "",
-) -> Integrator:
+    name: str, drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] | None = None, *,
+    chart: str = "angles", rotation: str = "exact", processor: float = 0.0, order: int | None = None,
+    summary: str = "", reference: str = "",
+) -> Integrator:  # fmt: skip
     """A splitting method from its coefficients: kick[0], drift[0], kick[1], ... drift[-1], kick[-1].
 
     Drifts and kicks must each sum to 1; what is missing by rounding is given to the middle ones, for a sum that is
@@ -88,15 +80,12 @@ def composition(
             shown: FixedStep(march, stages, prepare, 1, implicit=False)
             for shown, (march, prepare) in _KERNELS[chart].items()
         },
-        order=order,
-        explicit=True,
-        symplectic=True,
-        symmetric=all(numbers == numbers[::-1] for numbers in rule[:3]),
+        order=order, explicit=True, symplectic=True, symmetric=all(numbers == numbers[::-1] for numbers in rule[:3]),
         conserves=frozenset({"p_phi", "p_psi"} | ({"cayley_energy"} if one_drift and rotation != "exact" else set())),
         reference=reference,
         modified_energy=modified,
         sleeps_from=sleeps,
-    )
+    )  # fmt: skip
 
 
 def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] | None) -> Composition:

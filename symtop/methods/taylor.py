@@ -199,13 +199,9 @@ def _entry(precision: str, solvers: dict[str, Solver]) -> Integrator:
         family="taylor",
         summary=_SUMMARIES[precision],
         solvers=solvers,
-        control="tolerance",
-        explicit=True,
-        symplectic=False,
-        symmetric=False,
-        conserves=frozenset(),
+        control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
         least_tolerance=epsilon / 1000.0,
         default_tolerance=epsilon / 100.0,
         reference="biscani-izzo-2021",
         speed=0.002 if precision == "quad" else 1.0,
-    )
+    )  # fmt: skip

@@ -12,6 +12,11 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join([lines[0], "|" + "---|" * len(header), *lines[1:]])
 
 
+def columns(records: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:
+    """Header and rows of a table of records, which all have the same keys."""
+    return list(records[0]), [list(record.values()) for record in records]
+
+
 def _folded(title: str, body: str, count: int) -> str:
     if count <= FEW:
         return f"**{title}**\n\n{body}"

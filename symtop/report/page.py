@@ -1,16 +1,21 @@
-"""The report: one self-contained page from the findings that the studies left in the results folder."""
+"""The report: one self-contained page from the findings that the studies left in the results folder.
+
+A chart to point at is data for the page's script: each series with the look its integrator has in every figure.
+"""
 
 import base64
 import datetime
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from symtop.base.validate import SymtopError
-from symtop.methods.registry import Integrator, integrators
-from symtop.model.scenes import Scene, scenes
-from symtop.report import interactive, markdown
+from symtop.methods.registry import integrators
+from symtop.model.scenes import scenes
+from symtop.report import markdown
+from symtop.report.style import look
 from symtop.runner import run as runner, store
 
 TITLE = "Integrators on the heavy symmetric top"
@@ -20,10 +25,23 @@ INTRODUCTION = (
 )
 
 
-def table_of(catalogue: Mapping[str, Integrator | Scene]) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of the table of integrators, or of scenes, from the registry."""
-    records = [entry.record() for entry in catalogue.values()]
-    return list(records[0]), [list(record.values()) for record in records]
+def prepared(chart: Mapping[str, Any]) -> str:
+    """JSON of a chart of the findings, safe inside a script element, without points that a log axis cannot show."""
+    panels = {title: [_series(name, points) for name, points in series] for title, series in chart["panels"].items()}
+    content = {"title": chart["title"], "x": chart["x"], "y": chart["y"], "panels": panels}
+    return json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+
+
+def _series(name: str, points: Sequence[tuple[float | None, float | None, str]]) -> dict[str, Any]:
+    method, style = integrators().get(name), look(name)
+    return {
+        "name": name,
+        "family": method.family if method else "other",
+        "color": style.color,
+        "marker": style.marker,
+        "dashed": method is not None and method.implementation == "python",
+        "points": [list(point) for point in points if all(x is not None and 0.0 < x < math.inf for x in point[:2])],
+    }
 
 
 def gather(results: Path) -> list[dict[str, Any]]:
@@ -44,7 +62,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
                 code = base64.b64encode(file.read_bytes()).decode()
                 picture["data"] = f"data:image/{file.suffix[1:]};base64,{code}"
             for chart in findings["charts"]:
-                chart["prepared"] = interactive.prepared(chart)
+                chart["prepared"] = prepared(chart)
         except (OSError, KeyError, TypeError) as error:
             command = f"make {name}" if name in others else f"symtop study {name}"
             raise SymtopError(
@@ -76,8 +94,8 @@ def write(results: Path) -> Path:
         css=(templates / "style.css").read_text(encoding="utf-8"),
         script=(templates / "chart.js").read_text(encoding="utf-8"),
         studies=studies,
-        integrators=table_of(integrators()),
-        scenes=table_of(scenes()),
+        integrators=markdown.columns([method.record() for method in integrators().values()]),
+        scenes=markdown.columns([scene.record() for scene in scenes().values()]),
         provenance=facts,
         quick=any(study["quick"] for study in studies),
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),

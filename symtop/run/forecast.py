@@ -91,7 +91,6 @@ class Forecast(NamedTuple):
     axis_error: float  # expected largest, rad; inf if the probe did not get through, 0 if there is nothing to probe
     rounding: float  # what rounding alone will make of it, rad: large on a separatrix, whatever the method
     steps_per_nutation: float  # nan for an adaptive method
-    samples_per_nutation: float
     passage: float  # rad of precession in one step at the closest approach to a pole; nan for an adaptive method
     outcome: str  # of the probe
     reached: float
@@ -187,10 +186,9 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Foreca
     """
     marks = landmarks(scene)
     steps, passage = marks.period / plan.step_size, marks.rate * plan.step_size
-    samples = marks.period * (plan.times.size - 1) / plan.horizon
     if method.control is None:
-        return Forecast(0.0, 0.0, steps, samples, passage, "ok", plan.horizon)
+        return Forecast(0.0, 0.0, steps, passage, "ok", plan.horizon)
     expected, probe = _expected(scene, method, chart, plan, marks)
     turns = plan.horizon / marks.period
     rounding = marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0
-    return Forecast(expected, rounding, steps, samples, passage, probe.outcome, probe.reached)
+    return Forecast(expected, rounding, steps, passage, probe.outcome, probe.reached)

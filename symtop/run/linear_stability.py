@@ -24,7 +24,7 @@ import numpy as np
 
 from symtop.base.numbers import sign_changes
 from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator, integrator, solve
+from symtop.methods.registry import Integrator, solve
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View
@@ -69,9 +69,7 @@ class Trace(NamedTuple):
 NO_TRACE = Trace(math.nan, math.nan, math.nan)
 
 
-@functools.lru_cache(maxsize=256)
-def _standing(top: SymmetricTop, momenta: Momenta) -> float:
-    return top.steady_theta(momenta)
+_standing = functools.lru_cache(maxsize=256)(SymmetricTop.steady_theta)
 
 
 def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None, rounds: int = 6) -> Trace:
@@ -186,12 +184,3 @@ def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[f
         ends.append(0.5 * (a + b))
     limit, third = ends
     return limit, third if method.symmetric and not third > limit else math.nan
-
-
-def sleeping_threshold_in_theory(method: "str | Integrator", h: float) -> float:
-    """The threshold of `sleeping_threshold` in closed form where one is known (`Integrator.sleeps_from`).
-
-    2, that of the motion, where none is.
-    """
-    sleeps_from = integrator(method).sleeps_from
-    return 2.0 if sleeps_from is None else sleeps_from(h)

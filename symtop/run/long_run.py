@@ -112,15 +112,9 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
 
 
 def long_run(
-    scene: "str | Scene",
-    integrator: "str | Integrator",
-    *,
-    steps: int,
-    step_size: float,
-    checkpoint: "str | Path | bool" = False,
-    compensated: bool = True,
-    quiet: bool = False,
-) -> xr.Dataset:
+    scene: "str | Scene", integrator: "str | Integrator", *, steps: int, step_size: float,
+    checkpoint: "str | Path | bool" = False, compensated: bool = True, quiet: bool = False,
+) -> xr.Dataset:  # fmt: skip
     """Run a fixed-step method for any number of steps and return what it did, window by window.
 
     Dimension ``window``; ``steps`` is chosen each ends. For each of energy, modified_energy, p_phi, p_psi (relative
@@ -163,18 +157,11 @@ def long_run(
         for m, part in enumerate(("least", "largest", "mean")):
             variables[f"{name}_{part}"] = ("window", columns[:, i, m])
     return datasets.describe(
-        xr.Dataset(variables),
-        title=f"{method.name} on {chosen.name}, {count} steps",
-        units=chosen.units,
-        integrator=method.name,
-        scene=chosen.name,
-        step_size=h,
-        horizon=count * h,
-        compensated=str(compensated).lower(),
-        outcome=OUTCOMES[outcome],
-        outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h),
-        reached_time=reached * h,
-    )
+        xr.Dataset(variables), title=f"{method.name} on {chosen.name}, {count} steps", units=chosen.units,
+        integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h,
+        compensated=str(compensated).lower(), outcome=OUTCOMES[outcome],
+        outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h), reached_time=reached * h,
+    )  # fmt: skip
 
 
 def _summary(values: dict[str, Array]) -> list[float]:

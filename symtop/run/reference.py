@@ -218,21 +218,17 @@ def _compute(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
     else:
         shown, checks = _integrated(scene, times, precision)
         grain = 8.0 * max(taylor.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
-    variables: dict[str, Any] = {}
+    columns: dict[str, charts.Array] = {}
     stored = {name: _split(values) for name, values in shown.items()}
     for name, (high, low) in stored.items():
-        dims = ("time", {"axis": "component", "quaternion": "part"}[name]) if high.ndim > 1 else ("time",)
-        variables[name] = (dims, high)
-        if precision != "closed-form":
-            variables[f"{name}_lo"] = (dims, low)
+        columns |= {name: high} | ({f"{name}_lo": low} if precision != "closed-form" else {})
     shown = {name: high for name, (high, _) in stored.items()}
     bounds = _bounds(times, shown, checks, grain, overlap)
     if precision != "closed-form":
         _raise_to_distance(bounds, shown, _closed_values(scene, times))
-    variables.update({f"{name}_error_bound": ("time", bound) for name, bound in bounds.items()})
-    variables.update({name: ("time", np.full(times.size, value)) for name, value in _constants(scene).items()})
-    coordinates = {"time": times, "component": ["x", "y", "z"], "part": ["w", "x", "y", "z"]}
-    return xr.Dataset(variables, coordinates, {"overlap_with_integration": overlap})
+    columns |= {f"{name}_error_bound": bound for name, bound in bounds.items()}
+    columns |= {name: np.full(times.size, value) for name, value in _constants(scene).items()}
+    return datasets.over_time(times, columns).assign_attrs(overlap_with_integration=overlap)
 
 
 def _bounds(
@@ -299,13 +295,9 @@ def reference(scene: "str | Scene", times: ArrayLike, precision: str = "longdoub
     if wanted.size != distinct.size or not np.array_equal(wanted, distinct):
         data = data.isel(time=place)
     return datasets.describe(
-        data,
-        f"reference motion of {chosen.name}",
-        chosen.units,
-        scene=chosen.name,
-        precision=source,
+        data, f"reference motion of {chosen.name}", chosen.units, scene=chosen.name, precision=source,
         asked_for=precision,
-    )
+    )  # fmt: skip
 
 
 def _cached(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:

@@ -59,15 +59,9 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
 
 
 def make_plan(
-    scene: Scene,
-    method: Integrator,
-    step_size: object = None,
-    tolerance: object = None,
-    *,
-    horizon: float,
-    samples: int,
-    budget: float | None = None,
-) -> tuple[Plan, bool]:
+    scene: Scene, method: Integrator, step_size: object = None, tolerance: object = None, *, horizon: float,
+    samples: int, budget: float | None = None,
+) -> tuple[Plan, bool]:  # fmt: skip
     """Check the step or tolerance against the integrator and the budget, and lay out steps and samples."""
     period = scene.nutation_period
     if method.fixed_step:
@@ -101,17 +95,10 @@ def make_plan(
 
 
 def simulate(
-    scene: "str | Scene",
-    integrator: "str | Integrator",
-    *,
-    step_size: float | None = None,
-    tolerance: float | None = None,
-    horizon: float | None = None,
-    samples: int = 501,
-    observe: str | None = None,
-    guard: bool | Callable[[str], object] = True,
-    budget: float | None = None,
-) -> xr.Dataset:
+    scene: "str | Scene", integrator: "str | Integrator", *, step_size: float | None = None,
+    tolerance: float | None = None, horizon: float | None = None, samples: int = 501, observe: str | None = None,
+    guard: bool | Callable[[str], object] = True, budget: float | None = None,
+) -> xr.Dataset:  # fmt: skip
     """Run one integrator on one scene and return what it did.
 
     Dimension ``time`` (elapsed) and ``component`` (x, y, z). Variables ``theta``, ``phi``, ``psi`` (unwrapped; absent
@@ -148,27 +135,15 @@ def simulate(
             warnings.warn(caution, SymtopWarning, stacklevel=2)
     run = solve_plan(method, chart, chosen.top, chosen.start, plan, f" on {chosen.name}")
     return datasets.describe(
-        as_dataset(chosen, chart, plan, run),
-        title=f"{method.name} on {chosen.name}",
-        units=chosen.units,
-        integrator=method.name,
-        scene=chosen.name,
-        chart=chart,
-        implementation=method.implementation,
-        horizon=end,
-        step_size=plan.step_size,
-        tolerance=plan.tolerance,
-        steps=run.steps,
-        force_evaluations=run.force_evaluations,
-        newton_iterations=run.newton_iterations,
-        outcome=run.outcome,
-        outcome_message=sentence(run.outcome, run.reached, end),
-        reached_time=run.reached,
-        guard=caution,
+        as_dataset(chosen, chart, plan, run), title=f"{method.name} on {chosen.name}", units=chosen.units,
+        integrator=method.name, scene=chosen.name, chart=chart, implementation=method.implementation, horizon=end,
+        step_size=plan.step_size, tolerance=plan.tolerance, steps=run.steps, force_evaluations=run.force_evaluations,
+        newton_iterations=run.newton_iterations, outcome=run.outcome,
+        outcome_message=sentence(run.outcome, run.reached, end), reached_time=run.reached, guard=caution,
         sampling="dithered" if dithered else "uniform",
         top={"I1": chosen.top.I1, "I3": chosen.top.I3, "mgl": chosen.top.mgl},
         start={name: getattr(chosen.start, name) for name in chosen.start.__slots__},
-    )
+    )  # fmt: skip
 
 
 MOST_SAMPLES = 10_000_000
@@ -209,33 +184,21 @@ _scene, _integrator = scene, integrator  # the public argument names shadow thes
 
 
 def as_dataset(scene: Scene, chart: str, plan: Plan, run: Run) -> xr.Dataset:
-    """The observables of a run, whatever chart it was computed in."""
+    """The observables of a run, whatever chart it was computed in; phi and psi are made continuous."""
     with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up, and that is a result
-        columns = _columns(scene, chart, plan, run)
-    components = {"axis": "component", "quaternion": "part"}
-    variables = {
-        name: (("time", components[name]) if name in components else "time", values) for name, values in columns.items()
-    }
-    coordinates = {"time": plan.times, "component": ["x", "y", "z"]}
-    if "quaternion" in columns:
-        coordinates["part"] = ["w", "x", "y", "z"]
-    return xr.Dataset(variables, coords=coordinates)
-
-
-def _columns(scene: Scene, chart: str, plan: Plan, run: Run) -> dict[str, Any]:
-    """The variables of a run by name; phi and psi made continuous where the chart has them modulo a turn."""
-    seen = View(chart, scene.top, run.states, run.p_phi, run.p_psi)
-    angles = {"phi": seen.phi} if seen.psi is None else {"phi": seen.phi, "psi": seen.psi}
-    if chart != "angles":
-        truth = closed_form(scene)(plan.times)
-        angles = {name: charts.unwrapped(values, getattr(truth, name)) for name, values in angles.items()}
-    return {
-        "theta": seen.theta,
-        **angles,
-        "axis": seen.axis,
-        **({"quaternion": seen.quaternion} if chart == "attitude" else {}),
-        "energy": seen.energy,
-        "p_theta": seen.p_theta,
-        "p_phi": run.p_phi,
-        "p_psi": run.p_psi,
-    }
+        seen = View(chart, scene.top, run.states, run.p_phi, run.p_psi)
+        angles = {"phi": seen.phi} if seen.psi is None else {"phi": seen.phi, "psi": seen.psi}
+        if chart != "angles":
+            truth = closed_form(scene)(plan.times)
+            angles = {name: charts.unwrapped(values, getattr(truth, name)) for name, values in angles.items()}
+        columns = {
+            "theta": seen.theta,
+            **angles,
+            "axis": seen.axis,
+            **({"quaternion": seen.quaternion} if chart == "attitude" else {}),
+            "energy": seen.energy,
+            "p_theta": seen.p_theta,
+            "p_phi": run.p_phi,
+            "p_psi": run.p_psi,
+        }
+    return datasets.over_time(plan.times, columns)

@@ -170,9 +170,7 @@ def findings_of(
     opening = None if study.opening is None else study.opening(data)
     return {
         "study": study.name,
-        "title": study.title,
-        "question": study.question,
-        "how_to_read": study.how_to_read,
+        **{name: getattr(study, name) for name in ("title", "question", "how_to_read")},
         "verdict": study.verdict(data),
         "tables": [table._asdict() for table in study.tables(data)],
         "charts": [chart._asdict() for chart in study.charts(data)],

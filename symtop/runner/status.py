@@ -61,7 +61,8 @@ def changed(study: Study, case: Case, path: Path) -> list[str]:
 
 def other_settings(case: Case, stored: list[Path]) -> list[str]:
     """How the settings of a case differ from the nearest that were computed on its scene with its integrator."""
-    settings = [_attribute(path, "settings") for path in stored if store.is_labelled(path, case)]
+    alike = [path for path in stored if store.identity_of(path).rpartition("--")[0] == case.label]
+    settings = [_attribute(path, "settings") for path in alike]
     wanted = json.loads(json.dumps(dict(case.settings)))
     differing = [
         sorted(name for name in {*old, *wanted} if old.get(name, "") != wanted.get(name, "")) for old in settings

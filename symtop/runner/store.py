@@ -59,11 +59,6 @@ def identity_of(path: Path) -> str:
     return path.name.rpartition("--")[0]
 
 
-def is_labelled(path: Path, case: Case) -> bool:
-    """Is a file of the scene and integrator of a case?"""
-    return identity_of(path).rpartition("--")[0] == case.label
-
-
 def short(reasons: Reasons) -> Reasons:
     """Reasons as they are stored: 12 digits of each hash; versions and the name of the processor as they are."""
     return {label: value[:12] if len(value) == LENGTH else value for label, value in reasons.items()}
@@ -86,16 +81,10 @@ def prepare(results: Path, study: Study) -> None:
 def save_case(data: xr.Dataset, path: Path, study: Study, case: Case) -> None:
     """Store what a case measured, with what it was made from."""
     described = datasets.describe(
-        data,
-        f"{study.name}: {case.integrator} on {case.scene}",
-        units=units_of([case.scene]),
-        study=study.name,
-        settings=dict(case.settings),
-        sources=digest_of(path),
-        made_of=short(depends.reasons(study, case)),
-        seed=SEED,
+        data, f"{study.name}: {case.integrator} on {case.scene}", units=units_of([case.scene]), study=study.name,
+        settings=dict(case.settings), sources=digest_of(path), made_of=short(depends.reasons(study, case)), seed=SEED,
         content=datasets.content_hash(data),
-    )
+    )  # fmt: skip
     datasets.write(described, path)
     failure_path(path).unlink(missing_ok=True)
 

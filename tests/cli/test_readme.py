@@ -4,8 +4,7 @@ import importlib
 import re
 from pathlib import Path
 
-from symtop.report.markdown import table
-from symtop.report.page import table_of
+from symtop.report.markdown import columns, table
 
 registry = importlib.import_module("symtop.methods.registry")
 scenes = importlib.import_module("symtop.model.scenes")
@@ -17,7 +16,8 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 def test_the_table_of_integrators_is_the_generated_one():
     shown = re.search(r"<!-- integrators -->\n(.*?)\n<!-- /integrators -->", README, re.DOTALL)
     assert shown is not None
-    assert shown.group(1) == table(*table_of(registry.integrators())), "regenerate: symtop integrators --markdown"
+    records = [method.record() for method in registry.integrators().values()]
+    assert shown.group(1) == table(*columns(records)), "regenerate: symtop integrators --markdown"
 
 
 def test_every_study_is_explained():

@@ -25,7 +25,6 @@ from symtop.run.linear_stability import (
     sign_changes,
     sleep_margin,
     sleeping_threshold,
-    sleeping_threshold_in_theory,
     trace,
     with_momenta,
 )
@@ -181,13 +180,13 @@ def test_the_benchmark_of_bruls_cardona_arnold_is_no_place_for_angles():
 @pytest.mark.parametrize("name", ["strang", "cayley"])
 @pytest.mark.parametrize("h", [0.1, 0.5, 1.0])
 def test_the_sleeping_threshold_shifts_as_theory_says(name, h):
-    assert sleeping_threshold(integrator(name), h) == pytest.approx(sleeping_threshold_in_theory(name, h), abs=1e-8)
+    assert sleeping_threshold(integrator(name), h) == pytest.approx(integrator(name).sleeps_from(h), abs=1e-8)
 
 
 def test_the_closed_forms_are_what_they_are():
-    a = sleeping_threshold_in_theory("strang", 0.5)
+    a = integrator("strang").sleeps_from(0.5)
     assert a * math.tan(a * 0.5 / 4.0) == pytest.approx(0.5, abs=1e-10)
-    assert sleeping_threshold_in_theory("cayley", 0.5) == math.sqrt(4.25)
+    assert integrator("cayley").sleeps_from(0.5) == math.sqrt(4.25)
 
 
 @pytest.mark.parametrize("name", ["midpoint", "stormer-verlet", "trapezoidal", "gauss-2", "gauss-6"])
@@ -199,7 +198,7 @@ def test_methods_without_a_shift_keep_the_threshold(name):
 def test_long_runs_fall_on_one_side_of_the_threshold_only():
     h = 0.5
     for name in ("strang", "cayley"):
-        edge = sleeping_threshold_in_theory(name, h)
+        edge = integrator(name).sleeps_from(h)
         for spin, sleeps in ((edge + 0.01, True), (edge - 0.01, False)):
             scene = sleeping(spin, 1e-4)
             chart, done = run(name, scene, h, 600)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from symtop_studies.notebook import solid
 from symtop_studies.notebook.derivations import easy_way, energies, hard_way, notebook_top, nutation_cubic, with_alpha
 from symtop_studies.notebook.tables import (
     SOLVER,
@@ -25,7 +26,6 @@ from symtop.measure.order import power_law
 from symtop.methods.euler_lagrange import accelerations, momenta
 from symtop.methods.plan import Plan
 from symtop.methods.quadrature import RULES
-from symtop.report import solid
 from symtop.run.modified_energy import modified_energy
 
 FIRST = symtop.scene("spheroid").top

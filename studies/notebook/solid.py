@@ -4,14 +4,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from symtop.model.charts import Array, axis_from_quaternion, transverse_from_quaternion
 from symtop.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION
 
-Array = NDArray[np.float64]
-
 TRIAD = (VERMILLION, GREEN, BLUE)  # body axes 1, 2 and 3
-VIEW = {"elev": 22.0, "azim": -55.0}
 
 
 def sphere(axis: Any, label: str = "") -> None:
@@ -27,30 +24,13 @@ def sphere(axis: Any, label: str = "") -> None:
     axis.set(xlim=(-0.8, 0.8), ylim=(-0.8, 0.8), zlim=(-0.8, 0.8), title=label)
     axis.set_box_aspect((1.0, 1.0, 1.0), zoom=1.15)
     axis.set_axis_off()
-    axis.view_init(**VIEW)
-
-
-def solid_panels(rows: int, columns: int, size: float = 4.0) -> tuple[Figure, Any]:
-    """A grid of three-dimensional axes, always two-dimensional."""
-    import matplotlib.pyplot as plt
-
-    from symtop.report.style import use
-
-    use()
-    return plt.subplots(
-        rows, columns, figsize=(size * columns, size * rows), squeeze=False, subplot_kw={"projection": "3d"}
-    )
+    axis.view_init(elev=22.0, azim=-55.0)
 
 
 def columns_of(quaternion: Array) -> Array:
     """The three body axes in space, shape (..., 3, 3), the last index counting x, y, z."""
-    w, x, y, z = np.moveaxis(quaternion, -1, 0)
-    rows = (
-        (w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
-        (2.0 * (x * y - w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z + w * x)),
-        (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z),
-    )
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    third, first = axis_from_quaternion(quaternion), transverse_from_quaternion(quaternion)
+    return np.stack([first, np.cross(third, first), third], axis=-2)
 
 
 class Film(Figure):
