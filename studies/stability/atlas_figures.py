@@ -133,9 +133,8 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
                 cell = data.sel(scene=family, integrator=name)
                 for variable, kind in ((Column.LINEAR_LIMIT, "limit"), (Column.THIRD_TURN, "third")):
                     _line(axis, cell[variable].values, cell[Column.LIMIT_PARAMETER].values, kind)
-            elif (
-                drawn_maps is over_gap and one.control == "step_size"
-            ):  # the fall at 1.1 gap past the pole takes one step
+            elif drawn_maps is over_gap and one.control == "step_size":
+                # the fall at 1.1 gap past the pole takes one step
                 _line(axis, 1.1 * one.parameter / FALL_SPEED / FALL_PERIOD, one.parameter, "passage")
             if below != control:
                 axis.set_xlabel(CONTROLS[one.control], fontsize=8.5)

@@ -26,6 +26,7 @@ from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.plan import Plan
 from symtop.methods.registry import Integrator, solve
 from symtop.model import charts, scenes
+from symtop.model.charts import Array
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles
 from symtop.model.view import View
@@ -33,7 +34,6 @@ from symtop.run.simulation import sample_times
 
 NOT_RUN = 255  # stored where a map has no run
 SAMPLES = 49  # of a run
-Array = NDArray[np.float64]
 
 
 def spin_unit(scene: Scene) -> float:

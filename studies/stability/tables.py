@@ -98,16 +98,15 @@ def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) 
     def surviving(h: float) -> float:
         return surviving_displacement(method, scene, h, settings["steps"]) if math.isfinite(h) else math.nan
 
-    return xr.Dataset(
-        {
-            Column.PHASE: ("phase", phases),
-            Column.SURVIVING: ("phase", [surviving(float(x) / omega) for x in phases]),
-            Column.LIMIT_PHASE: limit * omega,
-            Column.THIRD_TURN_PHASE: third * omega,
-            Column.SURVIVING_AT_THIRD_TURN: surviving(third),
-            Column.SURVIVING_PAST_THIRD_TURN: surviving(PAST_RESONANCE * third),
-        }
-    )
+    columns: dict[str, Any] = {
+        Column.PHASE: ("phase", phases),
+        Column.SURVIVING: ("phase", [surviving(float(x) / omega) for x in phases]),
+        Column.LIMIT_PHASE: limit * omega,
+        Column.THIRD_TURN_PHASE: third * omega,
+        Column.SURVIVING_AT_THIRD_TURN: surviving(third),
+        Column.SURVIVING_PAST_THIRD_TURN: surviving(PAST_RESONANCE * third),
+    }
+    return xr.Dataset(columns)
 
 
 def sleeping_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
@@ -120,12 +119,9 @@ def sleeping_table(name: str, method: Integrator, settings: Mapping[str, Any]) -
 def separatrix_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
     """How long runs next to the separatrix stay right, and how long their early error says that they will."""
     rows = [separatrix_horizon(method, scenes.scene(name), float(value)) for value in settings["ladder"]]
+    names = (Column.EARLY_ERROR, Column.HORIZON, Column.PREDICTED_HORIZON)  # in the order of a Horizon
     return xr.Dataset(
-        {
-            Column.EARLY_ERROR: ("setting", [row.error for row in rows]),
-            Column.HORIZON: ("setting", [row.reached for row in rows]),
-            Column.PREDICTED_HORIZON: ("setting", [row.predicted for row in rows]),
-        }
+        {name: ("setting", list(values)) for name, values in zip(names, zip(*rows, strict=True), strict=True)}
     )
 
 

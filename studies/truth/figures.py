@@ -18,10 +18,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     figure, axes = style.grid(data.sizes["scene"], 2, ("horizon (s)", "axis error (rad)"))
     for axis, scene in zip(axes, data["scene"].values, strict=True):
         for source in map(str, data["integrator"].values):
-            cell, (color, marker) = (
-                data.sel(scene=scene, integrator=source).dropna("horizon", subset=[ERROR]),
-                LOOKS[source],
-            )
+            cell = data.sel(scene=scene, integrator=source).dropna("horizon", subset=[ERROR])
+            color, marker = LOOKS[source]
             error = np.maximum(cell[ERROR].values, NEAREST)
             axis.plot(cell["horizon"], error, marker + "-", color=color, label=source)
             axis.fill_between(cell["horizon"], error, cell[BOUND], color=color, alpha=0.15, lw=0)

@@ -64,11 +64,8 @@ def _woodhouse() -> list[Published]:
     for t in (1.0, 5.0):
         exact = 1.0 / (1.0 + 1.0 / math.cosh(g * t))
         ours = math.cos(float(closed_form(scene)(np.array([t])).theta[0]))
-        rows.append(
-            Published(
-                "Woodhouse, problem 5.3", f"cos theta on the separatrix at t = {t:g}", exact, ours, 1e-13, "formula"
-            )
-        )
+        quantity = f"cos theta on the separatrix at t = {t:g}"
+        rows.append(Published("Woodhouse, problem 5.3", quantity, exact, ours, 1e-13, "formula"))
     return rows
 
 

@@ -113,9 +113,8 @@ def _probe(
         piece = Plan.until(duration * (place / POINTS), plan.tolerance)
     run = solve(method, chart, scene.top, start, piece)
     with np.errstate(all="ignore"):
-        error = charts.axis_distance(
-            View(chart, scene.top, np.asarray(run.states)).axis, form.axis(since + piece.times)
-        )
+        axis = View(chart, scene.top, np.asarray(run.states)).axis
+        error = charts.axis_distance(axis, form.axis(since + piece.times))
     error[~np.isfinite(error)] = math.inf
     outcome = "not_finite" if run.outcome == "ok" and not np.isfinite(error).all() else run.outcome
     return Probe(piece.times, error, outcome, since + run.reached)
