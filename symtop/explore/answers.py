@@ -108,7 +108,7 @@ def answer(chosen: Setup) -> dict[str, Any]:
             "axis_error": charts.axis_distance(run["axis"].values, charts.axis_from_quaternion(truth)),
             "attitude_error": charts.attitude_distance(attitude, truth),
         }
-        packed = {name: _packed(values) for name, values in arrays.items()}
+        single = {name: np.ascontiguousarray(values, dtype="<f4") for name, values in arrays.items()}
     return {
         "outcome": run.attrs["outcome"],
         "message": run.attrs["outcome_message"],
@@ -119,12 +119,8 @@ def answer(chosen: Setup) -> dict[str, Any]:
         "run_ms": 1e3 * (ran - began),
         "all_ms": 1e3 * (time.perf_counter() - began),
         "largest": {name: _largest(arrays[name]) for name in (*CONSTANTS, "axis_error")},
-        "arrays": packed,
+        "arrays": {name: base64.b64encode(values.tobytes()).decode() for name, values in single.items()},
     }
-
-
-def _packed(values: Any) -> str:
-    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()
 
 
 def _largest(values: Any) -> float | None:

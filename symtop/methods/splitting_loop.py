@@ -32,11 +32,8 @@ class Composition(NamedTuple):
         return Stages(
             exact_sum([a * drift for a in self.drift], drift),
             exact_sum([b * kick for b in self.kick], kick),
-            tuple(c * bend for c in self.gradient),
-            self.forces,
-            turn,
-            boost,
-        )
+            tuple(c * bend for c in self.gradient), self.forces, turn, boost,
+        )  # fmt: skip
 
 
 class Stages(NamedTuple):

@@ -53,7 +53,6 @@ from symtop.model.view import View, space_energy
 SINE = tuple(1.0 / math.factorial(2 * k + 1) for k in range(9))
 COSINE = tuple(1.0 / math.factorial(2 * k + 2) for k in range(9))
 
-
 EXACT, CAYLEY, TUNED = range(3)
 ROTATIONS = ("exact", "cayley", "cayley-tuned")
 
@@ -119,9 +118,6 @@ def kick_space(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any
     return (*step[:-3], step[-3] - strength * y, step[-2] + strength * x, step[-1])
 
 
-# ---- the axis --------------------------------------------------------------------------------------------------------
-
-
 @register_jitable
 def force_axis(par: Any, state: Any, step: Any) -> Any:
     """The present axis: what a kick needs."""
@@ -142,10 +138,8 @@ def drift_axis(rule: Any, state: Any, step: Any, half: float) -> Any:
         step[0] + twice * (w * cx + r * (Ly * cz - Lz * cy)),
         step[1] + twice * (w * cy + r * (Lz * cx - Lx * cz)),
         step[2] + twice * (w * cz + r * (Lx * cy - Ly * cx)),
-        step[3],
-        step[4],
-        step[5],
-    )
+        step[3], step[4], step[5],
+    )  # fmt: skip
 
 
 def begin_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
@@ -177,9 +171,6 @@ def present_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     return state if rule.boost == 0.0 else process_axis(-rule.boost, *state)
 
 
-# ---- the attitude ----------------------------------------------------------------------------------------------------
-
-
 @register_jitable
 def force_attitude(par: Any, state: Any, step: Any) -> Any:
     """The present axis: what a kick needs."""
@@ -198,10 +189,8 @@ def drift_attitude(rule: Any, state: Any, step: Any, half: float) -> Any:
         step[1] + (m * x + s * (Lx * w + Ly * z - Lz * y)),
         step[2] + (m * y + s * (Ly * w + Lz * x - Lx * z)),
         step[3] + (m * z + s * (Lz * w + Lx * y - Ly * x)),
-        step[4],
-        step[5],
-        step[6],
-    )
+        step[4], step[5], step[6],
+    )  # fmt: skip
 
 
 def begin_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:
@@ -243,9 +232,6 @@ def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
 
 march_axis = driver(begin_axis, increment_axis, observe_axis, enter_axis, present_axis)
 march_attitude = driver(begin_attitude, increment_attitude, observe_attitude, enter_attitude, present_attitude)
-
-
-# ---- closed forms of kick-drift-kick ---------------------------------------------------------------------------------
 
 
 def strang_energy(seen: View, momenta: Momenta, h: float) -> Array:

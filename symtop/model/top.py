@@ -133,13 +133,9 @@ class SymmetricTop:
 
     @classmethod
     def from_spheroid(
-        cls,
-        mass: float,
-        polar_radius: float,
-        equatorial_radius: float,
-        gravity: float = 9.81,
+        cls, mass: float, polar_radius: float, equatorial_radius: float, gravity: float = 9.81,
         pivot_distance: float | None = None,
-    ) -> "SymmetricTop":
+    ) -> "SymmetricTop":  # fmt: skip
         """A solid spheroid; radii along and across its axis.
 
         With ``pivot_distance=None`` this is the reading of the notebook that the project began with:

@@ -171,9 +171,6 @@ def _summary(values: dict[str, Array]) -> list[float]:
     ]
 
 
-# ---- checkpoints -----------------------------------------------------------------------------------------------------
-
-
 def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
     """A hash of all that decides the bits of a run; one name may stand for other coefficients or code next time.
 
