@@ -34,11 +34,13 @@ from symtop.methods.loop import Loop, driver
 from symtop.methods.outcomes import NOT_CONVERGED, OK
 from symtop.methods.registry import Array, Integrator
 from symtop.methods.space import field_axis, field_frame, frame_to_attitude, observe_axis, on_axis, on_frame
+from symtop.methods.stage_newton import solve_stages
 from symtop.model.top import Angles, SymmetricTop
 
 STAGES = (1, 2, 3, 4, 5, 6)
 DIGITS = 40  # of the multiprecision that coefficients are computed in
 SWEEPS = 100  # most of them in a step; 14 are the most that a step of sensible size takes
+FARTHEST, PACE = 1e3, 0.68  # correction k must be below FARTHEST PACE^k; after 100 sweeps that is rounding
 STILL = 5  # L_z has no slope, so its increments stay zero: left out, they save a sixth of the sums on (e, L)
 ROUND_OFF = 1e-14  # a correction that stopped falling above this, in units of |e| = 1 and |L|, has not converged
 
@@ -94,12 +96,12 @@ def gauss_rule(stages: int) -> GaussRule:
 def working_space(field: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
     """One array for all that a step reads and writes, because numba counts references to each: 10 ns an array.
 
-    Of its rows, dimension + 1 wide, 0 .. s-1 hold L_i and, in the last column, h b_i; s .. 2s-1 are room for the
-    prediction; 2s .. 3s-1 hold mu and 3s .. 4s-1 the predictor; the last row begins with 1/|L|, the unit in which
-    corrections of L are judged. L_i starts as h b_i f(y).
+    Of its rows 0 .. s-1 hold L_i and then h b_i; s .. 2s-1 are room for the prediction; 2s .. 3s-1 hold mu and then
+    mu diag(h b) mu, which Newton needs; 3s .. 4s-1 hold the predictor; row 4s begins with 1/|L|, the unit in which
+    corrections of L are judged; the last 3s are room for Newton's equations. L_i starts as h b_i f(y).
     """
     stages, dimension = len(rule.b), len(state)
-    work = np.zeros((4 * stages + 1, dimension + 1))
+    work = np.zeros((7 * stages + 1, max(dimension + 1, 3 * stages + 1)))
     weights = h * rule.b
     if stages > 2:  # the two ends take the rounding of the inner weights, so that the sum is h
         weights[0] = weights[-1] = 0.5 * (h - np.sum(weights[1:-1]))
@@ -113,6 +115,8 @@ def working_space(field: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
         for j in range(stages):
             work[2 * stages + i, j] = rule.mu[i, j]
             work[3 * stages + i, j] = rule.predict[i, j]
+            for k in range(stages):
+                work[2 * stages + i, stages + j] += rule.mu[i, k] * weights[k] * rule.mu[k, j]
     return work
 
 
@@ -124,7 +128,7 @@ def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C90
     one function, for an array that is handed to another one is counted once more, 18 ns. The largest correction is
     kept for L and for the unit vectors, not for each component, for which there are not registers enough: 10 ns.
     """
-    stages, dimension = len(work) // 4, len(state)
+    stages, dimension = len(work) // 7, len(state)
     nothing = state
     for m in range(dimension):
         nothing = set_item(nothing, m, 0.0)
@@ -165,10 +169,18 @@ def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C90
                 work[i, m] = value
         effort += 1
         correction = max(gap, gap_momentum * work[4 * stages, 0])
-        if correction == 0.0 or (correction >= last and correction < ROUND_OFF):
-            outcome = OK
-            break
+        if not 0.0 < correction < last:
+            if correction < ROUND_OFF:
+                outcome = OK
+                break
+            if not correction <= FARTHEST * PACE**effort:
+                break
         last = correction
+    if outcome != OK:
+        iterations, converged = solve_stages(field, par, state, work, stages)
+        effort += iterations
+        if converged:
+            outcome = OK
     step = nothing
     for i in range(stages):
         for m in range(dimension):
