@@ -1,6 +1,7 @@
-/* Twin of symtop/integrators/gauss.py on (e, L), with -DAXIS, or on (e, L, a), with -DFRAME.
+/* Twin of symtop/methods/gauss.py on (e, L), with -DAXIS, or on (e, L, a), with -DFRAME.
 
-   The Python kernel is compiled once for all numbers of stages, and so is this: the number is read from the table. */
+   The Python kernel is compiled once for all numbers of stages, and so is this: the number is read from the table.
+   It is the twin of the sweep: where sweeps do not converge and Python goes on with Newton, this ends. */
 
 #include "march.h"
 
@@ -8,6 +9,8 @@
 
 #define MOST 6
 #define SWEEPS 100
+#define FARTHEST 1e3
+#define PACE 0.68
 #define STILL 5 /* L_z has no slope: its increments stay zero */
 #define ROUND_OFF 1e-14
 
@@ -65,9 +68,12 @@ static inline int increment(
         effort++;
         gap_momentum *= carry->scale;
         correction = gap_momentum > gap ? gap_momentum : gap;
-        if (correction == 0.0 || (correction >= last && correction < ROUND_OFF)) {
-            outcome = 0;
-            break;
+        if (!(0.0 < correction && correction < last)) {
+            if (correction < ROUND_OFF) {
+                outcome = 0;
+                break;
+            }
+            if (!(correction <= FARTHEST * pow(PACE, (double)effort))) break;
         }
         last = correction;
     }

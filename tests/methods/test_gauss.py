@@ -1,6 +1,7 @@
-"""Gauss methods: orders, the four constants at once, symmetry, and what they are not."""
+"""Gauss methods: orders, the four constants at once, symmetry, stability at any step, and what they are not."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from symtop.methods.gauss import STAGES, gauss_rule, march_axis, march_frame
 from symtop.methods.registry import integrator
 from symtop.methods.space import field_axis, frame_to_attitude, on_axis, on_frame
 from symtop.model import charts
+from symtop.model.scenes import steady
+from symtop.run.linear_stability import linear_limits, trace
 from tests.slopes import assert_order
 
 ONE = np.array([1])
@@ -84,10 +87,10 @@ def test_one_stage_is_the_midpoint_rule():
     np.testing.assert_allclose(after, before + 0.02 * slope, rtol=0, atol=4e-15)
 
 
-def assert_keeps_everything(method, scene, observe, nutation_steps, limit=1e-13):
-    """|e|, L.e, L_z and the energy together, over 1e5 steps, relative."""
+def assert_keeps_everything(method, scene, observe, nutation_steps, limit=1e-13, steps=100_000):
+    """|e|, L.e, L_z and the energy together, over so many steps, relative."""
     h = symtop.scene(scene).nutation_period / nutation_steps
-    run = symtop.simulate(scene, method, step_size=h, horizon=1e5 * h, samples=501, observe=observe, guard=False)
+    run = symtop.simulate(scene, method, step_size=h, horizon=steps * h, samples=501, observe=observe, guard=False)
     assert run.attrs["outcome"] == "ok"
     for name in ("energy", "p_phi", "p_psi"):
         assert np.max(np.abs(run[name] / run[name][0] - 1.0)) < limit, name
@@ -142,11 +145,72 @@ def test_gauss_methods_are_not_poisson():
     assert defect(12, 0.2) < 1e-9  # the exact map, as far as differences see
 
 
-def test_a_step_that_is_too_large_is_reported():
-    run = symtop.simulate("spheroid", "gauss-2", step_size=0.5, observe="axis", guard=False)
-    assert run.attrs["outcome"] == "not_converged"
-    assert np.isnan(run["theta"][-1])
-    assert np.isfinite(run["theta"][0])
+# ---- any step is stable ----------------------------------------------------------------------------------------------
+
+LARGE = (2.0, 5.0, 10.0)  # h omega; sweeps converge up to about 1.6 with one stage
+STEADY = symtop.scene("steady-fast")
+OMEGA = STEADY.top.nutation_frequency(STEADY.top.momenta(STEADY.start))
+
+
+def pade(stages, x):
+    """The stability function of a Gauss method, the diagonal approximant of exp, of a number or a square matrix."""
+    one = np.eye(len(x)) if np.ndim(x) else 1.0
+    power, above, below = one, 0.0, 0.0
+    for k in range(stages + 1):
+        weight = math.comb(stages, k) * math.factorial(2 * stages - k) / math.factorial(2 * stages)
+        above, below = above + weight * power, below + (-1) ** k * weight * power
+        power = power @ x if np.ndim(x) else power * x
+    return np.linalg.solve(below, above) if np.ndim(x) else above / below
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+@pytest.mark.parametrize("phase", LARGE)
+@pytest.mark.parametrize("stages", STAGES)
+def test_a_step_next_to_a_vertical_top_is_the_stability_function(stages, phase, up):
+    """At rest, with z = e_x + i e_y and l = L_x + i L_y, the equations are linear: the step is R(h J), entry by entry."""
+    top = symtop.SymmetricTop(2.0, 1.0, 3.0)
+    par, _ = on_axis(top, symtop.Angles(theta=1.0))
+    spin = 7.0  # p_psi = L_z; upright tops sleep from 2 sqrt(I1 mgl) = 4.9 on
+    slope = 1j * np.array([[spin / top.I1, -up / top.I1], [top.mgl, 0.0]])
+    frequencies = np.linalg.eigvals(slope).imag
+    h, tilt = phase / np.abs(frequencies).max(), 1e-6
+    measured = np.empty((2, 2), dtype=complex)
+    for column, (z, momentum) in enumerate(((tilt, 0.0), (0.0, tilt))):
+        after = one_step(stages, (z, 0.0, up, momentum, 0.0, spin), par, h)
+        measured[:, column] = after[0] + 1j * after[1], after[3] + 1j * after[4]
+    np.testing.assert_allclose(measured / tilt, pade(stages, h * slope), rtol=0, atol=1e-8)
+    np.testing.assert_allclose(np.abs(np.linalg.eigvals(measured / tilt)), 1.0, rtol=0, atol=1e-8)
+    assert abs(abs(pade(stages, 1.0 + 1j * phase)) - 1.0) > 1e-3  # off the imaginary axis it is not one
+
+
+@pytest.mark.parametrize("stages", STAGES)
+def test_small_nutations_are_stable_at_any_step(stages):
+    method = integrator(f"gauss-{2 * stages}")
+    assert math.isnan(linear_limits(method, STEADY, np.linspace(0.02, 10.0, 200) / OMEGA)[0])
+    for phase in LARGE:
+        at = trace(method, STEADY, phase / OMEGA)
+        assert abs(at.trace) < 2.0
+        assert abs(at.theta - STEADY.start.theta) < 1e-12  # where the reduced energy is least, whatever the step
+        gap = abs(at.trace - 2.0 * pade(stages, 1j * phase).real)
+        faster = steady(200.0)  # precesses 10 times slower, and a nutation turns 10 times faster
+        omega = faster.top.nutation_frequency(faster.top.momenta(faster.start))
+        gap_faster = abs(trace(method, faster, phase / omega).trace - 2.0 * pade(stages, 1j * phase).real)
+        assert gap < 0.15
+        assert gap_faster < max(0.02 * gap, 1e-6)  # theory holds as precession / nutation goes to nothing, squared
+
+
+def test_verlet_and_rk4_are_not():
+    for name, phase in (("stormer-verlet", 2.0), ("rk4", 5.0)):
+        assert not trace(integrator(name), STEADY, 1.001 * phase / OMEGA).growth <= 1.0 + 1e-4
+
+
+@pytest.mark.parametrize("observe", ["axis", "attitude"])
+@pytest.mark.parametrize("scene", ["spheroid", "goldstein", "cusp"])
+@pytest.mark.parametrize("stages", STAGES)
+def test_everything_is_kept_at_large_steps(stages, scene, observe):
+    for phase in LARGE:
+        method = integrator(f"gauss-{2 * stages}")
+        assert_keeps_everything(method, scene, observe, 2.0 * math.pi / phase, steps=500)
 
 
 @pytest.mark.parametrize("theta", [1e-9, 0.4, np.pi / 2, np.pi - 1e-9])

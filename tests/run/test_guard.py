@@ -135,7 +135,7 @@ def test_the_trace_in_space_turns_a_small_step_by_omega(name):
 
 
 def test_the_limits_of_verlet_and_rk4_are_found():
-    """F1: Verlet loses small nutations at h omega = 2, rk4 at 2 sqrt 2, the midpoint rule never."""
+    """F1: Verlet loses small nutations at h omega = 2, rk4 at 2 sqrt 2, the midpoint rule and Gauss methods never."""
     scene = steady(20.0)
     frequency = landmarks(scene).frequency
     for name, limit in (("stormer-verlet", 2.0), ("rk4", 2.0 * math.sqrt(2.0))):
@@ -144,6 +144,9 @@ def test_the_limits_of_verlet_and_rk4_are_found():
         assert "grow" in warned
         assert "grow" not in said(scene, name, step_size=0.98 * limit / frequency, observe="nutation")
     assert said(scene, "midpoint", step_size=3.0 / frequency) == ""
+    for name in ("gauss-2", "gauss-4", "gauss-12"):
+        for phase in (2.0, 5.0, 10.0):
+            assert "grow" not in said(scene, name, step_size=phase / frequency, observe="nutation")
 
 
 def test_landmarks_are_those_of_the_closed_form():
@@ -171,7 +174,8 @@ def test_each_cause_is_named():
     assert "1/3 of a turn, a resonance" in said(nutating(), "stormer-verlet", step_size=math.sqrt(3.0) / frequency)
     assert "errors add up over" in said("goldstein", "midpoint", step_size=0.1, horizon=1000.0)
     assert "tolerance" in said("goldstein", "rk45-compiled", tolerance=1e-5, horizon=1000.0)
-    assert "stopped at t =" in said("spheroid", "gauss-2", step_size=0.5, observe="axis")
+    assert "stopped at t =" in said("sleeping", "trapezoidal", step_size=2.0, horizon=4000.0)
+    assert "a step is 1/2.36 of a nutation" in said("spheroid", "gauss-2", step_size=0.5, observe="axis")  # it goes on
 
 
 @pytest.mark.parametrize(
