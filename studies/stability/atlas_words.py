@@ -1,6 +1,7 @@
 """The atlas in words: for each integrator when to use it and when it fails, and what a page of maps says."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ import xarray as xr
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG
 
 from .atlas import PAGES, OutcomeMap, maps, pole_effect
-from .tables import PERIODS
+from .tables import PERIODS, Column
 
 FAILURES = {
     "drifting": "loses energy",
@@ -91,7 +92,26 @@ def page_caption(data: xr.Dataset, family: str, page: str, names: Sequence[str])
         f"{family} over {PERIODS:g} nutation periods with another spin; r = 1 is the spin from which a top sleeps "
         "(spins upright and stays so). Right: one fall past a pole that the axis misses by 1.1 delta (rad). In both, "
         f"the step or the tolerance grows to the right. Accurate in the largest part of its map: {best}{smallest} "
-        f"{early}"
+        f"{early}{_without_limit(data, family, shown)}"
+    )
+
+
+def _without_limit(data: xr.Dataset, family: str, shown: Mapping[str, OutcomeMap]) -> str:
+    """Which methods of a page show no linear limit although their steps reach a third of a turn."""
+    if Column.LINEAR_LIMIT not in data:
+        return ""
+    cells = {name: data.sel(scene=family, integrator=name) for name in shown}
+    free = [
+        name
+        for name, cell in cells.items()
+        if np.isfinite(cell[Column.THIRD_TURN].values).any() and not np.isfinite(cell[Column.LINEAR_LIMIT].values).any()
+    ]
+    if not free:
+        return ""
+    longest = max(float(shown[name].settings[-1]) for name in free)
+    return (
+        f" No linear limit up to steps of {longest:.2g} nutation periods (h omega = {2.0 * math.pi * longest:.3g}), at "
+        f"none of the spins tried: {', '.join(free)}."
     )
 
 

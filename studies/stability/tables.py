@@ -22,6 +22,7 @@ from .outcome_maps import family, outcome_map
 from .solver_tolerance import solver_sweep, textbook_midpoint
 
 PERIODS = 12.0  # nutations of a run of a map over spin
+SOUGHT_PHASE = 10.0  # h omega up to which a linear limit is looked for
 PAST_RESONANCE = 1.05  # times the resonant step: far enough for what a resonance kills to live again
 
 
@@ -37,7 +38,7 @@ class Column:
     SHOWN_SETTING, GRAZING_ERROR = "shown_knob", "grazing_error"
     # resonances: largest displacement that survives at h omega; phase. Linear limit, a third of a turn, what survives
     PHASE, SURVIVING = "phase_value", "surviving"
-    LIMIT_PHASE, THIRD_TURN_PHASE = "limit_phase", "third_turn_phase"
+    LIMIT_PHASE, THIRD_TURN_PHASE, SOUGHT_PHASE = "limit_phase", "third_turn_phase", "sought_phase"
     SURVIVING_AT_THIRD_TURN, SURVIVING_PAST_THIRD_TURN = "surviving_at_third_turn", "surviving_past_third_turn"
     # the sleeping top; rung
     SLEEPING_STEP, SLEEPING_THRESHOLD = "sleeping_step", "sleeping_threshold"
@@ -89,11 +90,14 @@ def family_limits(name: str, method: Integrator, parameter: float, longest: floa
 
 
 def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
-    """What survives of a displaced steady precession against h omega, and where the linearised map has its limits."""
+    """What survives of a displaced steady precession against h omega, and where the linearised map has its limits.
+
+    The limits are looked for at 300 steps up to h omega = 10; one that is NaN is not there.
+    """
     scene = scenes.scene(name)
     omega = scene.top.nutation_frequency(scene.top.momenta(scene.start))
     phases = np.asarray(settings["phases"], float)
-    limit, third = linear_limits(method, scene, np.linspace(0.02, phases[-1], 120) / omega)
+    limit, third = linear_limits(method, scene, np.linspace(0.02, SOUGHT_PHASE, 300) / omega)
 
     def surviving(h: float) -> float:
         return surviving_displacement(method, scene, h, settings["steps"]) if math.isfinite(h) else math.nan
@@ -103,6 +107,7 @@ def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) 
         Column.SURVIVING: ("phase", [surviving(float(x) / omega) for x in phases]),
         Column.LIMIT_PHASE: limit * omega,
         Column.THIRD_TURN_PHASE: third * omega,
+        Column.SOUGHT_PHASE: SOUGHT_PHASE,
         Column.SURVIVING_AT_THIRD_TURN: surviving(third),
         Column.SURVIVING_PAST_THIRD_TURN: surviving(PAST_RESONANCE * third),
     }

@@ -21,8 +21,8 @@ HOW_TO_READ = (
     "A map has one cell a run. To the right the step or the tolerance grows; upwards the spin r, or the gap delta "
     "between path and pole. Green is accurate. Yellow has bounded energy and a wrong phase. Hatched cells lose energy, "
     "cross a turning point of the true motion, or end early. Solid lines: the linear limit, the step beyond which "
-    "small nutations about a steady precession grow. Dashed lines: the step that advances such a nutation by a third "
-    "of a turn. A limit for fast tops (r > 3) or slow tops (r < 1) holds for nine rows in ten; a method first fails in "
+    "small nutations about a steady precession grow; a map without one belongs to a method that has no such limit on "
+    "it, or whose limit is not known. Dashed lines: the step that advances such a nutation by a third of a turn. A limit for fast tops (r > 3) or slow tops (r < 1) holds for nine rows in ten; a method first fails in "
     "some way at the smallest step or tolerance at which one row in twenty does."
 )
 LOOSE = 10.0  # times the change of the solved equation: lost because the solver's tolerance is too loose
@@ -63,10 +63,30 @@ def poles(part: xr.Dataset) -> str:
 
 
 def limits(part: xr.Dataset) -> str:
-    """Linear limits of the step."""
+    """Linear limits of the step, and the methods that have none."""
     phases = {name: float(cell[Column.LIMIT_PHASE]) for name, cell in _rows(part, Column.LIMIT_PHASE).items()}
     growing = "Small nutations about a steady precession grow from h omega (step times nutation frequency) = "
-    return f"{growing}{_listed(phases)}." if phases else ""
+    text = f"{growing}{_listed(phases)}." if phases else ""
+    free = unlimited(part)
+    if free:
+        text += f" They grow at no step up to h omega = {max(free.values()):g} with {', '.join(free)}."
+    return text.strip()
+
+
+def unlimited(part: xr.Dataset) -> dict[str, float]:
+    """Methods whose small nutations grow at no step, with the largest h omega at which they were tried.
+
+    A method whose step reaches a third of a turn was followed on the whole way there; one that shows neither is not
+    symmetric, or has no precession to follow.
+    """
+    if Column.SOUGHT_PHASE not in part:
+        return {}
+    turning = _rows(part, Column.THIRD_TURN_PHASE)
+    return {
+        name: float(cell[Column.SOUGHT_PHASE])
+        for name, cell in turning.items()
+        if math.isnan(float(cell[Column.LIMIT_PHASE]))
+    }
 
 
 def resonances(part: xr.Dataset) -> str:
@@ -201,11 +221,14 @@ def tables(data: xr.Dataset) -> list[Table]:
         for family in families(data)
     ]  # fmt: skip
     columns = [one for one in LIMITS if one[0] in data["scene"].values and one[1] in data]
-    rows = []
+    rows, limit = [], LIMITS[0]
+    free = unlimited(data.sel(scene=limit[0])) if limit in columns else {}
     for name in map(str, data["integrator"].values):
         last = [float(np.ravel(data[key].sel(scene=scene, integrator=name).values)[-1]) for scene, key, *_ in columns]
         if np.isfinite(last).any():
             texts = [one[3].format(x) if math.isfinite(x) else "" for one, x in zip(columns, last, strict=True)]
+            if name in free:
+                texts[columns.index(limit)] = f"none up to {free[name]:g}"
             rows.append([name, *texts])
     limits_of_all = Table("Limits in numbers", ["integrator", *(one[2] for one in columns)], rows)
     return [*shown, limits_of_all] if columns else shown

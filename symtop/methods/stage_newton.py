@@ -105,8 +105,10 @@ def _iterate(
 ) -> Any:
     """Newton from the increments as they are, for a share of the step: iterations, and did they converge."""
     base, effort, converged = 4 * stages + 1, 0, False
-    while effort < DIRECT and not converged:
+    while True:
         _pull(field, par, state, work, stages, share)
+        if converged or effort == DIRECT:
+            return effort, converged
         _linearise(field, par, state, work, stages, share, first, mgl)
         _eliminate(work, base, 3 * stages)
         effort += 1
@@ -117,37 +119,30 @@ def _iterate(
                 correction += abs(change)
                 work[i, first + m] += change
         converged = correction <= enough  # false if it is not a number
-    return effort, converged
-
-
-@register_jitable
-def _forget(work: Any, stages: int, first: int) -> None:
-    """Three components without increments."""
-    for i in range(stages):
-        for m in range(first, first + 3):
-            work[i, m] = 0.0
 
 
 @register_jitable
 def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> Any:
-    """Solve a step in the array of `symtop.methods.gauss.working_space`: iterations, and did they converge."""
-    for first in range(0, len(state), 3):
-        _forget(work, stages, first)
-    effort, converged = _iterate(field, par, state, work, stages, 1.0, 0, par.mgl, ENOUGH)
-    if not converged:
-        _forget(work, stages, 0)
-        share = LONGER ** (1 - RUNGS)
-        for rung in range(RUNGS):
-            if rung == RUNGS - 1:
-                share = 1.0
-            enough = ENOUGH if share == 1.0 else NEAR
-            more, converged = _iterate(field, par, state, work, stages, share, 0, par.mgl, enough)
-            effort += more
-            if not converged:
-                break
-            share *= LONGER
-    _pull(field, par, state, work, stages, 1.0)
-    if len(state) > 6 and converged:
-        more, converged = _iterate(field, par, state, work, stages, 1.0, 6, 0.0, ENOUGH)
+    """Solve a step in the array of `symtop.methods.gauss.working_space`: iterations, and did they converge.
+
+    `_iterate` stands here once, because all of it is inlined: three times, compilation takes seconds longer.
+    """
+    effort, rung, first, mgl, grown = 0, RUNGS, 0, par.mgl, False
+    for i in range(stages):
+        for m in range(len(state)):
+            work[i, m] = 0.0
+    while True:
+        enough = ENOUGH if rung == RUNGS else NEAR
+        more, converged = _iterate(field, par, state, work, stages, LONGER ** (rung - RUNGS), first, mgl, enough)
         effort += more
-    return effort, converged
+        if converged and rung < RUNGS:
+            rung += 1
+        elif converged and first == 0 and len(state) > 6:
+            first, mgl = 6, 0.0
+        elif converged or grown or first > 0:
+            return effort, converged
+        else:  # from the start again, with a tenth of the step
+            grown, rung = True, 1
+            for i in range(stages):
+                for m in range(3):
+                    work[i, m] = 0.0

@@ -9,6 +9,10 @@ t is the trace of the linearised map. |t| <= 2: the discrete nutation turns by a
 point (Moser; Verlet is there at h omega = sqrt 3 and the midpoint rule at 2 sqrt 3). So t(h), which four steps of any
 method show, has the limit and the resonances in it, for any method.
 
+A method that keeps the energy and both momenta has |t| <= 2 at every step that it can solve: the reduced energy is
+least at the steady precession, and small nutations stay on its level lines. Gauss methods are of this kind. As the
+precession becomes slow beside the nutation, their t tends to 2 Re R(i h omega), R the diagonal Pade approximant of exp.
+
 Near the upright (sleeping) top the axis z = e_x + i e_y obeys the same with c = 0 and complex t and d, |d| = 1, in
 charts without poles; in the angles chart the inclination does if p_phi = p_psi. The top sleeps while t^2/d lies in
 [0, 4]. With I1 = mgl = 1 and a = I3 w3 that ends for Strang's splitting where a tan(a h/4) = h, for Cayley's where
@@ -157,7 +161,9 @@ GROWING = 1e-4  # growth of a nutation per step that counts, for a method that i
 
 
 def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[float, float]:
-    """Steps h of a grid at which small nutations first grow, and at which they first turn by a third of a turn; or NaN.
+    """Steps h of a grid at which small nutations first grow, and at which they first turn by a third of a turn.
+
+    NaN where that happens at no step of the grid, or at its first.
 
     Both at the steady precession of `scene`. A fixed point that is lost between two steps (an implicit equation without
     a solution, say) counts as the end of stability; a window narrower than the grid is not seen. Where a method is not

@@ -13,7 +13,7 @@ from symtop_studies.stability.tables import Column, family_limits, map_table, sa
 import symtop
 from symtop.base import datasets
 from symtop.measure.errors import errors_against
-from symtop.measure.verdicts import VERDICTS, verdict
+from symtop.measure.verdicts import JUDGED, VERDICTS, verdict
 from symtop.methods.registry import integrator, integrators
 from symtop.model.scenes import closed_form, scene
 from symtop.report.style import OUTCOME_COLORS
@@ -81,7 +81,45 @@ def test_limits_over_a_family_end_at_verlets_and_rk4s():
     limit, third = family_limits("cusp", integrator("stormer-verlet"), 30.0, 2.0)
     assert limit == pytest.approx(1.0 / math.pi, rel=1e-3)
     assert third == pytest.approx(math.sqrt(3.0) / (2.0 * math.pi), rel=1e-3)
-    assert math.isnan(family_limits("cusp", integrator("midpoint"), 30.0, 2.0)[0])
+    for name in ("midpoint", "gauss-2", "gauss-4", "gauss-12"):
+        for spin in (1.5, 30.0):
+            assert math.isnan(family_limits("cusp", integrator(name), spin, 2.0)[0])
+    # one stage turns by 2 atan(h omega/2), as the midpoint rule does
+    assert family_limits("cusp", integrator("gauss-2"), 30.0, 2.0)[1] == pytest.approx(math.sqrt(3.0) / math.pi, rel=1e-2)
+
+
+def test_maps_of_gauss_methods_have_no_run_that_ends_early():
+    """Up to two nutation periods a step, h omega = 12.6."""
+    for name in ("gauss-2", "gauss-4", "gauss-12"):
+        runs = outcome_map("cusp", [0.3, 1.0, 8.0, 30.0], integrator(name), [0.11, 0.34, 0.55, 0.83, 1.3, 2.0], 12.0)
+        assert {VERDICTS[k] for k in np.unique(runs.verdict)} <= set(JUDGED)
+        assert VERDICTS[runs.verdict[0, -1]] != "accurate"  # it is solved, and wrong
+
+
+def mechanism(limit, third):
+    """A dataset of `steady-fast` with one method of these limits."""
+    names = {Column.LIMIT_PHASE: limit, Column.THIRD_TURN_PHASE: third, Column.SOUGHT_PHASE: 10.0}
+    return store.combine([(Case("steady-fast", "midpoint"), xr.Dataset(names))])
+
+
+def test_a_method_without_a_linear_limit_is_said_to_have_none():
+    free = mechanism(math.nan, 3.4641)
+    assert "grow at no step up to h omega = 10 with midpoint." in words.limits(free.sel(scene="steady-fast"))
+    assert words.tables(free)[-1].rows[0][1] == "none up to 10"
+    bound = mechanism(1.9999, 1.7321)
+    assert "no step" not in words.limits(bound.sel(scene="steady-fast"))
+    assert words.tables(bound)[-1].rows[0][1] == "1.9999"
+    unknown = mechanism(math.nan, math.nan)  # not symmetric: nothing is claimed
+    assert words.limits(unknown.sel(scene="steady-fast")) == ""
+
+
+def test_the_caption_of_a_page_names_the_methods_without_a_limit():
+    for limit, said in ((math.nan, True), (0.3, False)):
+        data = hand_made([[A, B, B]] * 4)
+        for variable, value in ((Column.LINEAR_LIMIT, limit), (Column.THIRD_TURN, 0.55)):
+            data[variable] = (("scene", "integrator", "curve"), [[[value, value]]])
+        caption = atlas_words.page_caption(data, "cusp", "gauss", ["midpoint"])
+        assert ("No linear limit up to steps of 1 nutation periods (h omega = 6.28)" in caption) is said
 
 
 def hand_made(

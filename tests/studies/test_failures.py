@@ -311,6 +311,16 @@ def test_nothing_survives_a_third_of_a_turn_a_step(name, place):
     assert abs(trace(method, STEADY, third).trace) < 1.01  # a linear analysis sees nothing
 
 
+@pytest.mark.parametrize("name", ["gauss-2", "gauss-4", "gauss-12"])
+def test_gauss_methods_have_no_limit_and_no_resonance(name):
+    """They keep the energy and both momenta, so that a displaced top stays on its level line at every step."""
+    method = integrator(name)
+    limit, third = linear_limits(method, STEADY, np.linspace(0.02, 10.0, 300) / OMEGA)
+    assert math.isnan(limit)
+    for h in (third, *(phase / OMEGA for phase in (2.0, 5.0, 10.0))):
+        assert surviving_displacement(method, STEADY, h, 1000) == pytest.approx(0.3)
+
+
 def test_the_integrable_map_has_no_resonance():
     cayley = integrator("cayley")
     _, third = linear_limits(cayley, STEADY, np.linspace(0.05, 4.0, 80) / OMEGA)
