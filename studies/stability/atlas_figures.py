@@ -101,15 +101,17 @@ def draw_map(axis: Any, one: OutcomeMap) -> None:
     axis.set_yticks(*_ticks(y), fontsize=7.5)
 
 
-def _line(axis: Any, x: Any, y: Any, name: str) -> None:
-    """One of `LINES` over a map, with a white edge."""
+def _line(axis: Any, x: Any, y: Any, name: str) -> list[str]:
+    """One of `LINES` over a map, with a white edge; its name, if there was something to draw."""
     from matplotlib.patheffects import Normal, Stroke
 
-    if np.isfinite(x).sum() > 1:
-        ends = {"xlim": axis.get_xlim(), "ylim": axis.get_ylim()}
-        edge = [Stroke(linewidth=2.6, foreground="white"), Normal()]
-        axis.plot(np.log10(x), np.log10(y), color="black", lw=1.1, ls=LINES[name][1], path_effects=edge)
-        axis.set(**ends)
+    if np.isfinite(x).sum() < 2:
+        return []
+    ends = {"xlim": axis.get_xlim(), "ylim": axis.get_ylim()}
+    edge = [Stroke(linewidth=2.6, foreground="white"), Normal()]
+    axis.plot(np.log10(x), np.log10(y), color="black", lw=1.1, ls=LINES[name][1], path_effects=edge)
+    axis.set(**ends)
+    return [name]
 
 
 def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: Mapping[str, str]) -> Any:
@@ -132,10 +134,12 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
             if drawn_maps is over_spin and Column.LINEAR_LIMIT in data:
                 cell = data.sel(scene=family, integrator=name)
                 for variable, kind in ((Column.LINEAR_LIMIT, "limit"), (Column.THIRD_TURN, "third")):
-                    _line(axis, cell[variable].values, cell[Column.LIMIT_PARAMETER].values, kind)
+                    at = cell[variable].values, cell[Column.LIMIT_PARAMETER].values
+                    drawn |= dict.fromkeys(_line(axis, *at, kind))
             elif drawn_maps is over_gap and one.control == "step_size":
                 # the fall at 1.1 gap past the pole takes one step
-                _line(axis, 1.1 * one.parameter / FALL_SPEED / FALL_PERIOD, one.parameter, "passage")
+                at = 1.1 * one.parameter / FALL_SPEED / FALL_PERIOD, one.parameter
+                drawn |= dict.fromkeys(_line(axis, *at, "passage"))
             if below != control:
                 axis.set_xlabel(CONTROLS[one.control], fontsize=8.5)
         lines = textwrap.wrap(sentences[name], 128)
@@ -144,8 +148,7 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
             name, (0.0, 1.0), (0.0, 5.5 + 11.2 * len(lines)), xycoords="axes fraction", textcoords="offset points",
             fontsize=9.0, weight="bold", annotation_clip=False,
         )  # fmt: skip
-    shown = [word for word in VERDICTS if word in drawn]
-    shown += list(LINES)[: 2 + grazed] if "step_size" in controls else []
+    shown = [name for name in (*VERDICTS, *LINES) if name in drawn]
     figure.legend(handles=list(map(_handle, shown)), loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure
 

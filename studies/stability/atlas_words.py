@@ -110,8 +110,8 @@ def _without_limit(data: xr.Dataset, family: str, shown: Mapping[str, OutcomeMap
         return ""
     longest = max(float(shown[name].settings[-1]) for name in free)
     return (
-        f" No linear limit up to steps of {longest:.2g} nutation periods (h omega = {2.0 * math.pi * longest:.3g}), at "
-        f"none of the spins tried: {', '.join(free)}."
+        f" Small nutations grow at no spin and no step tried, up to steps of {longest:.2g} nutation periods (h omega = "
+        f"{2.0 * math.pi * longest:.3g}): {', '.join(free)} {'have' if len(free) > 1 else 'has'} no linear limit there."
     )
 
 

@@ -119,7 +119,7 @@ def test_the_caption_of_a_page_names_the_methods_without_a_limit():
         for variable, value in ((Column.LINEAR_LIMIT, limit), (Column.THIRD_TURN, 0.55)):
             data[variable] = (("scene", "integrator", "curve"), [[[value, value]]])
         caption = atlas_words.page_caption(data, "cusp", "gauss", ["midpoint"])
-        assert ("No linear limit up to steps of 1 nutation periods (h omega = 6.28)" in caption) is said
+        assert ("up to steps of 1 nutation periods (h omega = 6.28): midpoint has no linear limit" in caption) is said
 
 
 def hand_made(
