@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from symtop.methods.registry import Integrator
 
-ADAPTERS = ("scipy", "odeint", "diffrax", "sundae", "mujoco", "rebound", "drake")
+ADAPTERS = ("scipy", "odeint", "diffrax", "sundae", "cvode", "arkode", "mujoco", "rebound", "drake")
 
 
 class Peer(NamedTuple):
@@ -13,7 +13,18 @@ class Peer(NamedTuple):
 
     package: str
     method: Integrator
+    language: str  # of the right-hand side, and who calls it
     distribution: str = ""  # that installs it, where its name is another
+
+    @property
+    def chart(self) -> str:
+        """The one chart it runs in."""
+        return self.method.chart_for("axis")
+
+    @property
+    def row(self) -> str:
+        """What a table calls it: ``method[chart]``."""
+        return f"{self.method.name}[{self.chart}]"
 
 
 def load(adapters: tuple[str, ...] = ADAPTERS) -> tuple[list[Peer], list[str]]:
@@ -23,7 +34,7 @@ def load(adapters: tuple[str, ...] = ADAPTERS) -> tuple[list[Peer], list[str]]:
         module = importlib.import_module(f"benchmarks.peers.adapters.{name}")
         distribution = getattr(module, "DISTRIBUTION", module.PACKAGE)
         try:
-            found += [Peer(module.PACKAGE, method, distribution) for method in module.peers()]
+            found += [Peer(module.PACKAGE, method, language, distribution) for method, language in module.peers()]
         except (ImportError, OSError) as error:  # OSError: a shared library that does not load
             missing.append(f"{module.PACKAGE} is not installed here and was skipped: {error}.")
     return found, missing

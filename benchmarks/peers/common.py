@@ -1,43 +1,108 @@
-"""What the adapters share: the top's equations on (e, L), in plain Python and compiled, and the record of a peer.
+"""What the adapters share: the top's equations, in plain Python and compiled, and the two calls that are timed.
 
-    e' = L x e / I1,   L' = mgl z x e        (six variables, quadratic, no pole anywhere)
+    axis     e' = L x e / I1,   L' = mgl z x e          six variables, quadratic, no pole anywhere
+    angles   theta'', phi'', psi''                      six variables, Euler-Lagrange, a pole at theta = 0 and pi
 
-This is the form that suits a general solver best: no sine, no singularity, twelve multiplications. A library that is
-handed equations gets these; one that models bodies gets the body. The compiled right-hand sides freeze the numbers of
-the top, as a user who wants speed would.
+The first form suits a general solver best: no sine, no singularity, twelve multiplications. Compiled right-hand sides
+freeze the numbers of the top, as a user who wants speed would.
+
+Two calls of every solver are timed. The *public call* is what a user writes: objects of the library are built in it,
+and it ends with the sampled motion. The *inner loop* is what an author compares: everything that can be built once for
+a top, a start and a setting is built before, and the call goes from the start to the horizon without a sample.
+Compilation of machine code (numba, JAX, heyoka) happens before both.
 """
 
 import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray, cfunc, njit, types
+from numba import njit
 
-from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Array, Integrator, Solver
+from symtop.methods.euler_lagrange import accelerations, with_rates
+from symtop.methods.registry import Array, Integrator, Plan, Run
 from symtop.methods.space import on_axis
+from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop
 
-ON_AXIS = "six equations on (e, L)"
 SAME = "rtol = atol = the tolerance"
+PYTHON, NUMBA_IN_PYTHON, NUMBA_IN_C = "Python", "numba, called through Python", "numba, called from C"
+DENSE, OWN_STEPS = "dense output", "the ends of its own steps"
+
+
+class Motion(NamedTuple):
+    """What a public call returns: one row a sample, and the library's own counts (0: it does not say)."""
+
+    states: Any
+    steps: int = 0
+    evaluations: int = 0
+
+
+class Inner(NamedTuple):
+    """An inner loop that is ready to run: a call that starts anew each time, and the end state of what it returned."""
+
+    call: Callable[[], Any]
+    end: Callable[[Any], Any]
+
+
+class Library:
+    """One solver of another package.
+
+    `public` does all that a user's call does, `inner` prepares the integration alone. `states_of` turns rows of the
+    solver's own variables into states of `chart`. A library that would bend its steps to the times it is asked for has
+    `own_steps`, and its accuracy is judged there.
+    """
+
+    chart = "axis"
+    shows = DENSE
+
+    def public(self, top: SymmetricTop, start: Angles, plan: Plan) -> Motion:
+        """From the numbers of the top to the sampled motion."""
+        raise NotImplementedError
+
+    def inner(self, top: SymmetricTop, start: Angles, plan: Plan) -> Inner:
+        """The integration to the horizon, ready to be called."""
+        raise NotImplementedError
+
+    def states_of(self, top: SymmetricTop, start: Angles, rows: Array) -> Array:
+        """States of `chart`, one row a sample."""
+        del top, start
+        return rows
+
+    def axes(self, top: SymmetricTop, start: Angles, rows: Any) -> Array:
+        """The axis of each row, shape (rows, 3)."""
+        states = self.states_of(top, start, np.atleast_2d(np.asarray(rows, dtype=float)))
+        if self.chart == "angles":
+            return charts.axis_from_angles(states[:, 0], states[:, 2])
+        return states[:, :3] if self.chart == "axis" else charts.axis_from_quaternion(states[:, :4])
+
+    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        """The public call as a solver of the registry; samples that are missing or not finite are a failure."""
+        motion = self.public(top, start, plan)
+        shown = np.full((plan.times.size, charts.DIMENSIONS[self.chart]), np.nan)
+        count = min(len(motion.states), plan.times.size)
+        if count:
+            shown[:count] = self.states_of(top, start, np.asarray(motion.states, dtype=float)[:count])
+        good = np.isfinite(shown).all(axis=1)
+        reached = plan.horizon if good.all() else float(plan.times[good][-1]) if good.any() else 0.0
+        blank = np.zeros(plan.times.size)  # only the axis is judged here
+        outcome = "ok" if good.all() else "not_finite"
+        return Run(shown, blank, blank, int(motion.steps), int(motion.evaluations), 0, outcome, reached)
 
 
 def start_of(top: SymmetricTop, start: Angles) -> Array:
-    """(e, L) of a start."""
-    return np.array(on_axis(top, start)[1])
+    """(e, L) of a start; computed once, since a user writes it down as numbers."""
+    return np.array(_on_axis(top, start))
 
 
-def run_of(plan: Plan, states: Any, steps: int, evaluations: int) -> Run:
-    """A Run in the axis chart; samples that are missing or not finite are a failure."""
-    shown = np.full((plan.times.size, 6), np.nan)
-    count = min(len(states), plan.times.size)
-    shown[:count] = np.asarray(states)[:count]
-    good = np.isfinite(shown).all(axis=1)
-    outcome = "ok" if good.all() else "not_finite"
-    reached = plan.horizon if good.all() else float(plan.times[good][-1]) if good.any() else 0.0
-    p_psi = np.sum(shown[:, :3] * shown[:, 3:], axis=1)
-    return Run(shown, shown[:, 5].copy(), p_psi, int(steps), int(evaluations), 0, outcome, reached)
+def angles_of(top: SymmetricTop, start: Angles) -> Array:
+    """(theta, phi, psi, theta', phi', psi') of a start."""
+    return np.array(with_rates(top, start)[1])
+
+
+@functools.lru_cache(maxsize=64)
+def _on_axis(top: SymmetricTop, start: Angles) -> tuple[float, ...]:
+    return on_axis(top, start)[1]
 
 
 def with_start(plan: Plan) -> Array:
@@ -45,16 +110,16 @@ def with_start(plan: Plan) -> Array:
     return plan.times if plan.times[0] == 0.0 else np.concatenate([[0.0], plan.times])
 
 
-def peer(
-    name: str, solve: Solver, summary: str, *, implementation: str, control: str = "tolerance",
-    order: int | None = None, least: float = 1e-15, chart: str = "axis",
+def record(
+    name: str, library: Library, formulation: str, *, control: str = "tolerance",
+    implementation: str = "compiled", order: int | None = None, least: float = 1e-15,
 ) -> Integrator:  # fmt: skip
-    """An outside solver in the same record as our own methods, so that one code measures and times both."""
+    """An outside solver in the same record as our own methods, so that one code measures both."""
     return Integrator(
         name=name,
         family="other",
-        summary=summary,
-        solvers={chart: solve},
+        summary=formulation,
+        solvers={library.chart: library},
         control=control,
         implementation=implementation,
         order=order,
@@ -107,15 +172,27 @@ def filling_field(top: SymmetricTop) -> Callable[[float, Any, Any], None]:
 
 
 @functools.lru_cache(maxsize=16)
-def c_field(top: SymmetricTop) -> Any:
-    """f as a C function ``void(void *, double *out, const double *y, double t)``; keep it alive while it is in use."""
-    inverse, mgl = 1.0 / top.I1, top.mgl
+def python_angles(top: SymmetricTop) -> Callable[[float, Any], tuple[float, ...]]:
+    """f(t, y) on (theta, phi, psi, theta', phi', psi') in plain Python on floats."""
+    numbers = top.I1, top.I3, top.mgl
 
-    @cfunc(types.void(types.voidptr, types.CPointer(types.float64), types.CPointer(types.float64), types.float64))
-    def field(_, out, state, t):  # noqa: ARG001
-        f, y = carray(out, 6), carray(state, 6)
-        wx, wy, wz = inverse * y[3], inverse * y[4], inverse * y[5]
-        f[0], f[1], f[2] = wy * y[2] - wz * y[1], wz * y[0] - wx * y[2], wx * y[1] - wy * y[0]
-        f[3], f[4], f[5] = -mgl * y[1], mgl * y[0], 0.0
+    def field(_: float, y: Any) -> tuple[float, ...]:
+        theta, _, _, theta_dot, phi_dot, psi_dot = y.tolist()
+        return (theta_dot, phi_dot, psi_dot, *accelerations(*numbers, theta, theta_dot, phi_dot, psi_dot))
+
+    return field
+
+
+@functools.lru_cache(maxsize=16)
+def compiled_angles(top: SymmetricTop) -> Callable[[float, Any], Array]:
+    """The same compiled, returning a new array."""
+    I1, I3, mgl = top.I1, top.I3, top.mgl
+
+    @njit("float64[::1](float64, float64[:])")
+    def field(_, y):
+        f = np.empty(6)
+        f[0], f[1], f[2] = y[3], y[4], y[5]
+        f[3], f[4], f[5] = accelerations(I1, I3, mgl, y[0], y[3], y[4], y[5])
+        return f
 
     return field

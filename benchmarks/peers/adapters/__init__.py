@@ -1,1 +1,1 @@
-"""One file a peer: ``PACKAGE``, the name to install, and ``peers()``, its solvers as Integrator records."""
+"""One file a peer: ``PACKAGE`` and ``peers()``, its solvers as Integrator records with the language of their field."""

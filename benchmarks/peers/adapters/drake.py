@@ -2,83 +2,99 @@
 integrators.
 
 The mass is 1 and the centre of gravity a tenth of sqrt(I1) from the joint. The target accuracy is the control; the
-largest step is a tenth of a nutation. Drake stops at every time it is asked for, so its accuracy is judged at its own
-steps.
+largest step is a tenth of a nutation. Drake stops at every time it is asked for, so the public call keeps the ends of
+its own steps, and its accuracy is judged there. The public call builds plant and simulator.
 """
 
-import functools
 import importlib
 from typing import Any
 
 import numpy as np
 
-from benchmarks.peers.common import peer
-from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator
-from symtop.model import charts
+from benchmarks.peers import common
+from benchmarks.peers.common import Inner, Library, Motion
+from symtop.methods.registry import Array, Integrator, Plan
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "drake"
+LANGUAGE = "built in (C++)"
 LEAST = 1e-11  # below it the steps shrink until the run does not end
 MOST_STEPS = 60_000
 SCHEMES = {"runge_kutta3": 3, "runge_kutta5": 5}
 
 
-class Chain:
-    """A solver around one of Drake's integrators, and its own steps."""
+class Chain(Library):
+    """One of Drake's integrators; rows are the angles phi, theta, psi and their rates."""
+
+    chart = "angles"
+    shows = common.OWN_STEPS
 
     def __init__(self, scheme: str) -> None:
         self.scheme = scheme
-        self.plant_of = functools.lru_cache(maxsize=16)(_plant)
 
-    def _begin(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Any, Any, Any]:
+    def _built(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Any, Any, Any]:
         from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-        plant = self.plant_of(top)
+        plant = _plant(top)
         simulator = Simulator(plant)
         ResetIntegratorFromFlags(simulator, self.scheme, 0.1 * top.nutation_period(start))
         simulator.get_mutable_integrator().set_target_accuracy(plan.tolerance)
         context = simulator.get_mutable_context()
-        angles = [start.phi, start.theta, start.psi]
-        rates = [start.phi_dot, start.theta_dot, start.psi_dot]
-        plant.SetPositionsAndVelocities(context, np.array(angles + rates))
+        plant.SetPositionsAndVelocities(context, _begin(start))
         simulator.Initialize()
         return simulator, plant, context
 
-    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        """Integrate from sample to sample."""
-        simulator, plant, context = self._begin(top, start, plan)
-        rows = []
-        for time in plan.times.tolist():
-            simulator.AdvanceTo(time)
-            rows.append(plant.GetPositionsAndVelocities(context))
-        phi, theta, psi, phi_dot, theta_dot, psi_dot = np.array(rows).T
-        spin = top.I3 * (psi_dot + phi_dot * np.cos(theta))
-        p_phi = top.I1 * phi_dot * np.sin(theta) ** 2 + spin * np.cos(theta)
-        states = np.stack([theta, top.I1 * theta_dot, phi, psi], axis=-1)
-        steps = simulator.get_integrator().get_num_steps_taken()
-        evaluations = simulator.get_integrator().get_num_derivative_evaluations()
-        return Run(states, p_phi, spin, int(steps), int(evaluations), 0, "ok", plan.horizon)
-
-    def own_steps(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
-        """Times and axes at the ends of the steps of a run to the horizon."""
+    def _steps(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[list[float], list[Any]]:
         from pydrake.systems.framework import EventStatus
 
-        simulator, plant, _ = self._begin(top, start, plan)
-        times, axes = [], []
+        simulator, plant, _ = self._built(top, start, plan)
+        times: list[float] = []
+        rows: list[Any] = []
 
         def keep(context: Any) -> Any:
-            phi, theta = plant.GetPositions(context)[:2]
             times.append(context.get_time())
-            axes.append(charts.axis_from_angles(theta, phi))
+            rows.append(plant.GetPositionsAndVelocities(context))
             if len(times) < MOST_STEPS:
                 return EventStatus.DidNothing()
-            axes[-1] = np.full(3, np.nan)  # a run that does not end is a failure
+            rows[-1] = np.full(6, np.nan)  # a run that does not end is a failure
             return EventStatus.ReachedTermination(None, "out of steps")
 
         simulator.set_monitor(keep)
         simulator.AdvanceTo(plan.horizon)
-        return np.array(times), np.array(axes)
+        return times, rows
+
+    def public(self, top: SymmetricTop, start: Angles, plan: Plan) -> Motion:
+        """Build everything and keep the state after every step."""
+        times, rows = self._steps(top, start, plan)
+        return Motion(rows, len(times) - 1)
+
+    def own_steps(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Array, Array]:
+        """Times and axes at the ends of the steps of a run to the horizon."""
+        times, rows = self._steps(top, start, plan)
+        return np.array(times), self.axes(top, start, rows)
+
+    def inner(self, top: SymmetricTop, start: Angles, plan: Plan) -> Inner:
+        """Put the context back to the start and advance to the horizon."""
+        simulator, plant, context = self._built(top, start, plan)
+        state, horizon = _begin(start), plan.horizon
+
+        def call() -> Any:
+            context.SetTime(0.0)
+            plant.SetPositionsAndVelocities(context, state)
+            simulator.Initialize()
+            simulator.AdvanceTo(horizon)
+            return context
+
+        return Inner(call, plant.GetPositionsAndVelocities)
+
+    def states_of(self, top: SymmetricTop, start: Angles, rows: Array) -> Array:
+        """theta, p_theta, phi and psi."""
+        del start
+        return np.stack([rows[:, 1], top.I1 * rows[:, 4], rows[:, 0], rows[:, 2]], axis=-1)
+
+
+def _begin(start: Angles) -> Array:
+    return np.array([start.phi, start.theta, start.psi, start.phi_dot, start.theta_dot, start.psi_dot])
 
 
 def _plant(top: SymmetricTop) -> Any:
@@ -98,20 +114,20 @@ def _plant(top: SymmetricTop) -> Any:
     return plant
 
 
-def peers() -> list[Integrator]:
+def peers() -> list[tuple[Integrator, str]]:
     """Two of its error-controlled integrators."""
     importlib.import_module("pydrake.multibody.plant")  # an ImportError here means: skip
 
-    says = "multibody plant with three revolute joints (Euler angles); target accuracy = the tolerance"
     return [
-        peer(
-            f"drake-{scheme.replace('_', '-')}",
-            Chain(scheme),
-            says,
-            implementation="compiled",
-            order=order,
-            chart="angles",
-            least=LEAST,
+        (
+            common.record(
+                f"drake-{scheme.replace('_', '-')}",
+                Chain(scheme),
+                "a plant of three revolute joints; target accuracy = the tolerance",
+                order=order,
+                least=LEAST,
+            ),
+            LANGUAGE,
         )
         for scheme, order in SCHEMES.items()
     ]

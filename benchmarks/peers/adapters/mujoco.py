@@ -1,21 +1,22 @@
 """MuJoCo: one body on a ball joint, mass off the joint, stepped by the engine's own integrators.
 
 The mass is 1 and the centre of gravity a tenth of sqrt(I1) from the joint, gravity to match mgl. No damping, contacts,
-limits or actuators; constraints are switched off, which only saves time. The step is fixed; the loop runs in C.
+limits or actuators; constraints are switched off, which only saves time. The step is fixed; the loop runs in C. The
+public call compiles the model from its XML.
 """
 
-import functools
 from typing import Any
 
 import numpy as np
 
-from benchmarks.peers.common import peer
-from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator, Solver
+from benchmarks.peers import common
+from benchmarks.peers.common import Inner, Library, Motion
+from symtop.methods.registry import Array, Integrator, Plan
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "mujoco"
+LANGUAGE = "built in (C)"
 INTEGRATORS = {"RK4": ("mjINT_RK4", 4), "Euler": ("mjINT_EULER", 1), "implicit": ("mjINT_IMPLICIT", 1)}
 XML = """
 <mujoco>
@@ -31,40 +32,59 @@ XML = """
 """
 
 
-def _solver(mujoco: Any, code: str) -> Solver:
-    @functools.lru_cache(maxsize=16)
-    def model_of(top: SymmetricTop) -> tuple[Any, Any]:
+class Ball(Library):
+    """One of the engine's integrators; rows are qpos and qvel."""
+
+    chart = "attitude"
+
+    def __init__(self, mujoco: Any, name: str) -> None:
+        self.mujoco, self.code = mujoco, INTEGRATORS[name][0]
+        self.stages = 4 if name == "RK4" else 1
+
+    def _built(self, top: SymmetricTop, step: float) -> tuple[Any, Any]:
         arm = 0.1 * top.I1**0.5
-        text = XML.format(gravity=-top.mgl / arm, step=1e-3, arm=arm, across=top.I1 - arm * arm, along=top.I3)
-        model = mujoco.MjModel.from_xml_string(text)
-        model.opt.integrator = int(getattr(mujoco.mjtIntegrator, code))
-        return model, mujoco.MjData(model)
+        text = XML.format(gravity=-top.mgl / arm, step=step, arm=arm, across=top.I1 - arm * arm, along=top.I3)
+        model = self.mujoco.MjModel.from_xml_string(text)
+        model.opt.integrator = int(getattr(self.mujoco.mjtIntegrator, self.code))
+        return model, self.mujoco.MjData(model)
 
-    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        model, data = model_of(top)
-        inertia = np.array([top.I1, top.I1, top.I3])
-        state = charts.space_state("attitude", top, start)
-        mujoco.mj_resetData(model, data)
-        model.opt.timestep = plan.step_size
-        data.qpos[:] = state[:4]
-        data.qvel[:] = (_matrix(state[:4]).T @ state[4:]) / inertia
-        shown = np.full((plan.times.size, 7), np.nan)
-        done = 0
-        for row, mark in enumerate(plan.marks):
+    def public(self, top: SymmetricTop, start: Angles, plan: Plan) -> Motion:
+        """Compile the model and step it from sample to sample."""
+        model, data = self._built(top, plan.step_size)
+        data.qpos[:], data.qvel[:] = _begin(top, start)
+        rows, done = np.empty((plan.times.size, 7)), 0
+        for row, mark in zip(rows, plan.marks.tolist(), strict=True):
             if mark > done:
-                mujoco.mj_step(model, data, nstep=int(mark - done))
-                done = int(mark)
-            quaternion = np.array(data.qpos)
-            shown[row, :4], shown[row, 4:] = quaternion, _matrix(quaternion) @ (inertia * data.qvel)
-        axis = charts.axis_from_quaternion(shown[:, :4])
-        good = bool(np.isfinite(shown).all())
-        evaluations = done * (4 if code == "mjINT_RK4" else 1)
-        return Run(
-            shown, shown[:, 6].copy(), np.sum(axis * shown[:, 4:], axis=1), done, evaluations, 0,
-            "ok" if good else "not_finite", plan.horizon if good else 0.0,
-        )  # fmt: skip
+                self.mujoco.mj_step(model, data, nstep=mark - done)
+                done = mark
+            row[:4], row[4:] = data.qpos, data.qvel
+        return Motion(rows, done, done * self.stages)
 
-    return solve
+    def inner(self, top: SymmetricTop, start: Angles, plan: Plan) -> Inner:
+        """Put the data back to the start and make all steps in one call."""
+        model, data = self._built(top, plan.step_size)
+        (position, velocity), steps, step = _begin(top, start), int(plan.marks[-1]), self.mujoco.mj_step
+
+        def call() -> Any:
+            self.mujoco.mj_resetData(model, data)
+            data.qpos[:], data.qvel[:] = position, velocity
+            step(model, data, nstep=steps)
+            return data
+
+        return Inner(call, lambda data: np.concatenate([data.qpos, data.qvel]))
+
+    def states_of(self, top: SymmetricTop, start: Angles, rows: Array) -> Array:
+        """The angular momentum in space in place of the velocity in the body."""
+        del start
+        inertia = np.array([top.I1, top.I1, top.I3])
+        momenta = [_matrix(row[:4]) @ (inertia * row[4:]) for row in rows]
+        return np.concatenate([rows[:, :4], momenta], axis=1)
+
+
+def _begin(top: SymmetricTop, start: Angles) -> tuple[Array, Array]:
+    """Attitude, and angular velocity in the body."""
+    state = charts.space_state("attitude", top, start)
+    return state[:4], (_matrix(state[:4]).T @ state[4:]) / np.array([top.I1, top.I1, top.I3])
 
 
 def _matrix(quaternion: np.ndarray) -> np.ndarray:
@@ -79,14 +99,17 @@ def _matrix(quaternion: np.ndarray) -> np.ndarray:
     )
 
 
-def peers() -> list[Integrator]:
+def peers() -> list[tuple[Integrator, str]]:
     """Three of the engine's integrators; Euler is its default."""
     import mujoco
 
     return [
-        peer(
-            f"mujoco-{name.lower()}", _solver(mujoco, code), "a body on a ball joint; fixed step",
-            implementation="compiled", control="step_size", order=order, chart="attitude",
+        (
+            common.record(
+                f"mujoco-{name.lower()}", Ball(mujoco, name), "a body on a ball joint; fixed step",
+                control="step_size", order=order,
+            ),
+            LANGUAGE,
         )
-        for name, (code, order) in INTEGRATORS.items()
+        for name, (_, order) in INTEGRATORS.items()
     ]  # fmt: skip

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from scipy.integrate import odeint
 
-from benchmarks.peers.common import ON_AXIS, SAME, compiled_field, peer, python_field, run_of, start_of, with_start
+from benchmarks.peers import common
+from benchmarks.peers.common import Inner, Library, Motion
 from symtop.methods.dormand_prince import LEAST_TOLERANCE
-from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator, Solver
+from symtop.methods.registry import Integrator, Plan
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE, DISTRIBUTION = "scipy-odeint", "scipy"
@@ -21,35 +21,41 @@ MOST_STEPS = 1_000_000  # between two samples
 SUCCESS = "Integration successful."
 
 
-def _solver(field: Callable[[SymmetricTop], Any]) -> Solver:
-    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        times = with_start(plan)
+class Odeint(Library):
+    """One language of the right-hand side."""
+
+    def __init__(self, field: Callable[[SymmetricTop], Any]) -> None:
+        self.field = field
+
+    def public(self, top: SymmetricTop, start: Angles, plan: Plan) -> Motion:
+        """One call with the sample times."""
+        times = common.with_start(plan)
         states, about = odeint(
-            field(top),
-            start_of(top, start),
-            times,
-            tfirst=True,
-            rtol=plan.tolerance,
-            atol=plan.tolerance,
-            mxstep=MOST_STEPS,
-            full_output=True,
-        )
+            self.field(top), common.start_of(top, start), times,
+            tfirst=True, rtol=plan.tolerance, atol=plan.tolerance, mxstep=MOST_STEPS, full_output=True,
+        )  # fmt: skip
         if about["message"] != SUCCESS:  # it leaves zeros where it did not get to, and counts that mean nothing
-            return run_of(plan, np.empty((0, 6)), 0, 0)
-        return run_of(plan, states[times.size - plan.times.size :], int(about["nst"][-1]), int(about["nfe"][-1]))
+            return Motion(np.empty((0, 6)))
+        return Motion(states[times.size - plan.times.size :], int(about["nst"][-1]), int(about["nfe"][-1]))
 
-    return solve
-
-
-def peers() -> list[Integrator]:
-    """Two languages of the right-hand side; the loop is Fortran's or C's, but every call goes through Python."""
-    return [
-        peer(
-            f"scipy-odeint-{language}",
-            _solver(field),
-            f"odeint, {ON_AXIS}, right-hand side in {language}; {SAME}",
-            implementation="compiled",
-            least=LEAST_TOLERANCE,
+    def inner(self, top: SymmetricTop, start: Angles, plan: Plan) -> Inner:
+        """One call with two times."""
+        field, state, ends, bound = self.field(top), common.start_of(top, start), [0.0, plan.horizon], plan.tolerance
+        return Inner(
+            lambda: odeint(field, state, ends, tfirst=True, rtol=bound, atol=bound, mxstep=MOST_STEPS),
+            lambda states: states[-1],
         )
-        for language, field in (("python", python_field), ("numba", compiled_field))
+
+
+def peers() -> list[tuple[Integrator, str]]:
+    """Two languages of the right-hand side; the loop is compiled, but every call goes through Python."""
+    return [
+        (
+            common.record(f"scipy-odeint-{suffix}", Odeint(field), f"odeint; {common.SAME}", least=LEAST_TOLERANCE),
+            language,
+        )
+        for suffix, language, field in (
+            ("python", common.PYTHON, common.python_field),
+            ("numba", common.NUMBA_IN_PYTHON, common.compiled_field),
+        )
     ]

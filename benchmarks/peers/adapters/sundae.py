@@ -1,16 +1,16 @@
-"""scikit-sundae: CVODE of SUNDIALS, Adams and BDF, with a right-hand side compiled by numba.
+"""CVODE of SUNDIALS as scikit-sundae wraps it, Adams and BDF.
 
 Six equations on (e, L); rtol = atol = the tolerance, and as many steps as it takes; samples by its own interpolation.
-The interface calls the right-hand side as a Python object, so that each call goes through Python.
+The interface takes the right-hand side as a Python object, so that each call of it goes through Python although numba
+has compiled it: about 1 us a call. `cvode` is the same library from the same wheel without that.
 """
 
-import functools
 import types
 from typing import Any
 
-from benchmarks.peers.common import ON_AXIS, SAME, filling_field, peer, run_of, start_of, with_start
-from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator, Solver
+from benchmarks.peers import common
+from benchmarks.peers.common import Inner, Library, Motion
+from symtop.methods.registry import Integrator, Plan
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "scikit-sundae"
@@ -26,38 +26,41 @@ def _with_signature(field: Any) -> Any:
     return call
 
 
-def _solver(cvode: types.ModuleType, family: str) -> Solver:
-    @functools.lru_cache(maxsize=256)
-    def prepared(top: SymmetricTop, tolerance: float) -> Any:
-        return cvode.CVODE(
-            _with_signature(filling_field(top)), method=family, rtol=tolerance, atol=tolerance, max_num_steps=MOST_STEPS
-        )
+class Sundae(Library):
+    """One family of multistep methods."""
 
-    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        solver, times = prepared(top, plan.tolerance), with_start(plan)
-        state = start_of(top, start)
-        if times.size > 2:
-            found = solver.solve(times, state)
-            states = found.y
-        else:
+    def __init__(self, cvode: types.ModuleType, family: str) -> None:
+        self.cvode, self.family = cvode, family
+
+    def _built(self, top: SymmetricTop, tolerance: float) -> Any:
+        field = _with_signature(common.filling_field(top))
+        return self.cvode.CVODE(field, method=self.family, rtol=tolerance, atol=tolerance, max_num_steps=MOST_STEPS)
+
+    def public(self, top: SymmetricTop, start: Angles, plan: Plan) -> Motion:
+        """Build the solver and call it with the sample times."""
+        times = common.with_start(plan)
+        solution = self._built(top, plan.tolerance).solve(times, common.start_of(top, start))
+        return Motion(solution.y[times.size - plan.times.size :], 0, solution.nfev)
+
+    def inner(self, top: SymmetricTop, start: Angles, plan: Plan) -> Inner:
+        """Start a solver again and go to the horizon in one call."""
+        solver, state, horizon = self._built(top, plan.tolerance), common.start_of(top, start), plan.horizon
+
+        def call() -> Any:
             solver.init_step(0.0, state)
-            found = solver.step(plan.horizon)
-            states = [state, found.y]
-        return run_of(plan, states[times.size - plan.times.size :], 0, found.nfev)
+            return solver.step(horizon)
 
-    return solve
+        return Inner(call, lambda solution: solution.y)
 
 
-def peers() -> list[Integrator]:
+def peers() -> list[tuple[Integrator, str]]:
     """Both families of multistep methods."""
     from sksundae import cvode
 
     return [
-        peer(
-            f"cvode-{family.lower()}",
-            _solver(cvode, family),
-            f"{ON_AXIS}, right-hand side in numba; {SAME}",
-            implementation="compiled",
+        (
+            common.record(f"sundae-{family.lower()}", Sundae(cvode, family), f"CVODE; {common.SAME}"),
+            common.NUMBA_IN_PYTHON,
         )
         for family in ("Adams", "BDF")
     ]
