@@ -6,9 +6,10 @@ make peers        (makes benchmarks/peers/.venv once)
 import argparse
 from pathlib import Path
 
-from benchmarks.peers import load
+from benchmarks.peers import ADAPTERS, load
 from benchmarks.peers.measure import SCENES, measure
-from benchmarks.peers.summary import STUDY, lines
+from benchmarks.peers.study import STUDY, measured
+from benchmarks.peers.summary import lines
 from symtop.base import datasets
 from symtop.report import style
 from symtop.runner import run, store
@@ -19,10 +20,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="symtop beside other libraries")
     parser.add_argument("--results", type=Path, default=Path("results"))
     parser.add_argument("--scenes", nargs="+", default=list(SCENES))
+    parser.add_argument("--only", nargs="+", default=list(ADAPTERS), help="these libraries")
     parser.add_argument("--redraw", action="store_true", help="use the stored dataset")
     options = parser.parse_args()
     file = options.results / "peers.nc"
-    peers, missing = load()
+    peers, missing = load(tuple(options.only))
     for sentence in missing:
         print(sentence)
     if options.redraw:
@@ -33,7 +35,7 @@ def main() -> None:
     findings = run.findings_of(
         STUDY, data, options.results, style.save, failures=missing, cases=data["seconds"].count().item()
     )
-    store.write_json(options.results / "peers.json", findings)
+    store.write_json(options.results / "peers.json", findings | {"measured": measured(data)})
     print("\n".join(lines(data)))
 
 

@@ -45,6 +45,13 @@ class Inner(NamedTuple):
     end: Callable[[Any], Any]
 
 
+def axes_of(chart: str, states: Array) -> Array:
+    """The axis of each state, shape (states, 3)."""
+    if chart == "angles":
+        return charts.axis_from_angles(states[:, 0], states[:, 2])
+    return states[:, :3] if chart == "axis" else charts.axis_from_quaternion(states[:, :4])
+
+
 class Library:
     """One solver of another package.
 
@@ -71,10 +78,7 @@ class Library:
 
     def axes(self, top: SymmetricTop, start: Angles, rows: Any) -> Array:
         """The axis of each row, shape (rows, 3)."""
-        states = self.states_of(top, start, np.atleast_2d(np.asarray(rows, dtype=float)))
-        if self.chart == "angles":
-            return charts.axis_from_angles(states[:, 0], states[:, 2])
-        return states[:, :3] if self.chart == "axis" else charts.axis_from_quaternion(states[:, :4])
+        return axes_of(self.chart, self.states_of(top, start, np.atleast_2d(np.asarray(rows, dtype=float))))
 
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         """The public call as a solver of the registry; samples that are missing or not finite are a failure."""

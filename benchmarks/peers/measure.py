@@ -3,14 +3,18 @@
 Every solver comes as an Integrator record, ours from the registry and the peers' from their adapters. Accuracy: the
 largest angle between the axes over ten nutation periods, at 331 times that never beat with the nutation (for a library
 that would bend its steps to them, at the ends of its own steps), against the closed form with its bound. Time: runs of
-their own, start to horizon with nothing sampled between, all solvers of a scene interleaved in random order.
+their own, of two calls for every solver and setting (see `common`): the public call, and the inner loop. All calls of a
+scene are interleaved in random order.
 
 The setting is searched, not only gridded: between the loosest setting of a ladder that meets a target and the one
-before it, `symtop.measure.settings.seek` looks for a looser one, for us as for them.
+before it, `symtop.measure.settings.seek` looks for a looser one, for us as for them. One setting serves both calls. That
+the inner loop does the same work is checked: `end_error` is the error of the state that it ends with.
 """
 
+import datetime
 import importlib.metadata
 import math
+import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -20,27 +24,30 @@ import numpy as np
 import xarray as xr
 
 import symtop
-from benchmarks.peers import Peer
+from benchmarks.peers import Peer, own
+from benchmarks.peers.common import Inner, Library, axes_of
 from symtop.measure.accuracy import SAMPLES, judge_limit
 from symtop.measure.settings import seek, step_ladder
-from symtop.measure.timing import bare_run, timings
+from symtop.measure.timing import timings
 from symtop.methods.registry import Integrator
 from symtop.model import charts
 from symtop.model.scenes import Scene
 from symtop.run.reference import reference
 from symtop.run.simulation import as_dataset, make_plan
 
-SCENES = ("spheroid", "goldstein", "fast")
+SCENES = ("spheroid", "goldstein")
 TARGETS = (1e-3, 1e-6, 1e-9)
+CALLS = ("public", "inner")
 PERIODS = 10.0
+SHOWN = 501  # samples of a public call: what `simulate` returns by default
 RUNGS = 9
 CLOSE = 0.8  # of a target: an error between it and the target ends a search
 ENOUGH = 0.1 * TARGETS[-1]  # no finer setting is tried below this error
 PATIENCE = 0.6  # seconds of one run after which no finer setting is tried
-BATCHES, BATCH = 8, 0.006
-LONG = 0.2  # processor seconds of a run that is timed only if it meets a target
+BATCHES, BATCH = 8, 0.004
+LONG = 0.03  # processor seconds of a run that is timed only if it meets a target
 CONTENDERS = 3  # of our methods for each target, by a rough timing
-OURS, HEYOKA = "symtop", "heyoka"
+OURS, HEYOKA = "symtop", "symtop with heyoka"
 
 
 class Point(NamedTuple):
@@ -118,6 +125,29 @@ def worth_timing(points: Sequence[Point], targets: Sequence[float] = TARGETS) ->
     return kept
 
 
+def ready(scene: Scene, peer: Peer, setting: float) -> tuple[Callable[[], Any], Inner]:
+    """Both calls of a solver at a setting, from the start to the horizon."""
+    method, horizon = peer.method, PERIODS * scene.nutation_period
+    given = method.setting(setting).kwargs()
+    sampled, _ = make_plan(scene, method, **given, horizon=horizon, samples=SHOWN)
+    bare, _ = make_plan(scene, method, **given, horizon=horizon, samples=2)
+    library = method.solvers[peer.chart]
+    if isinstance(library, Library):
+        return lambda: library.public(scene.top, scene.start, sampled), library.inner(scene.top, scene.start, bare)
+    return own.public(scene, method, setting, horizon), own.inner(scene, method, peer.chart, bare)
+
+
+def end_error(scene: Scene, peer: Peer, loop: Inner) -> float:
+    """The axis error of the state that an inner loop ends with; its second call counts, which has to start anew."""
+    loop.call()
+    state = np.atleast_2d(np.array(loop.end(loop.call()), dtype=float))
+    library = peer.method.solvers[peer.chart]
+    if isinstance(library, Library):
+        state = library.states_of(scene.top, scene.start, state)
+    truth = reference(scene, np.array([PERIODS * scene.nutation_period]), precision="closed-form")
+    return float(charts.axis_distance(axes_of(peer.chart, state), truth["axis"].values)[0])
+
+
 def ours(scene: Scene, tell: Callable[[str], None]) -> list[tuple[Peer, list[Point]]]:
     """Our compiled integrators that are among the fastest at some target, by a rough timing; and heyoka's."""
     chosen: dict[str, tuple[Peer, list[Point]]] = {}
@@ -127,80 +157,98 @@ def ours(scene: Scene, tell: Callable[[str], None]) -> list[tuple[Peer, list[Poi
         if method.implementation != "compiled" or method.control is None or method.name.startswith("taylor-"):
             continue  # no control: the closed form, which is the truth here
         points = worth_timing(search(scene, method))
-        searched[method.name] = points
         if method.family == "taylor":
-            chosen[method.name] = (Peer(HEYOKA, method), points)
+            chosen[method.name] = (Peer(HEYOKA, method, own.TAYLOR_LANGUAGE, "heyoka"), points)
             continue
+        searched[method.name] = (Peer(OURS, method, own.LANGUAGE), points)
         for target in TARGETS:
             best = next((point for point in points if point.error <= target), None)
             if best is not None:
-                call = bare_run(scene, method, method.chart_for("axis"), best.setting, _horizon(scene))
-                rough[target].append((timings([call], batches=5, batch=1e-3)[0].best, method.name))
+                _, loop = ready(scene, searched[method.name][0], best.setting)
+                rough[target].append((timings([loop.call], batches=5, batch=1e-3)[0].best, method.name))
     for target, row in rough.items():
-        for _, name in sorted(row)[:CONTENDERS]:
-            chosen[name] = (Peer(OURS, symtop.integrator(name)), searched[name])
-        tell(f"{scene.name}, {target:.0e}: {', '.join(name for _, name in sorted(row)[:CONTENDERS])}")
+        names = [name for _, name in sorted(row)[:CONTENDERS]]
+        chosen |= {name: searched[name] for name in names}
+        tell(f"{scene.name}, {target:.0e}: {', '.join(names)}")
     return list(chosen.values())
 
 
-def _horizon(scene: Scene) -> float:
-    return PERIODS * scene.nutation_period
-
-
 def measure(peers: Sequence[Peer], scenes: Sequence[str] = SCENES) -> xr.Dataset:
-    """Everything: dimensions scene, integrator, setting and batch."""
+    """Everything: dimensions call, scene, integrator (a row ``method[chart]``), setting and batch."""
     cells: dict[tuple[str, str], dict[str, Any]] = {}
     about: dict[str, Peer] = {}
+    begun, load = datetime.datetime.now(tz=datetime.UTC), os.getloadavg()[0]
     for name in scenes:
         scene = symtop.scene(name)
-        entries = ours(scene, _tell)
-        for peer in peers:
-            begun = time.perf_counter()
-            try:
-                entries.append((peer, worth_timing(search(scene, peer.method))))
-                _tell(f"{name}: {peer.method.name} searched in {time.perf_counter() - begun:.1f} s")
-            except Exception as error:  # noqa: BLE001  (somebody else's solver must not take the others down)
-                _tell(f"{name}: {peer.method.name} failed, {type(error).__name__}: {error}")
-        calls = [
-            bare_run(scene, peer.method, peer.method.chart_for("axis"), point.setting, _horizon(scene))
-            for peer, points in entries
-            for point in points
-        ]
-        _tell(f"{name}: timing {len(calls)} runs of {len(entries)} solvers")
-        timed = iter(timings(calls, batches=BATCHES, batch=BATCH))
+        entries = ours(scene, _tell) + [found for peer in peers if (found := _searched(scene, peer)) is not None]
+        rows = [(peer, point, *ready(scene, peer, point.setting)) for peer, points in entries for point in points]
+        ends = [end_error(scene, peer, loop) for peer, _, _, loop in rows]
+        functions = [function for _, _, whole, loop in rows for function in (whole, loop.call)]
+        _tell(f"{name}: timing {len(functions)} calls of {len(entries)} solvers")
+        taken = timings(functions, batches=BATCHES, batch=BATCH)
         for peer, points in entries:
-            about[peer.method.name] = peer
-            samples = [next(timed) for _ in points]
-            cells[name, peer.method.name] = {
+            about[peer.row] = peer
+            mine = [i for i, row in enumerate(rows) if row[0] is peer]
+            cells[name, peer.row] = {
                 "axis": [point.error for point in points],
                 "axis_bound": [point.bound for point in points],
-                "knob_setting": [point.setting for point in points],
+                "end_error": [ends[i] for i in mine],
+                "control_setting": [point.setting for point in points],
                 "steps": [point.steps for point in points],
                 "force_evaluations": [point.evaluations for point in points],
-                "seconds": [timing.best for timing in samples],
-                "first_call": [timing.first_call for timing in samples],
-                "reliable": [float(timing.reliable) for timing in samples],
-                "seconds_samples": [timing.samples for timing in samples],
+                "timing": [[taken[2 * i + k] for i in mine] for k in range(len(CALLS))],
             }
-    return _combined(list(scenes), about, cells)
+    data = _combined(list(scenes), about, cells)
+    return data.assign_attrs(measured=begun.date().isoformat(), load_before=load, cores=os.cpu_count() or 0)
+
+
+def _searched(scene: Scene, peer: Peer) -> tuple[Peer, list[Point]] | None:
+    begun = time.perf_counter()
+    try:
+        points = worth_timing(search(scene, peer.method))
+        for point in points:
+            ready(scene, peer, point.setting)
+    except Exception as error:  # noqa: BLE001  (somebody else's solver must not take the others down)
+        _tell(f"{scene.name}: {peer.row} failed, {type(error).__name__}: {error}")
+        return None
+    _tell(f"{scene.name}: {peer.row} searched in {time.perf_counter() - begun:.1f} s")
+    return peer, points
 
 
 def _combined(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, str], dict[str, Any]]) -> xr.Dataset:
     names = list(about)
-    most = max((len(cell["axis"]) for cell in cells.values()), default=0)
-    variables = {}
-    for key in next(iter(cells.values())):
-        deep = key == "seconds_samples"
-        values = np.full((len(scenes), len(names), most, *([BATCHES] if deep else [])), np.nan)
-        for (scene, name), cell in cells.items():
-            row = np.array(cell[key], dtype=float)
-            values[scenes.index(scene), names.index(name), : len(row)] = row.reshape(len(row), *values.shape[3:])
-        variables[key] = (("scene", "integrator", "setting", *(["batch"] if deep else [])), values)
-    variables["package"] = ("integrator", [about[name].package for name in names])
-    variables["version"] = ("integrator", [_version(about[name].distribution or about[name].package) for name in names])
-    variables["formulation"] = ("integrator", [about[name].method.summary for name in names])
-    variables["implementation"] = ("integrator", [about[name].method.implementation for name in names])
-    return xr.Dataset(variables, coords={"scene": scenes, "integrator": names})
+    shape = len(scenes), len(names), max((len(cell["axis"]) for cell in cells.values()), default=0)
+    one, each = ("scene", "integrator", "setting"), ("call", "scene", "integrator", "setting")
+    plain = [key for key in next(iter(cells.values())) if key != "timing"]
+    values = {key: np.full(shape, np.nan) for key in plain}
+    timed = {key: np.full((len(CALLS), *shape), np.nan) for key in ("seconds", "first_call", "reliable")}
+    samples = np.full((len(CALLS), *shape, BATCHES), np.nan)
+    for (scene, name), cell in cells.items():
+        place = scenes.index(scene), names.index(name)
+        for key in plain:
+            values[key][place][: len(cell[key])] = cell[key]
+        for k, row in enumerate(cell["timing"]):
+            for i, timing in enumerate(row):
+                timed["seconds"][(k, *place, i)] = timing.best
+                timed["first_call"][(k, *place, i)] = timing.first_call
+                timed["reliable"][(k, *place, i)] = timing.reliable
+                samples[(k, *place, i)] = timing.samples
+    words = {
+        "package": [peer.package for peer in about.values()],
+        "version": [_version(peer.distribution or peer.package) for peer in about.values()],
+        "chart": [peer.chart for peer in about.values()],
+        "language": [peer.language for peer in about.values()],
+        "implementation": [peer.method.implementation for peer in about.values()],
+        "formulation": [peer.method.summary for peer in about.values()],
+        "shows": [getattr(peer.method.solvers[peer.chart], "shows", "dense output") for peer in about.values()],
+    }
+    return xr.Dataset(
+        {key: (one, array) for key, array in values.items()}
+        | {key: (each, array) for key, array in timed.items()}
+        | {"seconds_samples": ((*each, "batch"), samples)}
+        | {key: ("integrator", column) for key, column in words.items()},
+        coords={"call": list(CALLS), "scene": scenes, "integrator": names},
+    )
 
 
 def _version(distribution: str) -> str:

@@ -2,8 +2,8 @@
 
 Right-hand sides in C by numba. The ODE has the six equations on (e, L), eps_rel = eps_abs = the tolerance. IAS15 has no
 ODEs: the axis is its one particle with a force that depends on the velocity (see `callbacks`), and epsilon is the
-tolerance, from 1 down, because its error is far below it. rebound bends its step to stop at a time and does not
-interpolate: the public call keeps the ends of its own steps, and accuracy is judged there.
+tolerance. rebound bends its step to stop at a time and does not interpolate: the public call keeps the ends of its own
+steps, and accuracy is judged there.
 """
 
 import ctypes

@@ -1,0 +1,51 @@
+"""The two calls of symtop's own methods: `simulate` as a user types it, and the kernel alone.
+
+The kernel alone has its parameters, its start and its step as numbers; `taylor` has a compiled stepper of heyoka whose
+time, state and parameters are set back. An adaptive kernel of ours is called with a ready plan.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import symtop
+from benchmarks.peers.common import Inner
+from symtop.methods import taylor
+from symtop.methods.fixed_step import inside
+from symtop.methods.registry import Integrator, Plan, solve
+from symtop.model.scenes import Scene
+
+LANGUAGE = "numba, inside the kernel"
+TAYLOR_LANGUAGE = "LLVM by heyoka, inside the stepper"
+
+
+def public(scene: Scene, method: Integrator, setting: float, horizon: float) -> Callable[[], Any]:
+    """`simulate` with its defaults: 501 samples, momenta, energy, the guard; only the axis is asked for."""
+    name, given = method.name, method.setting(setting).kwargs()
+    return lambda: symtop.simulate(scene, name, horizon=horizon, observe="axis", **given)
+
+
+def inner(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Inner:
+    """The kernel alone, from the start to the horizon."""
+    top, start = scene.top, scene.start
+    fixed = inside(method.solvers[chart])
+    if fixed is not None:
+        par, rule, state = fixed.setup(top, start, plan.step_size)
+        loop, step, marks = fixed.loop, plan.step_size, plan.marks[-1:]
+        return Inner(lambda: loop(par, rule, state, step, marks), lambda done: fixed.run(
+            top, start, Plan.steps(step, marks), par, done).states[-1])  # fmt: skip
+    if method.family == "taylor":
+        stepper = taylor.stepper(chart, "double", plan.tolerance)
+        numbers, parameters = taylor.start_numbers(chart, "double", top, start)
+        begin, par, horizon = np.array(numbers), np.array(parameters[: stepper.pars.size]), plan.horizon
+
+        def call() -> Any:
+            stepper.time = 0.0
+            stepper.state[:], stepper.pars[:] = begin, par
+            stepper.propagate_until(horizon)
+            return stepper.state
+
+        return Inner(call, lambda state: state)
+    return Inner(lambda: solve(method, chart, top, start, plan), lambda run: run.states[-1])
+

@@ -1,0 +1,116 @@
+"""The peers as a study of the report: its question, its figure, its words, and where and when it was measured."""
+
+import json
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from benchmarks.peers import summary
+from benchmarks.peers.measure import HEYOKA, OURS, PERIODS
+from benchmarks.peers.summary import ENGINES, JUDGED, NAMES
+from symtop.report import figures, style
+from symtop.runner.study import Picture, Study
+
+THIN = 1.3
+LOOKS = {  # color, marker, line, width
+    OURS: (style.BLUE, "o", "-", 2.6),
+    HEYOKA: (style.BLACK, "*", "-", THIN),
+    "rebound": (style.GREEN, "^", "-", THIN),
+    "arkode-sprk": (style.SKY, "v", "-", THIN),
+    "cvode": (style.ORANGE, "s", "-", THIN),
+    "scikit-sundae": (style.ORANGE, "s", ":", THIN),
+    "diffrax": (style.PURPLE, "D", "-", THIN),
+    "scipy-odeint[axis], numba": (style.VERMILLION, "P", "-", THIN),
+    "scipy[axis], numba": (style.VERMILLION, "X", "-", THIN),
+    "scipy[axis], Python": (style.VERMILLION, "X", "--", THIN),
+    "scipy[angles], Python": (style.VERMILLION, "X", ":", THIN),
+}
+LEFT_OUT = ("scipy[angles], numba", "scipy-odeint[axis], Python", *ENGINES)
+
+
+def pictures(data: xr.Dataset) -> list[Picture]:
+    """Axis error against seconds: the front of each group, in both calls."""
+    scenes = [str(name) for name in data["scene"].values]
+    known = summary.groups(data)
+    drawn = [name for name in [*LOOKS, *known] if name in known and name not in LEFT_OUT]
+    names = list(dict.fromkeys(drawn))
+    figure, axes = style.panels(
+        len(NAMES), len(scenes), width=max(9.6, 4.6 * len(scenes)), height=3.7, sharey=True, sharex=True
+    )
+    for row, (call, words) in zip(axes, NAMES.items(), strict=True):
+        for axis, scene in zip(row, scenes, strict=True):
+            for name in reversed(names):  # ours on top
+                _front(axis, data.sel(call=call, scene=scene, integrator=known[name]), name)
+            for target in JUDGED:
+                axis.axhline(target, color=style.GREY, lw=0.8, ls=(0, (5, 3)), zorder=0)
+            axis.set(xscale="log", yscale="log", title=f"{words}, {scene}", ylim=(3e-12, 3.0))
+            axis.label_outer()
+        row[0].set_ylabel(f"largest axis error over\n{PERIODS:g} nutations (rad)")
+    for axis in axes[-1]:
+        axis.set_xlabel("wall time of one call (s)")
+    style.legend_below(figure, axes)
+    caption = (
+        "Above, the call that a user types; below, the inner loop alone; the same runs at the same settings in both. "
+        f"{_gain(data, known)}Each curve is the best that a library offers: for every accuracy its fastest method and "
+        "setting. Best is towards the lower left; the thick line is symtop's own kernels. Vermillion: SciPy, on (e, L) "
+        "with a compiled right-hand side (solid) or one in Python (dashed), and in Euler angles in Python (dotted). "
+        f"All others on (e, L), but arkode-sprk in angles. {PERIODS:g} nutations of each scene; dashed grey: the "
+        "accuracies at which the verdict is given."
+    )
+    alt = "Log-log plots of axis error against wall time, a row for each call, a panel a scene, a curve a library."
+    return [Picture("fronts", figure, caption, alt)]
+
+
+def _gain(data: xr.Dataset, known: dict[str, list[str]]) -> str:
+    """The lead over SciPy in both calls, on the same equations, as a sentence; empty if one is missing."""
+    theirs = known.get("scipy[axis], numba", [])
+    spans = [summary.span(data, call, known.get(OURS, []), theirs) for call in NAMES]
+    if not theirs or None in spans:
+        return ""
+    public, inner = (f"{low:.2g} to {high:.2g}" for low, high in spans)  # type: ignore[misc]
+    return f"SciPy's solve_ivp on the same equations takes {public} times as long above, {inner} times below. "
+
+
+def _front(axis: Any, cell: xr.Dataset, name: str) -> None:
+    """The Pareto front of one group."""
+    seconds, error = cell["seconds"].values.ravel(), cell["axis"].values.ravel()
+    keep = figures.pareto(seconds, error) & np.isfinite(seconds) & np.isfinite(error)
+    order = np.argsort(seconds[keep])
+    color, marker, line, width = LOOKS.get(name, (style.GREY, "x", "-", THIN))
+    size = 8.0 if marker == "*" else 4.5
+    axis.plot(
+        seconds[keep][order], error[keep][order],
+        color=color, marker=marker, ls=line, lw=width, label=name, markersize=size,
+    )  # fmt: skip
+
+
+def measured(data: xr.Dataset) -> str:
+    """When, where and with which versions, in a sentence."""
+    facts = data.attrs
+    pairs = zip(data["package"].values.astype(str), data["version"].values.astype(str), strict=True)
+    given = dict(pairs)
+    versions = {name: version for name, version in given.items() if name not in (OURS, HEYOKA)}
+    core = json.loads(facts["dependencies"])
+    versions |= {name: core[name] for name in ("heyoka", "numba", "numpy")}
+    return (
+        f"Measured {facts['measured']} by symtop {facts['symtop_version']}, revision {facts['symtop_revision']}, on "
+        f"{facts['processor']} ({facts['cores']} cores, load {float(facts['load_before']):.2f} before), "
+        f"{facts['platform']}, Python {facts['python_version']}; "
+        f"{', '.join(f'{name} {version}' for name, version in sorted(versions.items()))}. "
+        "It is not measured again when the studies run; `make peers` does that."
+    )
+
+
+STUDY = Study(
+    name="peers",
+    title="Beside other libraries",
+    question="What would I gain or lose by using another library for this, as its user and as its author?",
+    how_to_read=summary.HOW_TO_READ,
+    cases=lambda _: [],
+    measure=lambda _: xr.Dataset(),
+    pictures=pictures,
+    tables=summary.tables,
+    verdict=summary.verdict,
+    timed=True,
+)
