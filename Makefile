@@ -3,7 +3,7 @@
 # make report          write results/report.html again from the stored findings
 # make check-results   compute some stored cases again and compare them to the last bit (FRESH=1: every case)
 # make test            run the fast tests            make test-all   run all tests
-# make lint            run ruff and mypy             make clean      delete .venv, caches and stored results
+# make lint            run ruff and mypy             make clean      delete .venv, caches and what studies stored
 # make bench           time the kernels against C    make peers      run the same tops in other libraries
 # Each target makes .venv first if it is missing or out of date.
 
@@ -62,7 +62,7 @@ bench: $(READY)
 	@$(BIN)/python -m benchmarks.bench
 
 peers: $(PEERS)/.ready
-	@echo "symtop: running the same tops in other libraries (about four minutes; other work on the machine disturbs the times)"
+	@echo "symtop: running the same tops in other libraries (about six minutes; other work on the machine disturbs the times)"
 	@$(PEERS)/bin/python -m benchmarks.peers
 
 $(PEERS)/.ready: pyproject.toml constraints.txt benchmarks/peers/constraints.txt
@@ -72,4 +72,5 @@ $(PEERS)/.ready: pyproject.toml constraints.txt benchmarks/peers/constraints.txt
 	@touch $(PEERS)/.ready
 
 clean:
-	rm -rf .venv $(PEERS) .pytest_cache .ruff_cache .mypy_cache benchmarks/build results/cases results/quick results/*.nc results/*.json
+	rm -rf .venv $(PEERS) .pytest_cache .ruff_cache .mypy_cache benchmarks/build results/cases results/quick
+	find results -maxdepth 1 \( -name '*.nc' -o -name '*.json' \) ! -name 'peers.*' ! -name bench.json -delete

@@ -5,6 +5,7 @@ interleaved in random order, so that ratios hold although the machine drifts. A 
 its spread is what the five fifths of the batches would have said, each by itself.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import symtop
@@ -86,7 +87,7 @@ def measure() -> list[Row]:
     ]
 
 
-def lines(rows: list[Row]) -> list[str]:
+def lines(rows: Sequence[Row]) -> list[str]:
     """The table, and what it says."""
     columns = (
         ("ns/step", 9),
@@ -105,20 +106,30 @@ def lines(rows: list[Row]) -> list[str]:
             f"{name:<42}{row.nanoseconds:9.1f}{row.spread:8.0%}{row.in_c:8.1f}{row.ratio:7.2f}  {fifths:<13}{same:>10}"
             f"{row.verlet_steps:10.2f}"
         )
+    return [*table, "", *verdict(rows)]
+
+
+def verdict(rows: Sequence[Row]) -> list[str]:
+    """How many kernels are as fast as C, how many return its bits, and what an implicit step costs."""
     slow = [row for row in rows if row.ratio > LIMIT]
     worst = max(rows, key=lambda row: row.ratio)
-    table.append("")
-    table.append(
-        f"{len(rows) - len(slow)} of {len(rows)} kernels are within {LIMIT:g} times their C twin; the slowest is "
-        f"{worst.name} [{worst.chart}] at {worst.ratio:.2f}."
-    )
-    table.append(
-        f"{sum(row.difference == 0.0 for row in rows)} of {len(rows)} twins return the same bits after {CHECKED} steps "
-        "when gcc fuses no multiply and add by itself."
-    )
+    same = sum(row.difference == 0.0 for row in rows)
+    said = [
+        (
+            f"{len(rows) - len(slow)} of {len(rows)} kernels are within {LIMIT:g} times their C twin; the slowest is "
+            f"{worst.name}[{worst.chart}] at {worst.ratio:.2f}."
+        ),
+        (
+            f"{same} of {len(rows)} twins return the same bits after {CHECKED} steps when gcc fuses no multiply and add "
+            "by itself."
+        ),
+    ]
     if slow:
-        table.append(f"Slower than that: {', '.join(f'{row.name} [{row.chart}] {row.ratio:.2f}' for row in slow)}.")
+        said.append(f"Slower than that: {', '.join(f'{row.name}[{row.chart}] {row.ratio:.2f}' for row in slow)}.")
     for name in ("midpoint", "trapezoidal"):
-        row = next(row for row in rows if row.name == name)
-        table.append(f"{name}, solved to rounding, takes {row.verlet_steps:.2f} steps of stormer-verlet.")
-    return table
+        said += [
+            f"{name}, solved to rounding, takes {row.verlet_steps:.2f} steps of stormer-verlet."
+            for row in rows
+            if row.name == name
+        ]
+    return said

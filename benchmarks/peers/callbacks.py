@@ -8,7 +8,7 @@ IAS15 integrates x'' = a(x, x'). With L = I1 e x e' + p_psi e the axis is such a
 
     e'' = (e x e') x e' + (p_psi/I1) e x e' + (mgl/I1) (z x e) x e
 
-A split integrator of H = T(p) + V(q) takes the reduced top in angles, whose Hamiltonian is separable at fixed p_phi, p_psi:
+A split integrator of H = T(p) + V(q) takes the reduced top in angles, which is separable at fixed p_phi and p_psi:
 
     velocity half:  theta' = p_theta/I1
     force half:     p_theta' = -V'(theta),  phi' = (p_phi - p_psi c)/(I1 s^2),  psi' = p_psi/I3 - c phi'

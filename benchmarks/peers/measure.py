@@ -7,14 +7,12 @@ their own, of two calls for every solver and setting (see `common`): the public 
 scene are interleaved in random order.
 
 The setting is searched, not only gridded: between the loosest setting of a ladder that meets a target and the one
-before it, `symtop.measure.settings.seek` looks for a looser one, for us as for them. One setting serves both calls. That
-the inner loop does the same work is checked: `end_error` is the error of the state that it ends with.
+before it, `symtop.measure.settings.seek` looks for a looser one, for us as for them. One setting serves both calls.
+That the inner loop does the same work is checked: `end_error` is the error of the state that it ends with.
 """
 
-import datetime
 import importlib.metadata
 import math
-import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -24,6 +22,7 @@ import numpy as np
 import xarray as xr
 
 import symtop
+from benchmarks.measured import circumstances
 from benchmarks.peers import Peer, own
 from benchmarks.peers.common import Inner, Library, axes_of
 from symtop.measure.accuracy import SAMPLES, judge_limit
@@ -177,7 +176,7 @@ def measure(peers: Sequence[Peer], scenes: Sequence[str] = SCENES) -> xr.Dataset
     """Everything: dimensions call, scene, integrator (a row ``method[chart]``), setting and batch."""
     cells: dict[tuple[str, str], dict[str, Any]] = {}
     about: dict[str, Peer] = {}
-    begun, load = datetime.datetime.now(tz=datetime.UTC), os.getloadavg()[0]
+    facts = circumstances()
     for name in scenes:
         scene = symtop.scene(name)
         entries = ours(scene, _tell) + [found for peer in peers if (found := _searched(scene, peer)) is not None]
@@ -198,8 +197,7 @@ def measure(peers: Sequence[Peer], scenes: Sequence[str] = SCENES) -> xr.Dataset
                 "force_evaluations": [point.evaluations for point in points],
                 "timing": [[taken[2 * i + k] for i in mine] for k in range(len(CALLS))],
             }
-    data = _combined(list(scenes), about, cells)
-    return data.assign_attrs(measured=begun.date().isoformat(), load_before=load, cores=os.cpu_count() or 0)
+    return _combined(list(scenes), about, cells).assign_attrs(facts)
 
 
 def _searched(scene: Scene, peer: Peer) -> tuple[Peer, list[Point]] | None:

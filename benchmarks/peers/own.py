@@ -48,4 +48,3 @@ def inner(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Inner:
 
         return Inner(call, lambda state: state)
     return Inner(lambda: solve(method, chart, top, start, plan), lambda run: run.states[-1])
-

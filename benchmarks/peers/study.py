@@ -1,11 +1,11 @@
 """The peers as a study of the report: its question, its figure, its words, and where and when it was measured."""
 
-import json
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from benchmarks.measured import sentence
 from benchmarks.peers import summary
 from benchmarks.peers.measure import HEYOKA, OURS, PERIODS
 from benchmarks.peers.summary import ENGINES, JUDGED, NAMES
@@ -33,14 +33,13 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     """Axis error against seconds: the front of each group, in both calls."""
     scenes = [str(name) for name in data["scene"].values]
     known = summary.groups(data)
-    drawn = [name for name in [*LOOKS, *known] if name in known and name not in LEFT_OUT]
-    names = list(dict.fromkeys(drawn))
+    names = [name for name in dict.fromkeys([*LOOKS, *known]) if name in known and name not in LEFT_OUT]
     figure, axes = style.panels(
         len(NAMES), len(scenes), width=max(9.6, 4.6 * len(scenes)), height=3.7, sharey=True, sharex=True
     )
     for row, (call, words) in zip(axes, NAMES.items(), strict=True):
         for axis, scene in zip(row, scenes, strict=True):
-            for name in reversed(names):  # ours on top
+            for name in names:
                 _front(axis, data.sel(call=call, scene=scene, integrator=known[name]), name)
             for target in JUDGED:
                 axis.axhline(target, color=style.GREY, lw=0.8, ls=(0, (5, 3)), zorder=0)
@@ -82,24 +81,14 @@ def _front(axis: Any, cell: xr.Dataset, name: str) -> None:
     axis.plot(
         seconds[keep][order], error[keep][order],
         color=color, marker=marker, ls=line, lw=width, label=name, markersize=size,
+        zorder=4 if name == OURS else 3,
     )  # fmt: skip
 
 
 def measured(data: xr.Dataset) -> str:
     """When, where and with which versions, in a sentence."""
-    facts = data.attrs
     pairs = zip(data["package"].values.astype(str), data["version"].values.astype(str), strict=True)
-    given = dict(pairs)
-    versions = {name: version for name, version in given.items() if name not in (OURS, HEYOKA)}
-    core = json.loads(facts["dependencies"])
-    versions |= {name: core[name] for name in ("heyoka", "numba", "numpy")}
-    return (
-        f"Measured {facts['measured']} by symtop {facts['symtop_version']}, revision {facts['symtop_revision']}, on "
-        f"{facts['processor']} ({facts['cores']} cores, load {float(facts['load_before']):.2f} before), "
-        f"{facts['platform']}, Python {facts['python_version']}; "
-        f"{', '.join(f'{name} {version}' for name, version in sorted(versions.items()))}. "
-        "It is not measured again when the studies run; `make peers` does that."
-    )
+    return sentence(data.attrs, "make peers", {name: version for name, version in pairs if name not in (OURS, HEYOKA)})
 
 
 STUDY = Study(

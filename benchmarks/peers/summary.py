@@ -154,9 +154,12 @@ def _callbacks(data: xr.Dataset) -> list[str]:
     known = groups(data)
     if not {"cvode", "scikit-sundae"} <= set(known):
         return []
+    times = _range(span(data, "inner", known["cvode"], known["scikit-sundae"]))
     return [
-        f"CVODE takes {_range(span(data, 'inner', known['cvode'], known['scikit-sundae']))} times as long where each "
-        "call of its right-hand side goes through Python (scikit-sundae's interface) as where it calls C (inner loop)."
+        (
+            f"CVODE takes {times} times as long where each call of its right-hand side goes through Python "
+            f"(scikit-sundae's interface) as where it calls C (inner loop, {_fixed(data)})."
+        )
     ]
 
 
@@ -177,7 +180,7 @@ def tables(data: xr.Dataset) -> list[Table]:
     known = groups(data)
     ours = known.get(OURS, [])
     places = [(str(scene), target) for scene in data["scene"].values for target in JUDGED]
-    heads = [word for call in NAMES.values() for word in (f"{call}: row", call, "of symtop's")]
+    heads = [word for call in NAMES.values() for word in (f"{call}: row", call, "times symtop's")]
     by_group = [
         [scene, f"{target:.0e}", name, *_cells(data, scene, target, rows, ours)]
         for scene, target in places
@@ -194,10 +197,12 @@ def tables(data: xr.Dataset) -> list[Table]:
         [str(row), *(str(data[key].sel(integrator=row).values) for key in keys)] for row in data["integrator"].values
     ]
     return [
-        Table("Both comparisons, the fastest row of each library", ["scene", "axis error", "library", *heads], by_group),
+        Table(
+            "Both comparisons, the fastest row of each library", ["scene", "axis error", "library", *heads], by_group
+        ),
         Table(
             "Both comparisons, every row that reaches the accuracy",
-            ["scene", "axis error", "row", NAMES["public"], "of symtop's", NAMES["inner"], "of symtop's"],
+            ["scene", "axis error", "row", NAMES["public"], "times symtop's", NAMES["inner"], "times symtop's"],
             by_row,
         ),
         Table(
@@ -209,17 +214,17 @@ def tables(data: xr.Dataset) -> list[Table]:
 
 
 HOW_TO_READ = (
-    f"Held fixed: the top, the start, ten nutations, the largest axis error over them (measured by one code, the "
-    f"setting searched for every row), one thread, double precision. Two calls are timed. Public call: what a user "
-    f"types, objects built inside, `simulate` with its defaults and observe=\"axis\"; it returns {SHOWN} samples, or the "
-    "ends of the library's own steps where it does not interpolate. `simulate` also computes energy, momenta and angles. "
-    "Inner loop: everything that can be built once is built before, start to horizon, no samples; below about 15 us "
-    "this compares calls from Python more than integrators. Compilation (numba, JAX, heyoka) is outside of both for "
+    "Held fixed: the top, the start, ten nutations, the largest axis error over them (measured by one code, the setting "
+    "searched for every row), one thread, double precision. Two calls are timed. Public call: what a user types, "
+    f"objects built inside, `simulate` with its defaults and observe=axis; it returns {SHOWN} samples, or the ends of "
+    "the library's own steps where it does not interpolate. `simulate` also computes energy, momenta and angles. Inner "
+    "loop: everything that can be built once is built before; start to horizon, no samples. Below about 15 us this "
+    "compares calls from Python more than integrators. Compilation (numba, JAX, heyoka) is outside of both calls for "
     "all; solve_ivp's set-up cannot be taken out of its call. A row is method[chart]: axis is the six equations on "
-    "(e, L), angles are Euler's, attitude is a quaternion. \"of symtop's\" is the time over that of the fastest of "
-    "symtop's own kernels in the same call. \"symtop with heyoka\" is `taylor`, heyoka's stepper called by symtop. "
-    f"{WHEEL} rebound's IAS15 has no user-defined ODEs and gets the axis as a particle. MuJoCo and Drake model bodies of "
-    "any kind and are not in the figure. None of this says anything about a library's other uses."
+    "(e, L), angles are Euler's, attitude is a quaternion. \"Times symtop's\" is the time over that of the "
+    "fastest of symtop's own kernels in the same call. `symtop with heyoka` is `taylor`, heyoka's stepper called by "
+    f"symtop. {WHEEL} rebound's IAS15 has no user-defined ODEs and gets the axis as a particle. MuJoCo and Drake model "
+    "bodies of any kind and are not in the figure. None of this says anything about a library's other uses."
 )
 
 

@@ -34,6 +34,7 @@ def section(study: Mapping[str, Any]) -> str:
         f"**How to read it.** {study['how_to_read']}",
         *(_folded(*item) for item in tables),
         *study["failures"],
+        study["measured"],
     ]
     return "\n\n".join(part for part in parts if part)
 

@@ -47,8 +47,9 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
 def gather(results: Path) -> list[dict[str, Any]]:
     """The findings that are in the folder, with their pictures: of all studies, in order, then of `make` targets.
 
-    A target of the Makefile may leave findings in the form of a study's, as NAME.json. Raises SymtopError if findings
-    are incomplete, or there are none.
+    A target of the Makefile (`make peers`, `make bench`) may leave findings in the form of a study's, as NAME.json.
+    They stay as they are when the studies run again, so that their ``measured`` says when, where and with what.
+    Raises SymtopError if findings are incomplete, or there are none.
     """
     studies, gathered = list(runner.names()), []
     others = sorted({file.stem for file in results.glob("*.json")} - set(studies))
@@ -69,6 +70,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
                 f"the findings of {name} in {results} are incomplete ({error}); run it again: {command}"
             ) from error
         findings.setdefault("opening", None)
+        findings.setdefault("measured", "")
         findings["dataset"] = f"{name}.nc" if (results / f"{name}.nc").is_file() else ""
         gathered.append(findings)
     if not gathered:
@@ -84,7 +86,7 @@ def write(results: Path) -> Path:
         loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined
     )
     studies = gather(results)
-    provenance = studies[-1]["provenance"]
+    provenance = next((study for study in reversed(studies) if not study["measured"]), studies[-1])["provenance"]
     versions = json.loads(provenance["dependencies"])
     facts = {**provenance, "dependencies": ", ".join(f"{name} {version}" for name, version in versions.items())}
     templates = Path(__file__).parent / "templates"

@@ -2,8 +2,8 @@
 
 It composes kicks and drifts of H = T(p) + V(q), so it gets the reduced top in angles at fixed p_phi and p_psi, as
 symtop's own splittings in that chart do. Both halves are C functions by numba; the step is fixed; it stops at the
-samples, which are ends of steps. SundialsPy does not wrap SPRKStep itself, but ships SUNDIALS 7.3 with it; SUNDIALS' own
-wrapper, sundials4py, needs Python 3.12.
+samples, which are ends of steps. SundialsPy does not wrap SPRKStep itself, but ships SUNDIALS 7.3 with it; the wrapper
+of SUNDIALS' own authors, sundials4py, needs Python 3.12.
 """
 
 import ctypes
@@ -37,11 +37,11 @@ class Stepper:
         self.state, self.time = library.vector(self.begin.numbers), c_double(0.0)
         self.fields = callbacks.split_field(top, start, library.core)
         self.halves = [c_void_p(field.address) for field in self.fields]
-        make = function(
-            arkode, "SPRKStepCreate", c_void_p, c_void_p, c_double, c_void_p, c_void_p, returns=c_void_p
-        )
+        make = function(arkode, "SPRKStepCreate", c_void_p, c_void_p, c_double, c_void_p, c_void_p, returns=c_void_p)
         self.memory = c_void_p(make(*self.halves, 0.0, self.begin.handle, library.context))
-        function(arkode, "SPRKStepSetMethodName", c_void_p, ctypes.c_char_p)(self.memory, f"ARKODE_SPRK_{method}".encode())
+        function(arkode, "SPRKStepSetMethodName", c_void_p, ctypes.c_char_p)(
+            self.memory, f"ARKODE_SPRK_{method}".encode()
+        )
         function(arkode, "ARKodeSetFixedStep", c_void_p, c_double)(self.memory, step)
         function(arkode, "ARKodeSetMaxNumSteps", c_void_p, c_long)(self.memory, MOST_STEPS)
         self._restart = function(arkode, "ARKodeReset", c_void_p, c_double, c_void_p)

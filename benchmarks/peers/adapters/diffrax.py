@@ -2,7 +2,7 @@
 
 Six equations on (e, L); PIDController with rtol = atol = the tolerance and no other change; samples by dense output.
 Compiled once for each solver and number of samples, outside of what is timed; tolerance and top are arguments. The
-public call hands over NumPy arrays, the inner loop arrays that JAX holds already and asks for the last state alone. One
+public call hands over NumPy arrays, the inner loop arrays that JAX holds already and asks for the last state alone. A
 call starts with tens of microseconds of dispatch; diffrax is made for many tops at once (vmap), which is not asked here.
 """
 
@@ -75,7 +75,11 @@ class Diffrax(Library):
             (put(1.0 / top.I1), put(top.mgl)),
             put(plan.tolerance),
         )
-        return Inner(lambda: self.bare(*arguments)[0].block_until_ready(), lambda states: np.asarray(states)[-1])
+
+        def call() -> Any:
+            return self.bare(*arguments)[0].block_until_ready()
+
+        return Inner(call, lambda states: np.asarray(states)[-1])
 
 
 def peers() -> list[tuple[Integrator, str]]:

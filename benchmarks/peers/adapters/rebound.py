@@ -170,11 +170,18 @@ def peers() -> list[tuple[Integrator, str]]:
 
     return [
         (
-            common.record("rebound-bs", BulirschStoer(rebound), "a user-defined ODE; eps_rel = eps_abs = the tolerance"),
+            common.record(
+                "rebound-bs", BulirschStoer(rebound), "a user-defined ODE; eps_rel = eps_abs = the tolerance"
+            ),
             common.NUMBA_IN_C,
         ),
         (
-            common.record("rebound-ias15", Ias15(rebound), "the axis as a particle, e'' = a(e, e'); epsilon = the tolerance", order=15),
+            common.record(
+                "rebound-ias15",
+                Ias15(rebound),
+                "the axis as a particle, e'' = a(e, e'); epsilon = the tolerance",
+                order=15,
+            ),
             common.NUMBA_IN_C,
         ),
     ]
