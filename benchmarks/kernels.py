@@ -120,8 +120,8 @@ def verdict(rows: Sequence[Row]) -> list[str]:
             f"{worst.name}[{worst.chart}] at {worst.ratio:.2f}."
         ),
         (
-            f"{same} of {len(rows)} twins return the same bits after {CHECKED} steps when gcc fuses no multiply and add "
-            "by itself."
+            f"{same} of {len(rows)} twins return the same bits after {CHECKED} steps when gcc fuses no multiply and "
+            "add by itself."
         ),
     ]
     if slow:

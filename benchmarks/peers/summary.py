@@ -18,6 +18,7 @@ JUDGED = TARGETS[1:]  # the accuracies at which a verdict is given
 LEVEL = 1.25  # a ratio nearer to one than this is no difference
 NAMES = {"public": "public call", "inner": "inner loop"}
 SHORT = {"Python": "Python", "numba, called through Python": "numba", "numba, called from C": "C"}
+CALLED = {"scipy": "a user's `solve_ivp`", "scipy-odeint": "a user's `odeint`", "diffrax": "a user's `diffeqsolve`"}
 ENGINES = ("mujoco", "drake")  # model bodies, not equations
 WHEEL = (
     "ARKODE's symplectic stepper comes from the SUNDIALS 7.3 inside SundialsPy's wheel, which does not wrap it; "
@@ -99,8 +100,10 @@ def _range(ratios: tuple[float, float] | None) -> str:
 
 
 def verdict(data: xr.Dataset) -> list[str]:
-    """Both ratios against SciPy, then who is ahead in each of the two comparisons, and what a callback costs."""
-    return [*_scipy(data), *_wins(data), *_callbacks(data)]
+    """Both ratios for each library, SciPy first; then who is ahead in each comparison, and what a callback costs."""
+    known = groups(data)
+    others = sorted((name for name in known if name != OURS), key=lambda name: not name.startswith("scipy"))
+    return [*(_both(data, known, name) for name in others if OURS in known), *_wins(data, known), *_callbacks(data)]
 
 
 def _fixed(data: xr.Dataset) -> str:
@@ -108,45 +111,41 @@ def _fixed(data: xr.Dataset) -> str:
     return f"{scenes}, axis errors of {' and '.join(f'{target:.0e}' for target in JUDGED)}, {PERIODS:g} nutations"
 
 
-def _scipy(data: xr.Dataset) -> list[str]:
-    known = groups(data)
-    said = []
-    for name, rows in known.items():
-        if OURS not in known or not name.startswith("scipy"):
-            continue
-        public, inner = (span(data, call, known[OURS], rows) for call in NAMES)
-        if public is None or inner is None:
-            said.append(f"{name} does not reach the accuracies.")
-            continue
-        function = "odeint" if name.startswith("scipy-odeint") else "solve_ivp"
-        said.append(
-            f"{name}: a user's `{function}` takes {_range(public)} times as long as `simulate`; as an inner loop it "
-            f"takes {_range(inner)} times as long as the kernel alone ({_fixed(data)})."
-        )
-    return said
+def _both(data: xr.Dataset, known: dict[str, list[str]], name: str) -> str:
+    """The public-call ratio beside the inner-loop ratio of one library."""
+    public, inner = (span(data, call, known[OURS], known[name]) for call in NAMES)
+    if public is None or inner is None:
+        return f"{name} does not reach the accuracies ({_fixed(data)})."
+    call = "`taylor` in `simulate`" if name == HEYOKA else CALLED.get(name.partition("[")[0], "its public call")
+    return (
+        f"{name}: {call} takes {_range(public)} times as long as `simulate` with the best of symtop's own kernels; its "
+        f"inner loop takes {_range(inner)} times as long as the kernel alone ({_fixed(data)})."
+    )
 
 
-def _wins(data: xr.Dataset) -> list[str]:
-    """In how many comparisons the best of symtop's own kernels is ahead of a compiled peer, and where it is not."""
-    known, said = groups(data), []
+def _wins(data: xr.Dataset, known: dict[str, list[str]]) -> list[str]:
+    """In how many places the best of symtop's own kernels is ahead of libraries that are handed equations."""
+    said, rivals = [], [name for name in known if name not in (OURS, HEYOKA, *ENGINES)]
+    places = [(str(scene), target) for scene in data["scene"].values for target in JUDGED]
     for call, words in NAMES.items():
-        sorted_by: dict[str, list[str]] = {"ahead": [], "level": [], "behind": [], "noise": []}
-        for scene in data["scene"].values.astype(str):
-            for target in JUDGED:
-                mine = best_of(data, call, scene, known.get(OURS, []), target)
-                for name, rows in known.items():
-                    theirs = best_of(data, call, scene, rows, target)
-                    if mine is None or theirs is None or name == OURS or name.startswith("scipy"):
-                        continue
-                    found = standing(mine, theirs)
-                    factor = f", {1.0 / found.ratio:.2g} times" if found.word == "behind" else ""
-                    sorted_by[found.word].append(f"{theirs.row} on {scene} at {target:.0e}{factor}")
-        if count := sum(map(len, sorted_by.values())):
-            tails = {"level": "level with", "noise": "not told apart from", "behind": "slower than"}
-            parts = [f"{tail} {', '.join(sorted_by[word])}" for word, tail in tails.items() if sorted_by[word]]
-            parts += [] if sorted_by["behind"] else ["no peer is ahead"]
-            ahead = f"faster in {len(sorted_by['ahead'])} of {count} comparisons with other libraries"
-            said.append(f"{words.capitalize()}: symtop is {'; '.join([ahead, *parts])}.")
+        behind: dict[str, int] = {}
+        counts = {"ahead": 0, "level": 0, "behind": 0, "noise": 0}
+        for scene, target in places:
+            mine = best_of(data, call, scene, known.get(OURS, []), target)
+            for name in rivals:
+                theirs = best_of(data, call, scene, known[name], target)
+                if mine is not None and theirs is not None:
+                    word = standing(mine, theirs).word
+                    counts[word] += 1
+                    behind[name] = behind.get(name, 0) + (word == "behind")
+        if sum(counts.values()):
+            faster = [f"{name} in {count} of {len(places)}" for name, count in behind.items() if count]
+            said.append(
+                f"{words.capitalize()}: symtop's own kernels are faster in {counts['ahead']} of {sum(counts.values())} "
+                f"comparisons, level or within the noise in {counts['level'] + counts['noise']}, slower in "
+                f"{counts['behind']}: {', '.join(faster) or 'no library is faster'} (libraries that are handed "
+                "equations; heyoka's stepper, which symtop offers, apart)."
+            )
     return said
 
 
@@ -214,9 +213,9 @@ def tables(data: xr.Dataset) -> list[Table]:
 
 
 HOW_TO_READ = (
-    "Held fixed: the top, the start, ten nutations, the largest axis error over them (measured by one code, the setting "
-    "searched for every row), one thread, double precision. Two calls are timed. Public call: what a user types, "
-    f"objects built inside, `simulate` with its defaults and observe=axis; it returns {SHOWN} samples, or the ends of "
+    "Held fixed: the top, the start, ten nutations, the largest axis error over them (measured by one code; "
+    "the setting is searched for every row), one thread, double precision. Two calls are timed. Public call: what a user types; "
+    f"objects are built in it; `simulate` with its defaults and observe=axis; it returns {SHOWN} samples, or the ends of "
     "the library's own steps where it does not interpolate. `simulate` also computes energy, momenta and angles. Inner "
     "loop: everything that can be built once is built before; start to horizon, no samples. Below about 15 us this "
     "compares calls from Python more than integrators. Compilation (numba, JAX, heyoka) is outside of both calls for "

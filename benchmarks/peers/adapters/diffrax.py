@@ -2,8 +2,8 @@
 
 Six equations on (e, L); PIDController with rtol = atol = the tolerance and no other change; samples by dense output.
 Compiled once for each solver and number of samples, outside of what is timed; tolerance and top are arguments. The
-public call hands over NumPy arrays, the inner loop arrays that JAX holds already and asks for the last state alone. A
-call starts with tens of microseconds of dispatch; diffrax is made for many tops at once (vmap), which is not asked here.
+public call hands over NumPy arrays; the inner loop has arrays that JAX holds and asks for the last state alone. A
+call starts with tens of microseconds of dispatch; diffrax is made for many tops at once (vmap), which is not asked.
 """
 
 from typing import Any
