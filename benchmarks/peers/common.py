@@ -20,7 +20,8 @@ import numpy as np
 from numba import njit
 
 from symtop.methods.euler_lagrange import accelerations, with_rates
-from symtop.methods.registry import Array, Integrator, Plan, Run
+from symtop.methods.plan import Array, Plan, Run
+from symtop.methods.registry import Integrator
 from symtop.methods.space import on_axis
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop

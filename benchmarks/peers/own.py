@@ -13,7 +13,8 @@ import symtop
 from benchmarks.peers.common import Inner
 from symtop.methods import taylor
 from symtop.methods.fixed_step import inside
-from symtop.methods.registry import Integrator, Plan, solve
+from symtop.methods.plan import Plan
+from symtop.methods.registry import Integrator, solve
 from symtop.model.scenes import Scene
 
 LANGUAGE = "numba, inside the kernel"

@@ -213,17 +213,18 @@ def tables(data: xr.Dataset) -> list[Table]:
 
 
 HOW_TO_READ = (
-    "Held fixed: the top, the start, ten nutations, the largest axis error over them (measured by one code; "
-    "the setting is searched for every row), one thread, double precision. Two calls are timed. Public call: what a user types; "
-    f"objects are built in it; `simulate` with its defaults and observe=axis; it returns {SHOWN} samples, or the ends of "
-    "the library's own steps where it does not interpolate. `simulate` also computes energy, momenta and angles. Inner "
-    "loop: everything that can be built once is built before; start to horizon, no samples. Below about 15 us this "
-    "compares calls from Python more than integrators. Compilation (numba, JAX, heyoka) is outside of both calls for "
-    "all; solve_ivp's set-up cannot be taken out of its call. A row is method[chart]: axis is the six equations on "
-    "(e, L), angles are Euler's, attitude is a quaternion. \"Times symtop's\" is the time over that of the "
-    "fastest of symtop's own kernels in the same call. `symtop with heyoka` is `taylor`, heyoka's stepper called by "
-    f"symtop. {WHEEL} rebound's IAS15 has no user-defined ODEs and gets the axis as a particle. MuJoCo and Drake model "
-    "bodies of any kind and are not in the figure. None of this says anything about a library's other uses."
+    "Held fixed: the top, the start, ten nutations, the largest axis error over them, one thread, double precision. "
+    "One code measures all errors, and the setting is searched for every row. Two calls are timed. Public call: what "
+    f"a user types; objects are built in it, and `simulate` has its defaults and observe=axis. It returns {SHOWN} "
+    "samples, or the ends of the library's own steps where it does not interpolate. `simulate` also computes energy, "
+    "momenta and angles. Inner loop: all that can be built once is built before; start to horizon, no samples. Below "
+    "about 15 us it compares calls from Python more than integrators. Compilation (numba, JAX, heyoka) is outside of "
+    "both calls for all; solve_ivp's set-up cannot be taken out of its call. A row is method[chart]: axis is the six "
+    "equations on (e, L), angles are Euler's, attitude is a quaternion. The columns `times symtop's` divide by the "
+    "time of the fastest of symtop's own kernels in the same call. `symtop with heyoka` is `taylor`, heyoka's stepper "
+    f"called by symtop. {WHEEL} rebound's IAS15 has no user-defined ODEs and gets the axis as a particle. MuJoCo and "
+    "Drake model bodies of any kind and are not in the figure. None of this says anything about a library's other "
+    "uses."
 )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from symtop.methods.registry import Array
+from symtop.methods.plan import Array
 
 NORMAL, NO_COMMUNICATOR = 1, 0
 

@@ -20,6 +20,7 @@ from benchmarks.peers import callbacks, common, measure, own, study, summary
 from benchmarks.peers.adapters import sundae
 from symtop.base import datasets
 from symtop.methods.euler_lagrange import field_angles, with_rates
+from symtop.methods.plan import Plan
 from symtop.methods.space import field_axis
 from symtop.report import page, style
 from symtop.run.simulation import make_plan
@@ -200,7 +201,7 @@ def test_objects_are_built_inside_the_public_call_and_outside_the_inner_loop(sce
             return SimpleNamespace(y=self.state)
 
     library = sundae.Sundae(SimpleNamespace(CVODE=CVODE), "Adams")
-    plan = symtop.methods.registry.Plan.until([0.0, 1.0, 2.0], 1e-6)
+    plan = Plan.until([0.0, 1.0, 2.0], 1e-6)
     for _ in range(3):
         library.public(scene.top, scene.start, plan)
     assert len(built) == 3

@@ -12,7 +12,8 @@ import numpy as np
 
 from benchmarks.peers import common
 from benchmarks.peers.common import Inner, Library, Motion
-from symtop.methods.registry import Integrator, Plan
+from symtop.methods.plan import Plan
+from symtop.methods.registry import Integrator
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "diffrax"

@@ -13,7 +13,8 @@ from scipy.integrate import odeint
 from benchmarks.peers import common
 from benchmarks.peers.common import Inner, Library, Motion
 from symtop.methods.dormand_prince import LEAST_TOLERANCE
-from symtop.methods.registry import Integrator, Plan
+from symtop.methods.plan import Plan
+from symtop.methods.registry import Integrator
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE, DISTRIBUTION = "scipy-odeint", "scipy"
