@@ -67,7 +67,7 @@ def _gain(data: xr.Dataset, known: dict[str, list[str]]) -> str:
     spans = [summary.span(data, call, known.get(OURS, []), theirs) for call in NAMES]
     if not theirs or None in spans:
         return ""
-    public, inner = (f"{low:.2g} to {high:.2g}" for low, high in spans)  # type: ignore[misc]
+    public, inner = (f"{low:.3g} to {high:.3g}" for low, high in spans)  # type: ignore[misc]
     return f"SciPy's solve_ivp on the same equations takes {public} times as long above, {inner} times below. "
 
 
