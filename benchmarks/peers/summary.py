@@ -119,7 +119,7 @@ def _both(data: xr.Dataset, known: dict[str, list[str]], name: str) -> str:
     call = "`taylor` in `simulate`" if name == HEYOKA else "a user's `solve_ivp`"
     return (
         f"{name}: {call} takes {_range(public)} times as long as `simulate` with the best of symtop's own kernels; the "
-        f"inner loop takes {_range(inner)} times as long as that kernel alone."
+        f"inner loop takes {_range(inner)} times as long as the fastest kernel alone."
     )
 
 

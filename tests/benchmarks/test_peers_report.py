@@ -1,0 +1,182 @@
+"""What the measured peers say: both ratios, winners and losers by name, in a section that outlives the studies."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import symtop
+from benchmarks import measured
+from benchmarks.peers import measure, study, summary
+from symtop.base import datasets
+from symtop.report import page, style
+from symtop.runner import run as runner, store
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def _stored(times, spread=0.01):
+    """A dataset as `measure` leaves it: one scene, one setting; seconds of the (public, inner) call of each package."""
+    names, batches = list(times), 10
+    wobble = 1.0 + spread * np.arange(batches) / batches
+    samples = np.array([[[[pair[k] * wobble] for pair in times.values()]] for k in range(2)])
+    flat = samples.min(axis=-1)
+    one, each = ("scene", "integrator", "setting"), ("call", "scene", "integrator", "setting")
+    words = {
+        "package": [name.partition("[")[0] for name in names],
+        "version": ["1"] * len(names),
+        "chart": ["angles" if "[angles" in name else "axis" for name in names],
+        "language": ["Python" if "Python" in name else "numba, called from C" for name in names],
+        "implementation": ["compiled"] * len(names),
+        "formulation": ["as it is"] * len(names),
+        "shows": ["dense output"] * len(names),
+    }
+    data = xr.Dataset(
+        {
+            "axis": (one, np.where(np.isfinite(flat[0]), 1e-10, np.nan)),
+            **dict.fromkeys(("seconds", "first_call", "reliable"), (each, flat)),
+            "seconds_samples": ((*each, "batch"), samples),
+            **{key: ("integrator", column) for key, column in words.items()},
+        },
+        coords={"call": list(measure.CALLS), "scene": ["spheroid"], "integrator": [f"{name}-one" for name in names]},
+    )
+    facts = measured.circumstances() | {"measured": "2001-02-03", "processor": "an abacus"}
+    return datasets.describe(data, "peers").assign_attrs(facts)
+
+
+def test_both_ratios_against_scipy_stand_side_by_side_for_each_chart_and_language():
+    data = _stored({
+        "symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3), "scipy[axis] Python": (7e-3, 5e-3),
+        "scipy[angles] Python": (1.2e-2, 1e-2),
+    })  # fmt: skip
+    said = {sentence.partition(":")[0]: sentence for sentence in summary.verdict(data)}
+    for name, public, inner in (
+        ("scipy[axis], C", "6", "200"), ("scipy[axis], Python", "7", "250"), ("scipy[angles], Python", "12", "500"),
+    ):  # fmt: skip
+        assert f"takes {public} to {public} times as long as `simulate` with" in said[name]
+        assert f"takes {inner} to {inner} times as long as the fastest kernel alone" in said[name]
+    assert "spheroid, axis errors of 1e-06 and 1e-09, 10 nutations" in said["All ratios"]
+    ratios = {row[0]: row[1:] for row in summary.tables(data)[0].rows}
+    assert ratios["scipy[angles], Python"] == ["angles", "Python", "12 to 12", "500 to 500"]
+
+
+def test_the_verdict_names_winners_losers_and_ties_of_each_call():
+    data = (
+        _stored({
+            "symtop": (1e-3, 1e-4), "rebound": (2e-4, 3e-4), "diffrax": (1.05e-3, 1.05e-4), "drake": (np.nan, np.nan),
+            "mujoco": (1e-2, 1e-2), "arkode": (2e-3, 5e-5),
+        })
+    )  # fmt: skip
+    said = summary.verdict(data)
+    public, inner = (next(line for line in said if line.startswith(word)) for word in ("Public call", "Inner loop"))
+    assert "faster in 2 of 6 comparisons, level or within the noise in 2, slower in 2: rebound in 2 of 2 (" in public
+    assert "faster in 2 of 6 comparisons, level or within the noise in 2, slower in 2: arkode in 2 of 2 (" in inner
+    ratios = {row[0]: row[3:] for row in summary.tables(data)[0].rows}
+    assert ratios["rebound"] == ["0.2 to 0.2", "3 to 3"]
+    assert ratios["drake"] == ["not reached", "not reached"]
+
+
+def test_noise_is_not_called_a_win():
+    data = _stored({"symtop": (1e-4, 1e-4), "rebound": (1.4e-4, 1.4e-4)})
+    assert "faster in 2 of 2 comparisons, level or within the noise in 0" in summary.verdict(data)[0]
+    data["seconds_samples"].values[:, 0, 0, 0, 0::5] *= 2.0  # one fifth of our batches was slow
+    assert all(
+        "faster in 0 of 2 comparisons, level or within the noise in 2" in said for said in summary.verdict(data)[1:]
+    )
+
+
+def test_the_price_of_a_callback_through_python_is_told():
+    said = summary.verdict(_stored({"symtop": (1e-3, 1e-4), "cvode": (4e-4, 2e-4), "scikit-sundae": (3e-3, 2.4e-3)}))
+    assert "CVODE takes 12 to 12 times as long where each call of its right-hand side goes through Python" in said[-1]
+
+
+def test_every_row_names_its_chart_its_language_and_what_its_call_shows():
+    given = summary.tables(_stored({"symtop": (1e-3, 1e-4), "scipy[angles] Python": (1e-2, 1e-2)}))[-1]
+    columns = {name: [row[i] for row in given.rows] for i, name in enumerate(given.header)}
+    assert columns["chart"] == ["axis", "angles"]
+    assert columns["right-hand side"] == ["numba, called from C", "Python"]
+    assert all(cell for row in given.rows for cell in row)
+
+
+# ---- the report ------------------------------------------------------------------------------------------------------
+
+
+def _peers_into(folder):
+    data = _stored({"symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3)})
+    found = runner.findings_of(study.STUDY, data, folder, style.save, failures=["drake was skipped."], cases=2)
+    found["provenance"] = {**found["provenance"], "processor": "an abacus"}
+    store.write_json(folder / "peers.json", found | {"measured": study.measured(data)})
+
+
+def test_the_report_shows_the_peers_with_date_machine_and_versions(tmp_path):
+    _peers_into(tmp_path)
+    text = page.write(tmp_path).read_text()
+    for words in (study.STUDY.title, "200 to 200 times as long as the fastest kernel alone", "drake was skipped.",
+                  "Measured on 2001-02-03", "an abacus", "scipy 1", "make peers"):  # fmt: skip
+        assert words in text
+        assert words in (tmp_path / "report.md").read_text()
+    (tmp_path / "figures" / "peers-fronts.png").unlink()
+    with pytest.raises(symtop.SymtopError, match="make peers"):
+        page.write(tmp_path)
+
+
+def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_path):
+    _peers_into(tmp_path)
+    (tmp_path / "report.md").write_text("what an earlier run left")
+    truth = runner.load("truth")
+    runner.run(truth, tmp_path, quick=True, jobs=1, quiet=True, save=style.save)
+    page.write(tmp_path)
+    text = (tmp_path / "report.md").read_text()
+    sections = re.findall(r"^## (.+)$", text, re.MULTILINE)
+    assert study.STUDY.title in sections
+    assert truth.title in sections
+    assert "Measured on 2001-02-03" in text
+    assert "an abacus" not in text.partition("## Provenance")[2]  # the studies were run here
+
+
+def test_what_the_readme_cites_is_in_the_checkout():
+    cited = set(re.findall(r"results/[\w/-]+\.(?:nc|json|md|png)", (ROOT / "README.md").read_text()))
+    assert {"results/bench.json", "results/peers.nc"} <= cited
+    studies = {f"results/{name}.{kind}" for name in runner.names() for kind in ("nc", "json")}
+    kept = subprocess.run(["git", "ls-files", "results"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
+    assert not {path for path in cited - studies if not (ROOT / path).is_file()}
+    if kept:  # a checkout, not an archive
+        assert {path for path in cited - studies if "/figures/" not in path} <= set(kept.split())
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="there is no make here")
+def test_cleaning_spares_what_the_studies_do_not_make(tmp_path):
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    (tmp_path / "results").mkdir()
+    for name in ("peers.nc", "peers.json", "bench.json", "claims.nc", "claims.json", "report.md"):
+        (tmp_path / "results" / name).touch()
+    subprocess.run(["make", "clean"], cwd=tmp_path, check=True, capture_output=True)
+    left = {path.name for path in (tmp_path / "results").iterdir()}
+    assert left == {"peers.nc", "peers.json", "bench.json", "report.md"}
+
+
+def test_the_stored_measurement_is_whole_and_its_inner_loops_did_the_work():
+    data = datasets.read(ROOT / "results" / "peers.nc")
+    timed = np.isfinite(data["axis"].values)
+    assert timed.sum() > 100
+    assert np.isfinite(data["seconds"].values[:, timed]).all()  # both calls of every run
+    good = timed & (data["axis"].values < 1e-3)
+    error, bound, end = (data[name].values[good] for name in ("axis", "axis_bound", "end_error"))
+    assert np.all(end <= 3.0 * error + bound)  # CVODE's first step depends on the first time that is asked for
+    assert {"spheroid", "goldstein"} <= set(data["scene"].values.tolist())
+    for scene in ("spheroid", "goldstein"):
+        for target in summary.JUDGED:
+            for call in summary.NAMES:
+                for name in (
+                    "symtop",
+                    "scipy[axis], numba",
+                    "scipy[angles], Python",
+                    "cvode",
+                    "rebound",
+                    "arkode-sprk",
+                ):
+                    assert summary.best_of(data, call, scene, summary.groups(data)[name], target) is not None
