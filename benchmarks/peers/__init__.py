@@ -27,6 +27,12 @@ class Peer(NamedTuple):
         return f"{self.method.name}[{self.chart}]"
 
 
+def distributions() -> dict[str, str]:
+    """What installs each package, installed here or not: CVODE comes with scikit-sundae."""
+    modules = [importlib.import_module(f"benchmarks.peers.adapters.{name}") for name in ADAPTERS]
+    return {module.PACKAGE: getattr(module, "DISTRIBUTION", module.PACKAGE) for module in modules}
+
+
 def load(adapters: tuple[str, ...] = ADAPTERS) -> tuple[list[Peer], list[str]]:
     """All solvers that are installed here, and one sentence for each package that is not."""
     found, missing = [], []

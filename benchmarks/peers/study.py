@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.measured import sentence
-from benchmarks.peers import summary
+from benchmarks.peers import distributions, summary
 from benchmarks.peers.measure import HEYOKA, OURS, PERIODS
 from benchmarks.peers.summary import ENGINES, JUDGED, NAMES
 from symtop.report import figures, style
@@ -88,7 +88,9 @@ def _front(axis: Any, cell: xr.Dataset, name: str) -> None:
 def measured(data: xr.Dataset) -> str:
     """When, where and with which versions, in a sentence."""
     pairs = zip(data["package"].values.astype(str), data["version"].values.astype(str), strict=True)
-    return sentence(data.attrs, "make peers", {name: version for name, version in pairs if name not in (OURS, HEYOKA)})
+    wheels = distributions()
+    versions = {wheels.get(name, name): version for name, version in pairs if name not in (OURS, HEYOKA)}
+    return sentence(data.attrs, "make peers", versions)
 
 
 STUDY = Study(

@@ -20,8 +20,8 @@ NAMES = {"public": "public call", "inner": "inner loop"}
 SHORT = {"Python": "Python", "numba, called through Python": "numba", "numba, called from C": "C"}
 ENGINES = ("mujoco", "drake")  # model bodies, not equations
 WHEEL = (
-    "ARKODE's symplectic stepper comes from the SUNDIALS 7.3 inside SundialsPy's wheel, which does not wrap it; "
-    "SUNDIALS' own wrapper, sundials4py, has wheels from Python 3.12 on."
+    "CVODE is that of SUNDIALS 7.9 in scikit-sundae's wheel. ARKODE's symplectic stepper comes from the SUNDIALS 7.3 in "
+    "SundialsPy's wheel, which does not wrap it; SUNDIALS' own wrapper, sundials4py, has wheels from Python 3.12 on."
 )
 
 
@@ -217,7 +217,16 @@ def tables(data: xr.Dataset) -> list[Table]:
         ),
         Table(
             "What each row was given",
-            ["row", "package", "version", "chart", "right-hand side", "loop", "public call shows", "formulation"],
+            [
+                "row",
+                "package",
+                "version of its wheel",
+                "chart",
+                "right-hand side",
+                "loop",
+                "public call shows",
+                "formulation",
+            ],
             given,
         ),
     ]
