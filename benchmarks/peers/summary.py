@@ -20,7 +20,7 @@ NAMES = {"public": "public call", "inner": "inner loop"}
 SHORT = {"Python": "Python", "numba, called through Python": "numba", "numba, called from C": "C"}
 ENGINES = ("mujoco", "drake")  # model bodies, not equations
 WHEEL = (
-    "CVODE is that of SUNDIALS 7.9 in scikit-sundae's wheel. ARKODE's symplectic stepper comes from the SUNDIALS 7.3 in "
+    "CVODE is that of SUNDIALS 7.9 in scikit-sundae's wheel. ARKODE's symplectic stepper comes from SUNDIALS 7.3 in "
     "SundialsPy's wheel, which does not wrap it; SUNDIALS' own wrapper, sundials4py, has wheels from Python 3.12 on."
 )
 
