@@ -2,11 +2,13 @@
 
     line      v = a + b u:         b = du.dv/du.du,  error^2 = rest.rest/((n - 2) du.du)      du = u - mean(u)
     columns   v = sum c_k col_k:   c by least squares,  error_k^2 = rest.rest/(n - m) (A^T A)^-1_kk
+              (with weights w, rows of A and v times sqrt(w))
 
 A 95 % interval is Student's quantile of the degrees of freedom times the standard error. Source: any textbook, for
 example Draper and Smith, Applied Regression Analysis, chapters 1 and 5.
 """
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -35,8 +37,10 @@ def line(x: Array, y: Array) -> Line:
     return Line(slope, error, middle, rest)
 
 
-def columns_fitted(columns: Array, values: Array) -> tuple[Array, Array]:
-    """Coefficients (m,) of columns (n, m) in values (n,), and their standard errors."""
+def columns_fitted(columns: Array, values: Array, weights: Array | None = None) -> tuple[Array, Array]:
+    """Coefficients (m,) of columns (n, m) in values (n,), and their standard errors; `weights` (n,) are 1/variance."""
+    if weights is not None:
+        columns, values = columns * np.sqrt(weights)[:, None], values * np.sqrt(weights)
     coefficients = np.linalg.lstsq(columns, values, rcond=None)[0]
     rest = values - columns @ coefficients
     freedom = values.size - columns.shape[1]
@@ -44,6 +48,7 @@ def columns_fitted(columns: Array, values: Array) -> tuple[Array, Array]:
     return np.asarray(coefficients), np.asarray(np.sqrt(variances))
 
 
+@functools.lru_cache(maxsize=256)
 def student(freedom: int) -> float:
     """By how much a standard error is multiplied for a 95 % interval."""
     from scipy.stats import t  # 0.5 s to import
