@@ -65,25 +65,26 @@ def errors(
     shown = errors_against(chosen, data, truth)
     for name in list(shown):
         shown[name].attrs["long_name"] = QUANTITIES[str(name)]
-        shown[f"{name}_bound"] = ("time", _bound(chosen, truth, str(name)))
+        shown[f"{name}_bound"] = ("time", error_bound(chosen, data, truth, str(name)))
     return shown.assign_attrs(title=f"errors on {chosen.name}", scene=chosen.name, precision=truth.attrs["precision"])
 
 
-def _bound(scene: Scene, truth: xr.Dataset, quantity: str) -> charts.Array:
-    """The reference's bound on a quantity and the rounding of the compared doubles, at every sample."""
+def error_bound(scene: Scene, run: xr.Dataset, truth: xr.Dataset, quantity: str) -> charts.Array:
+    """The reference's bound on a quantity and the rounding of the compared doubles, at every sample (n,)."""
     if quantity in CONSTANTS:
         scale = scene.energy_scale if quantity == "energy" else scene.momentum_scale
         return np.asarray(4.0 * EPSILON * np.maximum(1.0, np.abs(truth[quantity].values) / scale))
     bound: charts.Array = truth[f"{quantity}_error_bound"].values + EPSILON
-    if quantity == "attitude":  # phi and psi come as doubles; their rounding is an angle
-        bound = bound + EPSILON * (np.abs(truth["phi"].values) + np.abs(truth["psi"].values))
+    if quantity == "attitude" and "quaternion" not in run:  # phi and psi come as doubles; their rounding is an angle
+        bound = bound + 0.5 * EPSILON * (np.abs(truth["phi"].values) + np.abs(truth["psi"].values))
     return bound
 
 
 def errors_against(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Dataset:
     """Error of every quantity that a run shows at every sample; NaN where the run had failed.
 
-    `truth` holds `axis`, `theta`, `quaternion`, `energy`, `p_phi`, `p_psi` at the same times (see `reference`).
+    Where the reference knows a value beyond double, the difference is taken from both of its halves: a run that is
+    right to its last digit has the error of that digit and not zero. `truth` holds `axis`, `theta`, `quaternion`, `energy`, `p_phi`, `p_psi` at the same times (see `reference`).
     """
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
         columns = _columns(scene, run, truth)
@@ -91,11 +92,13 @@ def errors_against(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Datas
 
 
 def _columns(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> dict[str, charts.Array]:
-    columns = {"axis": charts.axis_distance(run["axis"].values, truth["axis"].values)} if "axis" in run else {}
+    columns = {}
+    if "axis" in run:
+        columns["axis"] = charts.axis_distance(run["axis"].values, truth["axis"].values, _low(truth, "axis"))
     units = {"theta": 1.0, "energy": scene.energy_scale, "p_phi": scene.momentum_scale, "p_psi": scene.momentum_scale}
     for name, unit in units.items():
         if name in run:
-            columns[name] = np.abs(run[name].values - truth[name].values) / unit
+            columns[name] = np.abs((run[name].values - truth[name].values) - _low(truth, name)) / unit
     if "quaternion" in run or "psi" in run:
         columns["attitude"] = attitude_error(run, truth)
     return columns
@@ -107,4 +110,10 @@ def attitude_error(run: xr.Dataset, truth: xr.Dataset) -> charts.Array:
         attitude = run["quaternion"].values
     else:
         attitude = charts.quaternion_from_angles(run["theta"].values, run["phi"].values, run["psi"].values)
-    return charts.attitude_distance(attitude, truth["quaternion"].values)
+    return charts.attitude_distance(attitude, truth["quaternion"].values, _low(truth, "quaternion"))
+
+
+def _low(truth: xr.Dataset, name: str) -> charts.Array | float:
+    """What the reference knows of a value beyond its double."""
+    low: charts.Array | float = truth[f"{name}_lo"].values if f"{name}_lo" in truth else 0.0
+    return low

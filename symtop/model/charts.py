@@ -162,16 +162,17 @@ def angles_from_attitude(top: SymmetricTop, state: Array) -> Angles:
     return Angles(*(float(value) for value in (theta, phi, psi, *rates)))
 
 
-def axis_distance(first: Array, second: Array) -> Array:
-    """Angle between two axes in radians, shape (...), to 1e-16 however small."""
-    cross = np.cross(first, second)
+def axis_distance(first: Array, second: Array, low: Array | float = 0.0) -> Array:
+    """Angle between two axes in radians, shape (...), to 1e-16 however small; `second` may have a low half."""
+    gap = (first - second) - low  # exact before the low half where the two are close; a x b = (a - b) x b
+    cross = np.cross(gap, second)
     angle: Array = np.arctan2(np.sqrt(np.sum(cross * cross, axis=-1)), np.sum(first * second, axis=-1))
     return angle
 
 
-def attitude_distance(first: Array, second: Array) -> Array:
-    """Angle of the rotation between two orientations in radians, shape (...)."""
-    nearer = np.where(np.sum(first * second, axis=-1, keepdims=True) < 0.0, -second, second)
-    gap = np.sqrt(np.sum((first - nearer) ** 2, axis=-1))
+def attitude_distance(first: Array, second: Array, low: Array | float = 0.0) -> Array:
+    """Angle of the rotation between two orientations in radians, shape (...); `second` may have a low half."""
+    sign = np.where(np.sum(first * second, axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+    gap = np.sqrt(np.sum(((first - sign * second) - sign * low) ** 2, axis=-1))
     angle: Array = 4.0 * np.arcsin(np.minimum(1.0, 0.5 * gap))
     return angle

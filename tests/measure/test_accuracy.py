@@ -1,0 +1,85 @@
+"""The table of errors: enough samples, both halves of the truth, and steps where the error is a power of the step."""
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.base.numbers import EPSILON
+from symtop.measure.accuracy import SAMPLES, asymptotic_steps, enough_samples, error_table
+from symtop.measure.errors import attitude_error, error_bound, errors_against
+from symtop.measure.order import LARGEST_ERROR
+from symtop.methods.registry import integrator
+from symtop.model.scenes import scene
+from symtop.run.reference import have_heyoka, reference
+
+DENSE, EVEN = 40_001, 331
+HORIZONS = (10.037, 100.37, 1003.7)  # nutations
+
+
+def largest_errors(name, method, nutations, samples):
+    where = scene(name)
+    period = where.nutation_period
+    run = symtop.simulate(where, method, step_size=period / 40.0, horizon=nutations * period, samples=samples,
+                          observe="axis", guard=False)  # fmt: skip
+    errors = errors_against(where, run, reference(where, run["time"].values, "closed-form"))
+    return np.array([float(errors[quantity].max()) for quantity in ("axis", "theta")])
+
+
+@pytest.mark.parametrize("name", ["spheroid", "goldstein", "grazing"])
+@pytest.mark.parametrize("method", ["takahashi-imada", "rk4"])
+def test_the_largest_error_of_enough_samples_is_that_of_a_dense_run_to_five_percent(name, method):
+    period = scene(name).nutation_period
+    for nutations in HORIZONS:
+        samples = enough_samples(scene(name), nutations * period)
+        assert SAMPLES <= samples < 2 * SAMPLES
+        share = largest_errors(name, method, nutations, samples) / largest_errors(name, method, nutations, DENSE)
+        assert np.all(share > 0.95)
+
+
+def test_as_many_samples_at_one_phase_of_the_nutation_see_less():
+    """1004 samples of 1003 nutations come at nearly the same phase of each, and their phase drifts once in the run."""
+    where = scene("goldstein")
+    horizon = 1003.7 * where.nutation_period
+    stride = np.mod(horizon / (enough_samples(where, horizon) - 1) / where.nutation_period, 1.0)
+    assert min(abs(stride - 0.618), abs(stride - 0.382)) < 0.02
+    shares = [largest_errors("goldstein", "takahashi-imada", 1003.7, count)[1] for count in (EVEN, SAMPLES, DENSE)]
+    assert min(shares[:2]) < 0.95 * shares[2]
+
+
+@pytest.mark.skipif(not have_heyoka(), reason="long double needs heyoka")
+def test_errors_are_taken_from_both_halves_of_the_reference():
+    where = scene("goldstein")
+    truth = reference(where, np.linspace(0.0, 20.0, 41), "longdouble")
+    rounded = truth[["axis", "quaternion", "theta"]]  # right to the last digit of a double, and no further
+    with_low = errors_against(where, rounded, truth)
+    for name, low in (("axis", "axis_lo"), ("attitude", "quaternion_lo"), ("theta", "theta_lo")):
+        assert 1e-18 < float(with_low[name].max()) < EPSILON
+        assert float(np.abs(truth[low].values).max()) > 1e-18
+        dropped = truth.drop_vars([low])
+        assert float(errors_against(where, rounded, dropped)[name].max()) < 1e-20
+
+
+def test_a_run_that_shows_its_quaternion_is_judged_without_the_rounding_of_its_angles():
+    where = scene("spheroid")
+    angles, attitude = (symtop.simulate(where, name, step_size=0.01, samples=101, observe="attitude")
+                        for name in ("stormer-verlet", "gauss-12"))  # fmt: skip
+    truth = reference(where, angles["time"].values, "closed-form")
+    turned = float(np.max(np.abs(truth["phi"].values) + np.abs(truth["psi"].values)))
+    wide, narrow = (float(error_bound(where, run, truth, "attitude").max()) for run in (angles, attitude))
+    assert wide - narrow == pytest.approx(0.5 * EPSILON * turned, rel=0.05)
+    assert float(attitude_error(attitude.isel(time=slice(1, 2)), truth.isel(time=slice(1, 2)))[0]) < 3.0 * narrow
+
+
+def test_added_steps_lie_where_the_error_is_a_power_of_the_step():
+    where, method = scene("goldstein"), integrator("sofroniou-spaletta-10")
+    horizon = 5.0 * where.nutation_period
+    coarse = error_table(where, method, list(where.nutation_period / np.geomspace(6.0, 80.0, 9)), horizon, "attitude")
+    steps = asymptotic_steps(coarse, "attitude", 10)
+    table = error_table(where, method, steps, horizon, "attitude")
+
+    def judged(part):
+        return int(np.sum((part["attitude"] > 10.0 * part["attitude_bound"]) & (part["attitude"] < LARGEST_ERROR)))
+
+    assert judged(table) >= 10 > judged(coarse)
+    nothing = coarse.assign(attitude=coarse["attitude_bound"])
+    assert asymptotic_steps(nothing, "attitude", 10) == []
