@@ -5,7 +5,7 @@ An outcome that is not ok stands. A run that reached its end is, in this order,
     accurate            the axis error is at most 1e-2 rad throughout, and at most a tenth of the nutation's width
     wrong_regime        the axis went where the true motion never goes: a tenth of the width beyond a turning point, or
                         past a pole on the other side (p_phi - p_psi or p_phi + p_psi changed its sign)
-    drifting            the energy error grew with time and passed 1 %
+    drifting            the energy error grew with time and passed 1 % of the energy of the nutation
     bounded_but_wrong   everything looks right except the answer
 
 `judge` takes arrays and costs 0.13 us a run, `verdict` takes one dataset, and `judgement` adds the time and the cause.
@@ -24,8 +24,9 @@ from symtop.model.scenes import Scene
 ACCURATE = 1e-2  # rad
 OUTSIDE = 0.1  # of the nutation's width, or rad if it has none
 STEADY = 1e-6  # rad; a nutation narrower than this is a steady precession, known to rounding only
-DRIFT = 0.01  # of the energy's scale
+DRIFT = 0.01  # of the energy of the nutation, `Scene.energy_scale`
 GROWING = 1.3  # the second half's largest energy error over the first half's; bounded errors have 1
+FEWEST = 8  # samples of half a run: fewer do not tell an energy that grows from one that oscillates
 NO_GAP = 1e-9  # of the momentum scale: a gap p_phi -+ p_psi below this has no sign to change
 
 JUDGED = ("accurate", "bounded_but_wrong", "drifting", "wrong_regime")
@@ -100,9 +101,10 @@ def verdict(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> str:
     theta = run["theta"].values
     energy = np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     half = energy.size // 2
+    early = energy[:half] if half >= FEWEST else energy
     index = judge(
         barriers(scene), ended, np.max(axis_error), theta.min(), theta.max(),
-        energy[:half].max(), energy[half:].max(), pole_passed(scene, run["p_phi"].values, run["p_psi"].values).any(),
+        early.max(), energy[half:].max(), pole_passed(scene, run["p_phi"].values, run["p_psi"].values).any(),
     )  # fmt: skip
     return VERDICTS[int(index)]
 

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from symtop.base.numbers import TINY
+from symtop.base.numbers import EPSILON, TINY
 from symtop.base.validate import SymtopError, finite, label, one_of, positive
 from symtop.base.walk import by_name
 from symtop.model.top import Angles, SymmetricTop
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 OBSERVABLES = ("nutation", "axis", "attitude")
 UNITS = ("", "SI")
+STEADY = 1e4  # times its rounding: a nutation of less energy is a steady precession
+NEXT_TO_POLE = 1e-9  # rad; V is not evaluated nearer to a pole, where it has a limit and 0/0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +61,19 @@ class Scene:
 
     @property
     def energy_scale(self) -> float:
-        """E0 - min(mgl cos theta), what energy errors are divided by: a kinetic energy, never zero by accident."""
-        return max(self.top.energy(self.start) + abs(self.top.mgl), TINY)
+        """E0 - p_psi^2/2 I3 - min V, what energy errors are divided by: the energy of the nutation, spin excluded.
+
+        V is the effective potential of theta, so that this is the height of the reduced motion above its steady
+        precession; it bounds how far a wrong energy moves the turning points. A steady precession has none. There it is
+        I1 omega^2/2, the energy of a small nutation with an amplitude of one radian: a relative error of the energy is
+        then the square of the amplitude (rad) that it could pay for.
+        """
+        return _energy_scale(self.top, self.start)
+
+    @property
+    def energy_grain(self) -> float:
+        """(|E0| + |mgl|) / `energy_scale`, at least 1: by how much the rounding of an energy shows in relative errors."""
+        return max((abs(self.top.energy(self.start)) + abs(self.top.mgl)) / self.energy_scale, 1.0)
 
     @property
     def momentum_scale(self) -> float:
@@ -78,6 +91,21 @@ class Scene:
             "observes": self.observes,
             "purpose": self.purpose,
         }
+
+
+@functools.lru_cache(maxsize=256)
+def _energy_scale(top: SymmetricTop, start: Angles) -> float:
+    momenta = top.momenta(start)
+
+    def height(theta: float) -> float:
+        return float(top.potential(min(max(theta, NEXT_TO_POLE), math.pi - NEXT_TO_POLE), momenta))
+
+    depth = 0.5 * top.I1 * start.theta_dot**2 + height(start.theta) - height(top.steady_theta(momenta))
+    rounding = EPSILON * (abs(top.energy(start)) + abs(top.mgl))
+    for scale in (depth, 0.5 * top.I1 * top.nutation_frequency(momenta) ** 2, abs(top.mgl)):
+        if scale > STEADY * rounding:
+            return scale
+    return TINY  # a free top at rest
 
 
 @functools.lru_cache(maxsize=256)

@@ -61,7 +61,7 @@ def test_an_answer_is_the_run_beside_the_truth(method):
     assert np.max(charts.axis_distance(drawn, run["axis"].values)) < 1e-6
     energy = run["energy"].values
     assert np.max(np.abs(arrays["energy"])) == pytest.approx(
-        np.max(np.abs(energy - energy[0])) / (energy[0] + chosen.scene.top.mgl), rel=1e-5
+        np.max(np.abs(energy - energy[0])) / chosen.scene.energy_scale, rel=1e-5
     )
     assert answer["outcome"] == "ok"
 

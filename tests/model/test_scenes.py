@@ -63,3 +63,38 @@ def test_families_carry_their_parameter_in_their_name():
     assert len(set(names)) == len(names)
     assert spinning(10.0, name="cusp").start == symtop.scene("cusp").start
     assert {"grazing", "sleeping", "sleeping-unstable", "separatrix", "steady-fast"} <= set(symtop.scenes())
+
+
+@pytest.mark.parametrize("name", ["spheroid", "goldstein", "fast", "simo-wong", "bruls-cardona-arnold", "separatrix"])
+def test_energies_are_measured_by_the_nutation_and_not_by_the_spin(name):
+    """Over the true motion the kinetic energy of theta goes from 0 to E0 - min V, where V is least."""
+    where = symtop.scene(name)
+    end = min(where.nutation_period, where.horizon)
+    motion = closed_form(where)(np.linspace(0.0, end, 20_001))
+    assert np.max(0.5 * where.top.I1 * motion.theta_dot**2) == pytest.approx(where.energy_scale, rel=1e-5)
+
+
+def test_on_a_fast_top_the_energy_of_the_spin_hides_the_nutation():
+    where = symtop.scene("fast")
+    kinetic = where.top.energy(where.start) + where.top.mgl
+    assert where.energy_scale == pytest.approx(9.2e-5, rel=0.01)
+    assert kinetic / where.energy_scale > 5e7
+    assert where.energy_grain == pytest.approx(kinetic / where.energy_scale, rel=1e-3)
+
+
+@pytest.mark.parametrize("spin", [4.0, 20.0])
+def test_a_steady_precession_measures_energies_by_a_nutation_of_one_radian(spin):
+    where = steady(spin)
+    top, amplitude = where.top, 1e-3
+    momenta = top.momenta(where.start)
+    raised = top.potential(where.start.theta + amplitude, momenta) - top.potential(where.start.theta, momenta)
+    assert raised / where.energy_scale == pytest.approx(amplitude**2, rel=0.01)
+
+
+@pytest.mark.parametrize("start", [{"theta": 0.0, "psi_dot": 3.0}, {"theta": 0.0, "psi_dot": 1.0}, {"theta": 1.0},
+                                   {"theta": math.pi, "psi_dot": 1.0}])  # fmt: skip
+@pytest.mark.parametrize("mgl", [1.0, 0.0, -1.0])
+def test_every_start_has_an_energy_scale(start, mgl):
+    where = symtop.Scene("any", symtop.SymmetricTop(1.0, 1.0, mgl), symtop.Angles(**start), 1.0)
+    assert 0.0 < where.energy_scale < math.inf
+    assert where.energy_grain >= 1.0

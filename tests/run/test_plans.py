@@ -54,7 +54,10 @@ def test_a_scene_has_a_time_scale_even_on_a_separatrix():
 def test_the_scales_of_errors_are_those_of_the_scene():
     momenta = SCENE.top.momenta(SCENE.start)
     assert SCENE.momentum_scale == max(abs(momenta.p_phi), abs(momenta.p_psi))
-    assert SCENE.energy_scale == SCENE.top.energy(SCENE.start) + SCENE.top.mgl
+    theta = np.linspace(0.01, 3.13, 200_001)
+    spin = 0.5 * momenta.p_psi**2 / SCENE.top.I3
+    depth = SCENE.top.energy(SCENE.start) - spin - np.min(SCENE.top.potential(theta, momenta))
+    assert SCENE.energy_scale == pytest.approx(depth, rel=1e-8)
     resting = symtop.Scene("rest", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(theta=1.0), 1.0)
     assert resting.momentum_scale > 0.0
     assert resting.energy_scale > 0.0
