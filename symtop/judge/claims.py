@@ -25,15 +25,13 @@ from symtop.base.validate import SymtopError
 from symtop.judge import claims_long as long, claims_order as orders
 from symtop.judge.ledger import CLAIMS, Finding, Ledger, undecided
 from symtop.measure import step_map as maps
+from symtop.measure.order import BESIDE, order_verdict
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 
 SCENE = "spheroid"
 CONSTANTS = ("energy", "p_phi", "p_psi", "axis_length")
 
-BAND = 0.4  # by how much a slope may differ from an order, beside its own interval: orders are whole numbers
-BESIDE = 0.7  # likewise for theta and energy, whose errors may vanish by chance within the window
-LOOSE_BAND = 0.6  # against the mean step of an adaptive method, whose steps do not all scale alike
 SYMPLECTIC = 1e-9  # a smaller defect of the bracket is none
 MET = 1e-8  # a larger one is one, if it stands out of its noise
 STANDS = 0.2  # the raw defect of a symplectic map falls to 1/256 over the widths
@@ -109,13 +107,13 @@ def _order(method: Integrator, scene: Scene, quick: bool, traces: dict[str, np.n
         return Finding("order", declared, "", "undecided", f"{main.reason} ({slopes})")
     if method.order is None:
         return Finding("order", declared, measured, "measured", slopes, main.slope, main.interval)
-    band = BAND if method.fixed_step else LOOSE_BAND
-    low = any(fit.slope + fit.interval < method.order - BESIDE for fit in fitted.fits.values())
-    off = abs(main.slope - method.order) > band + main.interval
-    verdict, why = "confirmed", slopes
-    if off or (low and method.fixed_step):
-        verdict, why = "refuted", f"the error falls with another power of the step: {slopes}"
-    return Finding("order", declared, measured, verdict, why, main.slope, band + main.interval)
+    others = fitted.fits.values() if method.fixed_step else ()  # the steps of an adaptive method do not all scale alike
+    verdict = order_verdict(method.order, main, others)
+    why = {
+        "refuted": f"the error falls with another power of the step: {slopes}",
+        "undecided": f"the slope is neither {method.order} nor clearly another order: {slopes}",
+    }.get(verdict, slopes)
+    return Finding("order", declared, measured, verdict, why, main.slope, BESIDE + main.interval)
 
 
 # ---- structure of a step ---------------------------------------------------------------------------------------------
@@ -276,7 +274,8 @@ def _constant(claim: str, declared: str, run: long.LongRun, constant: long.Const
     elif declared == "bounded" and constant.grows is None:
         why += ", which leaves open whether it grows"
     else:
-        true = {"kept": kind == "kept", "bounded": not constant.grows}.get(declared)
+        within = kind == "kept" or (kind == "bounded" and changed.largest <= constant.floor)
+        true = {"kept": within, "bounded": not constant.grows}.get(declared)
         verdict = "measured" if true is None else "confirmed" if true else "refuted"
     return Finding(claim, declared, measured, verdict, why, changed.largest, constant.floor)
 

@@ -1,9 +1,10 @@
 """What a million steps do to the constants of the motion, what a step costs, and what happens at a pole.
 
-A constant is kept if after n steps it is off by no more than `KEPT`, relative, or by the random walk that the rounding
-seen in one step makes, n^1/2 times as much: a bias beyond a thousandth of that rounding is seen in a million steps.
-An energy that is not kept is bounded, a random walk or a drift by the exponent of its growth (0, 1/2, 1) if its 95 %
-interval excludes the others (`symtop.measure.growth.behaviour`), and else just growing. A drift that hides below a
+A constant is kept, bounded, a random walk, a drift or just growing by the rule of every study,
+`symtop.measure.growth.behaviour`: by its size, and by the exponent of its growth (0, 1/2, 1) if the 95 % interval
+excludes the others. Somebody else's sums may be plain. So a change that grows is rounding, too, while it is no more
+than `KEPT`, relative, or than the random walk that the rounding seen in one step makes, n^1/2 times as much: a bias
+beyond a thousandth of that rounding is seen in a million steps. A drift that hides below a
 bounded oscillation shows in the means of 24 equal stretches, and counts if the line through them exceeds `SURE` of its
 own intervals. Random walks pass a plain test of the slope in one case in three; this one they do not pass, and at the
 size of rounding nothing but the size is judged. Every chart of a method makes its own run.
@@ -52,12 +53,13 @@ class Constant(NamedTuple):
     changed: Changed  # relative change, its trend and its growth
     a_step: float  # largest change in one step
     floor: float  # a smaller change is rounding
+    grain: float = 1.0  # rounding of the constant, in units of the machine's
 
     @property
     def kind(self) -> str:
         """kept, bounded, random walk, drift, or just growing; unknown without a size or an exponent to judge it by."""
         seen = self.changed
-        word = behaviour(seen.largest, seen.exponent, seen.exponent_interval, self.floor)
+        word = behaviour(seen.largest, seen.exponent, seen.exponent_interval, self.grain, self.floor)
         if word == "kept":
             return word
         if not (math.isfinite(seen.largest) and math.isfinite(seen.exponent)):
@@ -116,7 +118,8 @@ def long_run(method: Integrator, scene: Scene, chart: str, *, quick: bool = Fals
     made = max(int(run.attrs["steps"]), 1)
     changes, small = constants(scene, run), constants(scene, pilot)
     return LongRun(
-        {name: _judged(run["time"].values, values, small[name], made) for name, values in changes.items()},
+        {name: _judged(run["time"].values, values, small[name], made, scene.energy_grain if name == "energy" else 1.0)
+         for name, values in changes.items()},
         str(run.attrs["outcome"]),
         str(run.attrs["outcome_message"]),
         str(run.attrs["chart"]),
@@ -155,13 +158,15 @@ def _cayley_residual(top: SymmetricTop, run: xr.Dataset) -> Array:
     return relative
 
 
-def _judged(time: Array, values: Array, every_step: Array, steps: int) -> Constant:
+def _judged(time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0) -> Constant:
     """Size, growth and trend of a residual over so many steps; `every_step` holds it at consecutive ones."""
     jumps = np.abs(np.diff(every_step))
     jumps = jumps[np.isfinite(jumps)]
     a_step = float(jumps.max()) if jumps.size else math.nan
-    floor = max(KEPT, a_step * math.sqrt(steps)) if a_step <= ROUNDING_OF_A_STEP else KEPT
-    return Constant(constant_of(time, values), a_step, floor)
+    floor = KEPT * grain
+    if a_step <= ROUNDING_OF_A_STEP * grain:
+        floor = max(floor, a_step * math.sqrt(steps))
+    return Constant(constant_of(time, values), a_step, floor, grain)
 
 
 # the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1

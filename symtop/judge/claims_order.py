@@ -1,8 +1,9 @@
 """The order claim: the slope of the error, and the limit that it falls to.
 
-The slope is fitted by `symtop.measure.order` to a ladder of steps, then again with ten more steps put into the two
-decades of error above rounding where a method of high order is asymptotic; if the scene does not show it, on
-`FALLBACK` over longer runs. An adaptive method is fitted against its mean step.
+The slope is extrapolated to h = 0 by `symtop.measure.order` from a ladder of steps, then again with more steps put into
+the decades of error above rounding where a method of high order is asymptotic; if the scene does not show it, on
+`FALLBACK` over longer runs. An adaptive method is fitted against its mean step. What a slope confirms is said by
+`symtop.measure.order.order_verdict`, as in every study.
 
 A slope says nothing about a small constant: a method whose coefficients miss their sum by 1e-9 has the right slope down
 to an error of 1e-9 and stays there. So the error at the end of a short run of many steps, taken with its sign, is
@@ -18,7 +19,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.base.validate import SymtopError
-from symtop.measure.accuracy import error_table
+from symtop.measure.accuracy import asymptotic_steps, error_table
 from symtop.measure.order import Fit, order
 from symtop.measure.settings import ladder
 from symtop.methods.registry import Integrator
@@ -31,8 +32,6 @@ Array = NDArray[np.float64]
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
 FALLBACK, LONGER = "goldstein", (40.0, 400.0)
 FINEST = {"compiled": 2e5, "python": 1e4}  # steps of the longest run
-DENSE, DECADES = 10, 2.0
-FURTHER = 0.5  # an error that does not fall must not ask for a million times the steps
 SHARE = 0.37  # of a nutation: length of the runs that are extrapolated to h = 0
 STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
 TRUE_LIMIT = 1e-11  # a limit as close as this is the true motion
@@ -78,7 +77,7 @@ def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool) -> 
     fitted = _fitted(method, scene, main, horizon, table)
     if math.isfinite(fitted.fits[main].slope) or not method.fixed_step:
         return fitted
-    dense = _asymptotic(method, fitted)
+    dense = asymptotic_steps(table, main, method.order or 2)
     if not dense:
         return fitted
     table = xr.concat([table, error_table(scene, method, dense, horizon, observe=main)], "setting")
@@ -89,22 +88,12 @@ def _fitted(method: Integrator, scene: Scene, main: str, horizon: float, table: 
     step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
     omega = 2.0 * math.pi / scene.nutation_period
     fits = {
-        name: order(step, table[name].values, table[f"{name}_bound"].values, omega, method.order)
+        name: order(
+            step, table[name].values, table[f"{name}_bound"].values, omega, method.order, symmetric=method.symmetric
+        )
         for name in (main, "theta", "energy")
     }
     return Order(scene.name, step, table[main].values, table[f"{main}_bound"].values, fits, main)
-
-
-def _asymptotic(method: Integrator, fitted: Order) -> list[float]:
-    """Steps from where rounding ends to an error `DECADES` above it."""
-    good = np.flatnonzero(np.isfinite(fitted.error) & (fitted.error > 50.0 * fitted.bound))
-    if good.size == 0:
-        return []
-    finest = good[np.argmin(fitted.step_size[good])]
-    power = method.order or 2
-    further = (20.0 * fitted.bound[finest] / fitted.error[finest]) ** (1.0 / power)
-    first = float(fitted.step_size[finest]) * max(float(further), FURTHER)
-    return [first * 10.0 ** (DECADES / power * k / (DENSE - 1)) for k in range(DENSE)]
 
 
 class Limit(NamedTuple):
