@@ -7,16 +7,18 @@ The error of a method of order p is
 so that a slope measured at finite h differs from p by q a h^q. A straight line through many points has a small
 standard error and a wrong slope. Here log error is fitted by
 
-    log C + p log h + a h^q + b h^2q,
+    log C + p log h + a h^q + b h^2q + c h^3q,
 
-by least squares. A point counts if its error is above ten times the reference's own bound, below 1e-2, above
-the run's round-off, and h omega < 0.45 for a method of order 2 (in proportion more for higher orders, whose steps have
-more stages). Points within a thousand times the bound weigh less, as the bound is to the error. The coarsest points are
-dropped while the correction a h^q + b h^2q exceeds `CORRECTION` there or the interval exceeds `WIDEST`.
+by least squares. At the coarsest step of the fit a, b, c have priors of mean 0 and deviation 1/2, 1/4, 1/8, as a series
+has: where the steps span too little to tell a h^q from a power, the prior decides, and its doubt is in the interval. A
+point counts if its error is above ten times the reference's own bound and the run's round-off, below 1e-2, and
+h omega < 0.45 for a method of order 2 (in proportion more for higher orders, whose steps have more stages). Points
+within a hundred times the bound weigh less. The coarsest points are dropped while the correction exceeds `CORRECTION`
+there or the interval exceeds `WIDEST`.
 
-The interval is the larger of Student's 95 % interval and `TRUNCATED` times the change of p that one more term of the
-series makes, and never less than `RESOLVED`. It covers p in 93 to 97 % of synthetic curves with an h^2 correction and
-the scatter of sampled maxima; that of a straight line covers it in less than 4 %.
+The interval is Student's, for the degrees of freedom that the data leave, and never less than `RESOLVED`. It covers p
+for 93 to 97 % of synthetic curves with an h^2 correction and the scatter of sampled maxima; that of a straight line
+covers it for less than 4 %.
 
 One rule, `order_verdict`, says for every study whether a measured slope confirms a declared order.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, theorem II.3.2 (even powers of a symmetric method).
@@ -30,18 +32,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.measure.statistics import columns_fitted, line, student
+from symtop.measure.statistics import line, student
 
 LEAST = 5
 LARGEST_ERROR = 1e-2
 FLOOR = 1e3  # times the reference's bound: a finest error beyond it has not met rounding
 LARGEST_PHASE = 0.45  # h omega
 WIDEST = 0.2  # 95 % interval of a slope that still says something
-CORRECTION = 0.5  # of log error at the coarsest step, by which it differs from a straight line
-TRUNCATED = 1.8  # times the effect of one more term: what the terms that are left out may do
+CORRECTION = 0.7  # of log error, by which it differs from a straight line at the coarsest step
+TERMS, PRIOR = 3, 0.5  # of the series; at the coarsest step the k-th is of the size PRIOR^k
+ITERATIONS, SMOOTH = 12, 1e-12  # of the scatter; the least that it is taken to be
+LEVEL = 30.0  # times the least error: up to there errors may be round-off
 RESOLVED = 1e-3  # half-width of an interval: rounding shifts slopes by less than this
-TWO_TERMS = 7  # points from which on h^2q is fitted beside h^q
-EXACT = 1e-3  # of an error: the reference's bound, beyond which a point weighs less
+EXACT = 1e-2  # of an error: the reference's bound, beyond which a point weighs less
 MISSES = 5.0  # standard deviations: a finest point further off the curve of the others has met round-off
 VISIBLE = 0.01  # of an error, likewise
 BESIDE = 0.05  # a slope this near to the declared order, beyond its interval, still is that order
@@ -90,30 +93,41 @@ def order(
     """The order of a method as h -> 0, from errors at several steps; `bound` is the least error that can be judged.
 
     `claim` is the declared order and only widens the range of steps. For a `symmetric` method the series goes on in h^2.
-    From the finest step upwards, points are cut until an error exceeds its finer neighbour's by at least the root of
-    the ratio of their steps: they have met round-off. A fit that cannot be judged says why.
+    A fit that cannot be judged says why.
     """
     h, e, b = (np.asarray(values, float) for values in np.broadcast_arrays(step_size, error, bound))
     rank = np.argsort(h)
     finest = e[rank][np.isfinite(e[rank])][:2]
     if finest.size == 0:
         return _unjudged(e, "every run failed")
+    judged, b = b, np.maximum(b, _round_off(h[rank], e[rank]))
     used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR)
     used &= h * omega < LARGEST_PHASE * max(claim or 2, 2) / 2.0
-    for place, (finer, coarser) in enumerate(pairwise(rank), start=1):
-        if used[coarser] and used[finer]:
-            if e[coarser] > e[finer] * math.sqrt(h[coarser] / h[finer]):
-                break
-            used[rank[:place]] = False
     places = rank[used[rank]]
     series = _series(h[places], e[places], b[places], 2 if symmetric else 1)
     if series is None:
-        if np.min(finest) > FLOOR * np.max(b):
+        if np.min(finest) > FLOOR * np.max(judged):
             return _unjudged(used, "the error does not fall to rounding as a power of the step")
         return _unjudged(used, "fewer than five points follow a power of the step before rounding")
     used = np.zeros(h.shape, dtype=bool)
     used[places[series.window]] = True
     return Fit(series.slope, series.interval, series.constant, used)
+
+
+def _round_off(h: Array, e: Array) -> float:
+    """The level where the errors of a run, from fine to coarse steps, stop falling; 0 if they never do.
+
+    Near the least error, a step whose error is not larger than the next finer one's by the root of their ratio, and all
+    finer ones, have met round-off. Its level is their median.
+    """
+    good = np.isfinite(e)
+    h, e = h[good], e[good]
+    level = [
+        place
+        for place, ((fine, low), (coarse, high)) in enumerate(pairwise(zip(h, e, strict=True)), start=1)
+        if high < LEVEL * np.min(e) and high <= low * math.sqrt(coarse / fine)
+    ]
+    return float(np.median(e[: level[-1]])) if level else 0.0
 
 
 def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> str:
@@ -148,48 +162,49 @@ class _Series(NamedTuple):
 def _series(h: Array, e: Array, b: Array, power: int) -> _Series | None:
     """The fit to points from fine to coarse, over the widest window that the series describes; None if there is none."""
     first, last = 0, h.size
-    weights = 1.0 / (1.0 + (b / (EXACT * e)) ** 2)
-    u, v = np.log(h), np.log(e)
     while last - first >= LEAST:
         window = slice(first, last)
-        terms = 2 if last - first >= TWO_TERMS else 1
-        columns = _columns(u[window], h[window], power, terms)
-        values, w = v[window], weights[window]
-        fitted, deviations = columns_fitted(columns, values, w)
-        correction = columns[:, 2:] * fitted[2:]
-        if max(np.max(np.abs(correction.sum(axis=1))), 0.5 * np.sum(np.abs(correction[-1]))) > CORRECTION:
-            last -= 1
-            continue
-        if last - first > LEAST + 1 and _missed(columns, values, w):
+        relative = (h[window] / h[last - 1]) ** power
+        terms = range(1, min(TERMS, last - first - 4) + 1)  # two degrees of freedom are left at least
+        columns = np.stack([np.ones(last - first), np.log(h[window]), *(relative**k for k in terms)], axis=1)
+        values, weights = np.log(e[window]), 1.0 / (1.0 + (b[window] / (EXACT * e[window])) ** 2)
+        if last - first > columns.shape[1] + 2 and _missed(columns, values, weights):
             first += 1
             continue
-        interval = student(values.size - columns.shape[1]) * float(deviations[1])
-        if values.size > columns.shape[1] + 1:
-            further, _ = columns_fitted(_columns(u[window], h[window], power, terms + 1), values, w)
-            interval = max(interval, TRUNCATED * abs(float(further[1] - fitted[1])))
-        if interval > WIDEST:
-            last -= 1
-            continue
-        return _Series(float(fitted[1]), max(interval, RESOLVED), math.exp(float(fitted[0])), window)
+        fitted, deviations, freedom = _regularised(columns, values, weights)
+        interval = student(max(int(freedom), 1)) * float(deviations[1])
+        if interval <= WIDEST and np.max(np.abs(columns[:, 2:] @ fitted[2:])) <= CORRECTION:
+            return _Series(float(fitted[1]), max(interval, RESOLVED), math.exp(float(fitted[0])), window)
+        last -= 1
     return None
 
 
-def _columns(u: Array, h: Array, power: int, terms: int) -> Array:
-    """1, log h and the terms h^q, h^2q, ..., which are 1 at the coarsest step."""
-    relative = (h / h[-1]) ** power
-    return np.stack([np.ones_like(u), u, *(relative**k for k in range(1, terms + 1))], axis=1)
+def _regularised(columns: Array, values: Array, weights: Array) -> tuple[Array, Array, float]:
+    """Coefficients, their standard errors and the degrees of freedom, where the terms have the prior `PRIOR`.
+
+    The prior is a row for each term, weighed by the scatter of the values. The scatter is found by iteration: the sum
+    of squares over n less the trace of the hat matrix.
+    """
+    count, terms = values.size, columns.shape[1] - 2
+    prior = np.diag([0.0, 0.0, *(PRIOR**-k for k in range(1, terms + 1))])[2:]
+    top, right = columns * np.sqrt(weights)[:, None], np.append(values * np.sqrt(weights), np.zeros(terms))
+    scatter = 1e-2
+    for _ in range(ITERATIONS):
+        basis, triangle = np.linalg.qr(np.vstack([top, scatter * prior]))
+        fitted = np.linalg.solve(triangle, basis.T @ right)
+        freedom = count - float(np.sum(basis[:count] ** 2))
+        rest = values - columns @ fitted
+        spread = np.sqrt(np.sum(np.linalg.inv(triangle) ** 2, axis=1)) * scatter
+        scatter = max(math.sqrt(float(weights @ rest**2) / max(freedom, 1.0)), SMOOTH)
+    return fitted, spread, freedom
 
 
 def _missed(columns: Array, values: Array, weights: Array) -> bool:
     """Does the finest point lie off the curve through the others, beyond their scatter?"""
-    if values.size <= columns.shape[1] + 1:
-        return False
-    fitted, _ = columns_fitted(columns[1:], values[1:], weights[1:])
+    fitted, _, freedom = _regularised(columns[1:], values[1:], weights[1:])
     rest = values[1:] - columns[1:] @ fitted
-    scatter = float(weights[1:] @ rest**2) / (rest.size - columns.shape[1])
-    inverse = np.linalg.pinv((columns[1:].T * weights[1:]) @ columns[1:])
-    spread = math.sqrt(max(scatter * (1.0 / weights[0] + columns[0] @ inverse @ columns[0]), 0.0))
-    return bool(abs(values[0] - columns[0] @ fitted) > max(VISIBLE, MISSES * spread))
+    scatter = math.sqrt(float(weights[1:] @ rest**2) / max(freedom, 1.0) / float(weights[0]))
+    return bool(abs(values[0] - columns[0] @ fitted) > max(VISIBLE, MISSES * scatter))
 
 
 def _unjudged(used: NDArray[Any], reason: str) -> Fit:

@@ -2,7 +2,6 @@
 
     line      v = a + b u:         b = du.dv/du.du,  error^2 = rest.rest/((n - 2) du.du)      du = u - mean(u)
     columns   v = sum c_k col_k:   c by least squares,  error_k^2 = rest.rest/(n - m) (A^T A)^-1_kk
-              (with weights w, rows of A and v times sqrt(w))
 
 A 95 % interval is Student's quantile of the degrees of freedom times the standard error. Source: any textbook, for
 example Draper and Smith, Applied Regression Analysis, chapters 1 and 5.
@@ -37,10 +36,8 @@ def line(x: Array, y: Array) -> Line:
     return Line(slope, error, middle, rest)
 
 
-def columns_fitted(columns: Array, values: Array, weights: Array | None = None) -> tuple[Array, Array]:
-    """Coefficients (m,) of columns (n, m) in values (n,), and their standard errors; `weights` (n,) are 1/variance."""
-    if weights is not None:
-        columns, values = columns * np.sqrt(weights)[:, None], values * np.sqrt(weights)
+def columns_fitted(columns: Array, values: Array) -> tuple[Array, Array]:
+    """Coefficients (m,) of columns (n, m) in values (n,), and their standard errors."""
     coefficients = np.linalg.lstsq(columns, values, rcond=None)[0]
     rest = values - columns @ coefficients
     freedom = values.size - columns.shape[1]
