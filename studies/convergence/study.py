@@ -1,12 +1,12 @@
-"""At what rate does the error fall with the step?"""
+"""At what rate does the error fall with the step, or with the tolerance?"""
 
 import math
 
 import xarray as xr
 
-from symtop.measure.accuracy import error_table
-from symtop.measure.settings import step_ladder
-from symtop.methods.registry import integrator, integrators
+from symtop.measure.order_table import observable, order_table
+from symtop.measure.settings import step_ladder, tolerance_ladder
+from symtop.methods.registry import integrator, rows
 from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
@@ -24,35 +24,45 @@ LEFT_OUT = {
 NOT_QUICK = {"left to the ordinary grid": ("loop", "hairer-lubich-wanner")}
 WHOLE = "spheroid"  # runs to its horizon; the other scenes run for `NUTATIONS` at most
 NUTATIONS = 8.0
+MOST_STEPS = 1e6  # of a run
 
 
 def cases(quick: bool) -> list[Case]:
-    """Every fixed-step method on every scene, from ten steps a nutation to steps so short that rounding rules."""
+    """Every method in every chart: steps from ten a nutation to so short that rounding rules, tolerances likewise."""
     grid = []
     for name in grid_scenes(LEFT_OUT | (NOT_QUICK if quick else {})):
         on = scene(name)
         horizon = min(on.horizon, math.inf if name == WHOLE else NUTATIONS * on.nutation_period)
-        for method in integrators().values():
-            if method.fixed_step:
-                steps = step_ladder(method, on, horizon, *((8, 1e5) if quick else (17,)))
-                grid.append(Case(name, method.name, {"horizon": horizon, "step_sizes": steps}))
+        for row in rows():
+            if row.fixed_step:
+                settings = step_ladder(row, on, horizon, *((8, 1e5) if quick else (17, MOST_STEPS)))
+            elif row.adaptive:
+                settings = tolerance_ladder(row, 6 if quick else 13)
+            else:
+                continue  # a formula has nothing to set
+            grid.append(Case(name, row.name, {"horizon": horizon, "settings": settings, "dense": not quick}))
     return grid
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The error table of one method on one scene."""
-    on, method = scene(case.scene), integrator(case.integrator)
-    return error_table(on, method, case.settings["step_sizes"], case.settings["horizon"], observe="attitude")
+    """The error table of one method in one chart on one scene, with the attitude where the chart shows it."""
+    on, row = scene(case.scene), integrator(case.integrator)
+    horizon = case.settings["horizon"]
+    table = order_table(on, row, case.settings["settings"], horizon, observable(row), dense=case.settings["dense"])
+    return table.assign(horizon=horizon)
 
 
 STUDY = Study(
     name="convergence",
     title="Convergence",
-    question="At what rate does the error fall with the step?",
+    question="At what rate does the error fall with the step, or with the tolerance?",
     how_to_read=(
-        "Both axes are logarithmic, so a method of order p is a straight line of slope p. Where a line bends at the "
-        "top, the step is too large for the order to show; where it flattens at the bottom, the error has reached "
-        "rounding or the grey band, below which the reference cannot judge."
+        "Both axes are logarithmic, so a method of order p is a straight line of slope p against its step. Where a "
+        "line bends at the top, the step is too large for the order to show; where it flattens at the bottom, the "
+        "error has reached rounding or the grey band, below which the reference cannot judge. A row is a method in one "
+        "chart, rk4[axis]: angles are Euler's angles, axis is the direction of the axis with the angular momentum, "
+        "attitude is the quaternion with the angular momentum. Steps of adaptive methods follow from their tolerance; "
+        "they are drawn against it, and against work beside the methods of fixed step."
     ),
     cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
 )  # fmt: skip

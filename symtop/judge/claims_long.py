@@ -118,8 +118,12 @@ def long_run(method: Integrator, scene: Scene, chart: str, *, quick: bool = Fals
     made = max(int(run.attrs["steps"]), 1)
     changes, small = constants(scene, run), constants(scene, pilot)
     return LongRun(
-        {name: _judged(run["time"].values, values, small[name], made, scene.energy_grain if name == "energy" else 1.0)
-         for name, values in changes.items()},
+        {
+            name: _judged(
+                run["time"].values, values, small[name], made, scene.energy_grain if name == "energy" else 1.0
+            )
+            for name, values in changes.items()
+        },
         str(run.attrs["outcome"]),
         str(run.attrs["outcome_message"]),
         str(run.attrs["chart"]),

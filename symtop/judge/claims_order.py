@@ -15,12 +15,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.base.validate import SymtopError
-from symtop.measure.accuracy import asymptotic_steps, error_table
-from symtop.measure.order import Fit, order
+from symtop.measure.order import Fit
+from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
 from symtop.methods.registry import Integrator
 from symtop.model import charts
@@ -48,11 +47,6 @@ class Order(NamedTuple):
     observed: str
 
 
-def observable(method: Integrator) -> str:
-    """The attitude, if the method shows it in any chart."""
-    return "attitude" if set(method.solvers) & {"angles", "attitude"} else "axis"
-
-
 def measured_order(method: Integrator, scene: Scene, *, quick: bool = False) -> Order:
     """Slopes of the errors of attitude, theta and energy, where they can be judged."""
     if method.control is None:
@@ -70,29 +64,12 @@ def measured_order(method: Integrator, scene: Scene, *, quick: bool = False) -> 
 
 def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool) -> Order:
     horizon = nutations * scene.time_scale()
-    count = (11 if method.fixed_step else 9) if quick else 13 if method.fixed_step else 25  # steps chosen by an error scatter
+    count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
     settings = ladder(method, scene, horizon, count, FINEST[method.implementation])
     main = observable(method)
-    table = error_table(scene, method, settings, horizon, observe=main)
-    fitted = _fitted(method, scene, main, horizon, table)
-    if math.isfinite(fitted.fits[main].slope) or not method.fixed_step:
-        return fitted
-    dense = asymptotic_steps(table, main, method.order or 2)
-    if not dense:
-        return fitted
-    table = xr.concat([table, error_table(scene, method, dense, horizon, observe=main)], "setting")
-    return _fitted(method, scene, main, horizon, table)
-
-
-def _fitted(method: Integrator, scene: Scene, main: str, horizon: float, table: xr.Dataset) -> Order:
+    table = order_table(scene, method, settings, horizon, main)
     step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
-    omega = 2.0 * math.pi / scene.nutation_period
-    fits = {
-        name: order(
-            step, table[name].values, table[f"{name}_bound"].values, omega, method.order, symmetric=method.symmetric
-        )
-        for name in (main, "theta", "energy")
-    }
+    fits = {name: order_fit(scene, method, table, name, horizon) for name in (main, "theta", "energy")}
     return Order(scene.name, step, table[main].values, table[f"{main}_bound"].values, fits, main)
 
 

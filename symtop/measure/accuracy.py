@@ -24,9 +24,6 @@ from symtop.run.simulation import simulate
 SAMPLES = 1001
 DENSE = 5.0  # samples a nutation from which on their phases need no care
 GOLDEN_CLOSE = 0.01  # of a nutation: a stride this near to the golden section is one
-ASYMPTOTIC, DECADES = 12, 3.0  # steps that are added, and the decades of error that they fill
-ABOVE_ROUNDING = 20.0  # times the bound: the least error that an added step is to have
-FURTHER = 0.5  # an error that does not fall must not ask for a million times the steps
 ENOUGH = {"compiled": 1e9, "python": 2e4}  # force evaluations of a run after which no finer setting is tried
 
 
@@ -39,20 +36,6 @@ def enough_samples(scene: Scene, horizon: float) -> int:
     phase = np.mod(horizon / (counts - 1) / period, 1.0)
     off = np.minimum(np.abs(phase - GOLDEN), np.abs(phase - 1.0 + GOLDEN))
     return int(counts[np.argmax(off < GOLDEN_CLOSE) if (off < GOLDEN_CLOSE).any() else np.argmin(off)])
-
-
-def asymptotic_steps(table: xr.Dataset, quantity: str, power: int) -> list[float]:
-    """More steps where an error table's errors are a power of the step: from above rounding `DECADES` upwards.
-
-    A ladder over all decades has few steps there if the order `power` is high. Empty if every error is near its bound.
-    """
-    h, error, bound = (table[name].values for name in ("step_size", quantity, f"{quantity}_bound"))
-    judged = np.flatnonzero(np.isfinite(error) & (error > 2.5 * ABOVE_ROUNDING * bound))
-    if judged.size == 0:
-        return []
-    finest = judged[np.argmin(h[judged])]
-    first = h[finest] * max(float((ABOVE_ROUNDING * bound[finest] / error[finest]) ** (1.0 / power)), FURTHER)
-    return [float(first * 10.0 ** (DECADES / power * k / (ASYMPTOTIC - 1))) for k in range(ASYMPTOTIC)]
 
 
 def error_table(

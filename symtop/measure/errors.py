@@ -84,7 +84,8 @@ def errors_against(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Datas
     """Error of every quantity that a run shows at every sample; NaN where the run had failed.
 
     Where the reference knows a value beyond double, the difference is taken from both of its halves: a run that is
-    right to its last digit has the error of that digit and not zero. `truth` holds `axis`, `theta`, `quaternion`, `energy`, `p_phi`, `p_psi` at the same times (see `reference`).
+    right to its last digit has the error of that digit and not zero. `truth` holds `axis`, `theta`,
+    `quaternion`, `energy`, `p_phi`, `p_psi` at the same times (see `reference`).
     """
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
         columns = _columns(scene, run, truth)

@@ -2,7 +2,7 @@
 
 The error of a method of order p is
 
-    error = C h^p (1 + a h^q + b h^2q + ...),      q = 2 for a symmetric method (its error has even powers only), else 1,
+    error = C h^p (1 + a h^q + b h^2q + ...),      q = 2 for a symmetric method (even powers only), else 1,
 
 so that a slope measured at finite h differs from p by q a h^q. A straight line through many points has a small
 standard error and a wrong slope. Here log error is fitted by
@@ -92,7 +92,7 @@ def order(
 ) -> Fit:
     """The order of a method as h -> 0, from errors at several steps; `bound` is the least error that can be judged.
 
-    `claim` is the declared order and only widens the range of steps. For a `symmetric` method the series goes on in h^2.
+    `claim` is the declared order and only widens the range of steps. The series of a `symmetric` method goes on in h^2.
     A fit that cannot be judged says why.
     """
     h, e, b = (np.asarray(values, float) for values in np.broadcast_arrays(step_size, error, bound))
@@ -133,11 +133,11 @@ def _round_off(h: Array, e: Array) -> float:
 def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> str:
     """The one rule of every study: what a measured slope says of a declared order.
 
-        confirmed   the interval, widened by `BESIDE`, holds the declared order
-        refuted     the slope is off by more than `CLEARLY` beyond its interval, or one of the `others` (the same
-                    method's slopes in other quantities, whose errors may fall faster by chance) is as much lower
-        undecided   the slope lies between, or could not be measured
-        measured    nothing is declared
+    confirmed   the interval, widened by `BESIDE`, holds the declared order
+    refuted     the slope is off by more than `CLEARLY` beyond its interval, or one of the `others` (the same
+                method's slopes in other quantities, whose errors may fall faster by chance) is as much lower
+    undecided   the slope lies between, or could not be measured
+    measured    nothing is declared
     """
     if not math.isfinite(main.slope):
         return "undecided"
@@ -160,7 +160,7 @@ class _Series(NamedTuple):
 
 
 def _series(h: Array, e: Array, b: Array, power: int) -> _Series | None:
-    """The fit to points from fine to coarse, over the widest window that the series describes; None if there is none."""
+    """The fit to points from fine to coarse, over the widest window that the series describes; None without one."""
     first, last = 0, h.size
     while last - first >= LEAST:
         window = slice(first, last)

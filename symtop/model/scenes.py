@@ -72,7 +72,7 @@ class Scene:
 
     @property
     def energy_grain(self) -> float:
-        """(|E0| + |mgl|) / `energy_scale`, at least 1: by how much the rounding of an energy shows in relative errors."""
+        """(|E0| + |mgl|) / `energy_scale`, at least 1: how much larger rounding is in relative errors of the energy."""
         return max((abs(self.top.energy(self.start)) + abs(self.top.mgl)) / self.energy_scale, 1.0)
 
     @property

@@ -5,9 +5,10 @@ import pytest
 
 import symtop
 from symtop.base.numbers import EPSILON
-from symtop.measure.accuracy import SAMPLES, asymptotic_steps, enough_samples, error_table
+from symtop.measure.accuracy import SAMPLES, enough_samples, error_table
 from symtop.measure.errors import attitude_error, error_bound, errors_against
 from symtop.measure.order import LARGEST_ERROR
+from symtop.measure.order_table import asymptotic_steps
 from symtop.methods.registry import integrator
 from symtop.model.scenes import scene
 from symtop.run.reference import have_heyoka, reference

@@ -49,7 +49,7 @@ def test_the_interval_of_a_straight_line_does_not(kind):
 
 
 def test_a_correction_in_h_is_extrapolated_too():
-    """Over one decade h and h^2 are nearly one column: where the scatter is large, the interval is too wide to judge."""
+    """Over one decade h and h^2 are nearly one column: where the scatter is large, no order is judged."""
     assert 0.93 <= coverage("normal", lambda h, e, p: order(h, e, 1e-30, 1.0, p), 0.7, q=1, seed=2) <= 0.98
 
 
