@@ -9,7 +9,7 @@ from matplotlib.ticker import LogLocator
 from symtop.measure.errors import QUANTITIES
 from symtop.methods.registry import split_name
 from symtop.report.figures import error_band
-from symtop.report.style import grid, legend_below, look, slope_guide
+from symtop.report.style import GREY, grid, legend_below, look, slope_guide
 from symtop.runner.study import Picture
 
 from .tables import (
@@ -148,16 +148,15 @@ def _by_tolerance(data: xr.Dataset) -> Picture:
             error = np.maximum(cell[MAIN].values, 0.3 * floor)
             _line(axis, cell, name, label, cell["tolerance"].values, error, fitted[scene, name].used)
         ends = np.array([1e-14, LARGE])
-        axis.plot(ends, ends, color="#7F7F7F", lw=0.9, ls=(0, (5, 3)), zorder=1)
-        axis.annotate("error = tolerance", (3e-14, 3e-14), xytext=(4, -8), textcoords="offset points", fontsize=8.5)
+        axis.plot(ends, ends, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1, label="error = tolerance")
     legend_below(figure, [axis for _, axis in panels])
     slopes = {name: [fit.slope for pair, fit in fitted.items() if pair[1] == name and np.isfinite(fit.slope)]
               for name in labels}  # fmt: skip
     listed = ", ".join(f"{name} {min(values):.2f} to {max(values):.2f}" for name, values in slopes.items() if values)
     caption = (
         f"Largest axis error {HORIZON} of the adaptive methods against the tolerance that was asked for; relative and "
-        "absolute tolerance of the Runge-Kutta methods are equal. A tolerance bounds the error of a step and not that of a run: lines above the "
-        f"dashed diagonal lose more than they were asked for. Exponents x of error ~ tolerance^x: {listed}. Large "
+        "absolute tolerance of the Runge-Kutta methods are equal. A tolerance bounds the error of a step and not that "
+        f"of a run: lines above the dashed diagonal lose more than they were asked for. Exponents x of error ~ tolerance^x: {listed}. Large "
         "points enter the fit; dashed lines are plain Python."
     )
     alt = "Log-log plots of axis error against tolerance for the adaptive methods, with the diagonal as a guide."

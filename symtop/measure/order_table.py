@@ -52,7 +52,19 @@ def order_table(
 
 
 def order_fit(scene: Scene, method: Integrator, table: xr.Dataset, quantity: str, horizon: float) -> Fit:
-    """The order in one quantity of an error table, against the step, or the mean step of an adaptive method."""
+    """The order in one quantity of an error table, against the step, or the mean step of an adaptive method.
+
+    A method of high order makes few steps a nutation, and the largest error at so few times scatters. Where
+    it cannot be judged, the error at the end is, which is smooth in h.
+    """
+    largest = _fit(scene, method, table, quantity, horizon)
+    if math.isfinite(largest.slope) or f"{quantity}_end" not in table:
+        return largest
+    end = _fit(scene, method, table, f"{quantity}_end", horizon)
+    return end if math.isfinite(end.slope) else largest
+
+
+def _fit(scene: Scene, method: Integrator, table: xr.Dataset, quantity: str, horizon: float) -> Fit:
     step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
     omega = 2.0 * math.pi / scene.nutation_period
     error, bound = (table[column].values for column in (quantity, f"{quantity.removesuffix('_end')}_bound"))
