@@ -156,8 +156,8 @@ def _by_tolerance(data: xr.Dataset) -> Picture:
     caption = (
         f"Largest axis error {HORIZON} of the adaptive methods against the tolerance that was asked for; relative and "
         "absolute tolerance of the Runge-Kutta methods are equal. A tolerance bounds the error of a step and not that "
-        f"of a run: lines above the dashed diagonal lose more than they were asked for. Exponents x of error ~ tolerance^x: {listed}. Large "
-        "points enter the fit; dashed lines are plain Python."
+        "of a run: lines above the dashed diagonal lose more than they were asked for. Exponents x of "
+        f"error ~ tolerance^x: {listed}. Large points enter the fit; dashed lines are plain Python."
     )
     alt = "Log-log plots of axis error against tolerance for the adaptive methods, with the diagonal as a guide."
     return Picture("tolerance", figure, caption, alt)

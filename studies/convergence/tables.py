@@ -13,7 +13,7 @@ import xarray as xr
 
 from symtop.base.numbers import EPSILON
 from symtop.measure.order import LARGEST_ERROR, Fit, order_verdict, power_law
-from symtop.measure.order_table import order_fit
+from symtop.measure.order_table import observable, order_fit
 from symtop.methods.registry import Integrator, integrator, integrators, split_name
 from symtop.model.scenes import scene
 
@@ -61,7 +61,7 @@ def fits(data: xr.Dataset, quantity: str, *, at_end: bool = False) -> Pairs:
     fitted = {}
     for name, label in product(map(str, part["scene"].values), map(str, part["integrator"].values)):
         row, cell = registered(label), part.sel(scene=name, integrator=label)
-        if row is not None and np.isfinite(cell[f"{quantity}_bound"]).any():
+        if row is not None and not (quantity == "attitude" and observable(row) == "axis"):
             fitted[name, label] = order_fit(scene(name), row, cell, column, float(cell["horizon"]))
     return fitted
 

@@ -8,14 +8,14 @@ import xarray as xr
 from matplotlib.ticker import NullFormatter
 
 from symtop.measure.conservation import CONSTANTS
-from symtop.measure.growth import tops
+from symtop.measure.growth import ROUNDED, tops
 from symtop.report.style import BLACK, GREY, legend_below, look, panels, slope_guide
 from symtop.run.long_run import PER_NUTATION
 from symtop.runner.study import Picture
 
 from . import words
 from .phase_loss import LOST
-from .tables import HISTORIES, HORIZONS, ROUNDED, ROUNDINGS, WINDOWS, by_integrator, losses
+from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS, by_integrator, losses
 
 SHOWN = ("midpoint", "trapezoidal", "stormer-verlet", "strang", "gauss-4", "rk4", "rk45", "taylor")
 LABELS = {
@@ -66,11 +66,12 @@ def _residuals(histories: xr.Dataset) -> Picture:
         axis.set_xlabel("time (s)")
     legend_below(figure, axes)
     caption = (
-        "Relative change of energy and of both momenta since the start: samples as dots, the largest of each time "
-        "window as a line with markers, at 1e-17 if smaller; the dashed line rises as t. On every scene the energy "
-        "error is at rounding or bounded (growth exponent nearest to 0, 95 % interval below 1/2) for "
-        f"{words.holding(data)}. The momenta are recomputed from the increments of the trajectory. "
-        f"{words.shortened(data)}"
+        "Change of energy since the start relative to E0 - min V, the energy of the nutation, and of both momenta "
+        "relative to the larger one: samples as dots, the largest of each time window as a line with markers, at 1e-17 "
+        "if smaller; the dashed line rises as t. On every scene the energy error is at rounding or bounded (growth "
+        f"exponent nearest to 0, 95 % interval below 1/2) for {words.holding(data)}. Bounded is the energy, not the "
+        f"error of the motion. {' '.join(words.phase_growth(data))} The momenta are recomputed from the increments of "
+        f"the trajectory. {words.shortened(data)}"
     )
     alt = "Log-log plots of residuals over time: level for the discrete methods, rising for adaptive Runge-Kutta."
     return Picture("residuals", figure, caption.rstrip(), alt)
@@ -103,9 +104,10 @@ def dots(data: xr.Dataset, columns: dict[str, str], *, log: bool) -> Any:
 def _sizes(histories: xr.Dataset) -> Picture:
     figure = dots(histories, {f"{name}_largest": f"largest residual {LABELS[name]}" for name in CONSTANTS}, log=True)
     caption = (
-        "Largest relative residual of every method over the whole run; an exact zero is drawn at 1e-17. A million "
-        f"steps of rounding explain changes up to {ROUNDED:.0e}: what a method conserves lies below. What it does not "
-        "conserve shows the truncation error of a step, or, farthest to the right, a drift. "
+        "Largest relative residual of every method over the whole run, energies relative to E0 - min V; an exact zero "
+        f"is drawn at 1e-17. A million steps of rounding explain changes up to {ROUNDED:.0e} of a momentum or of |E|: "
+        "what a method conserves lies below. What it does not conserve shows the truncation error of a step, or, "
+        "farthest to the right, a drift. "
         f"{words.shortened(histories)}"
     )
     alt = "Dot plot of the largest residuals of energy and momenta for every integrator."

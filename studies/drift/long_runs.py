@@ -52,8 +52,9 @@ def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, 
     Dimension ``window``: ``elapsed`` (see `elapsed_steps`), ``drift`` (member, window), its root mean square ``rms``
     over the members; ``end``, the last rms, and the ``exponent`` of its growth, fitted from as many steps on as the
     first window has, with ``exponent_interval``; each of these again as ``plain_drift``, ... with plain sums. ``p_phi``
-    and ``p_psi`` are the largest relative changes with compensated sums. ``gain`` is the plain over the compensated rms
-    of the members that ran with both, over the last decade of steps, because at one moment a walk may be anywhere.
+    and ``p_psi`` are the largest relative changes with compensated sums. ``late`` and ``plain_late`` are the rms over
+    the last decade of steps, because at one moment a walk may be anywhere, of the members that ran with both sums;
+    ``gain`` is their ratio. All that is said of what compensated sums gain rests on these three.
     """
     columns: dict[str, Any] = {}
     for prefix, compensated, many in (("", True, count), ("plain_", False, min(PLAIN_MEMBERS, count))):
@@ -74,5 +75,7 @@ def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, 
             changes = [np.abs(run[f"{momentum}_{part}"].values) for run in runs for part in ("least", "largest")]
             columns[momentum] = float(np.max(changes))
     late = elapsed > 0.1 * elapsed[-1]
-    plain, best = (np.mean(columns[name][1][:PLAIN_MEMBERS, late] ** 2) for name in ("plain_drift", "drift"))
-    return xr.Dataset({**columns, "gain": float(np.sqrt(plain / best))})
+    for prefix in ("", "plain_"):
+        walks = columns[f"{prefix}drift"][1][:PLAIN_MEMBERS, late]
+        columns[f"{prefix}late"] = float(np.sqrt(np.mean(walks**2)))
+    return xr.Dataset({**columns, "gain": columns["plain_late"] / columns["late"]})

@@ -12,10 +12,10 @@ import math
 
 import xarray as xr
 
-from symtop.measure.growth import behaviour
+from symtop.measure.growth import ROUNDED, behaviour
+from symtop.model.scenes import scenes
 
 HISTORIES, WINDOWS, ROUNDINGS, HORIZONS = "histories", "windows", "rounding", "horizons"  # groups
-ROUNDED = 3e-13  # relative: the largest change that a million steps of rounding explain
 FAILED = "failed"
 BEHAVIOURS = ("kept", "bounded", "random walk", "growing", "drift")  # each is worse than those before it
 
@@ -35,4 +35,18 @@ def worst_behaviour(histories: xr.Dataset, name: str) -> str:
     if not (histories["outcome"] == "ok").all():
         return FAILED
     columns = (histories[f"{name}_{part}"].values for part in ("largest", "exponent", "exponent_interval"))
-    return max((behaviour(*map(float, one), ROUNDED) for one in zip(*columns, strict=True)), key=BEHAVIOURS.index)
+    grains = [grain(str(where), name) for where in histories["scene"].values]
+    found = (behaviour(*map(float, one)) for one in zip(*columns, grains, strict=True))
+    return max(found, key=BEHAVIOURS.index)
+
+
+def grain(where: str, name: str) -> float:
+    """The rounding of a constant on a scene, in units of the machine's: that of an energy counts from E0 - min V."""
+    known = scenes()
+    return known[where].energy_grain if name == "energy" and where in known else 1.0
+
+
+def rounding(cell: xr.Dataset, name: str) -> float:
+    """The largest relative change of a constant that a million steps of rounding explain, in a cell of one scene."""
+    constant = "energy" if name == "phase" else name
+    return ROUNDED * grain(str(cell["scene"].item()) if "scene" in cell.coords else "", constant)

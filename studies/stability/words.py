@@ -29,6 +29,7 @@ HOW_TO_READ = (
 LOOSE = 10.0  # times the change of the solved equation: lost because the solver's tolerance is too loose
 BARELY = 0.02  # rad: a largest surviving displacement below this counts as none
 REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
+LEAST_SAMPLED = 1e-14  # an energy error that is rounding
 EARLY = 1e-15, 1e-2  # rad, axis errors that predict the time next to a separatrix: above rounding, still small
 
 
@@ -152,10 +153,15 @@ def sampling(part: xr.Dataset) -> str:
     good = np.isfinite(once) & (every > 1e-12)
     if not good.any():
         return ""
-    ratio = np.where(good, every / np.maximum(once, 1e-16), 0.0)
-    worst = int(np.argmax(ratio))
-    name = str(part["integrator"].values[worst])
-    text = f"An energy error that is sampled once a nutation appears up to {ratio[worst]:.0e} times too small ({name})"
+    names, seen = part["integrator"].values, good & (once > LEAST_SAMPLED)
+    unseen = zip(names[good & ~seen], every[good & ~seen], strict=True)
+    hidden = ", ".join(f"{name} ({error:.0e})" for name, error in unseen)
+    text = f"Sampled once a nutation, the energy error of {hidden} is below rounding" if hidden else ""
+    if seen.any():
+        ratio = np.where(seen, every / np.where(seen, once, 1.0), 0.0)
+        worst = int(np.argmax(ratio))
+        text += "; others appear" if hidden else "An energy error that is sampled once a nutation appears"
+        text += f" up to {ratio[worst]:.0e} times too small ({names[worst]})"
     if "stormer-verlet" in part["integrator"].values:
         verlet = part.sel(integrator="stormer-verlet")
         true, seen = float(verlet[Column.ENERGY_EVERY]), float(verlet[Column.ENERGY_ONCE])

@@ -12,6 +12,7 @@ from symtop_studies.stability import words as stability_words
 from symtop_studies.truth import tables as truth_tables, words as truth_words
 
 import symtop
+from symtop.judge.claims_long import KEPT, Constant
 from symtop.measure import conservation, published
 
 
@@ -50,15 +51,66 @@ def test_a_change_of_law_is_told_above_rounding_only():
         cell = xr.Dataset({f"{name}_{column}": value for column, value in grown.items()})
         bent = words.law(cell.assign(energy_largest=1e-6), name)
         assert bent == "1.10 +- 0.10, linear; t^0.10 to t^2.00 at t = 42"
-        assert words.law(cell.assign(energy_largest=1e-13), name) == "1.10 +- 0.10, linear"
+        below = "linear" if name == "phase" else "at rounding"
+        assert words.law(cell.assign(energy_largest=1e-13), name) == f"1.10 +- 0.10, {below}"
+
+
+def test_what_is_said_of_the_phase_follows_from_its_exponents():
+    """A phase is called steady only if the intervals of its exponents allow 1; one that grows as t^2 is named."""
+    exponents = {
+        "strang": (1.0, 1.0),
+        "rk4": (2.09, 1.90),
+        "taylor": (1.94, 2.03),
+        "mixed": (1.0, 1.6),
+        "exact": (0.2, 0.1),
+    }
+    sizes = {"strang": 1.0, "rk4": 1.0, "taylor": 7e-10, "mixed": 1e-3, "exact": 1e-15}
+    data = xr.Dataset(
+        {
+            "phase_exponent": (("integrator", "scene"), list(exponents.values())),
+            "phase_exponent_interval": (("integrator", "scene"), np.full((5, 2), 0.15)),
+            "phase_largest": (("integrator", "scene"), [[size] * 2 for size in sizes.values()]),
+        },
+        coords={"integrator": list(exponents), "scene": ["spheroid", "goldstein"]},
+    )
+    steady, faster, unclear, rounded = words.phase_growth(data)
+    assert steady == "The phase error grows as t with strang."
+    assert "rk4 (t^2.09 and t^1.90, to 1 rad), taylor (t^1.94 and t^2.03, to 7e-10 rad)." in faster
+    assert "mixed" in unclear
+    assert "below 1e-09 rad rounding" in rounded.lower()
+    assert "exact" not in f"{steady} {faster} {unclear}"
+
+
+def test_the_same_run_has_one_behaviour_in_every_study():
+    """kahan-li-6 changes the energy by 9e-13 of the spin's and has an exponent of 0: an error of the step, bounded."""
+    for size, exponent, interval in ((9e-12, 0.0, 0.001), (1e-15, 0.9, 0.1), (1e-4, 1.0, 0.1), (1e-4, 0.0, 0.01)):
+        measured = {"energy_largest": size, "energy_exponent": exponent, "energy_exponent_interval": interval}
+        columns = {"outcome": ("scene", ["ok"]), **{name: ("scene", [value]) for name, value in measured.items()}}
+        cell = xr.Dataset(columns, coords={"scene": ["spheroid"]})
+        grain = symtop.scene("spheroid").energy_grain
+        changed = conservation.Changed(size, 0.0, 1.0, 0.0, exponent, interval, "")
+        ledger = Constant(changed, 0.0, KEPT * grain, grain)
+        assert tables.worst_behaviour(cell, "energy") == ledger.kind
+
+
+def test_an_energy_error_that_no_sample_sees_is_below_rounding_and_no_ratio_of_a_floor():
+    part = xr.Dataset(
+        {stability_words.Column.ENERGY_ONCE: ("integrator", [0.0, 5e-9]),
+         stability_words.Column.ENERGY_EVERY: ("integrator", [4.2e-8, 2.5e-4])},
+        coords={"integrator": ["yoshida-4", "stormer-verlet"]},
+    )  # fmt: skip
+    sentence = stability_words.sampling(part)
+    assert "of yoshida-4 (4e-08) is below rounding" in sentence
+    assert "up to 5e+04 times too small (stormer-verlet)" in sentence
+    assert "e+08" not in sentence
 
 
 @pytest.mark.parametrize(("power", "says"), [(0.45, "(agrees with"), (0.8, "(does not agree with")])
 def test_a_walk_of_rounding_is_held_against_one_half(power, says):
-    cell = xr.Dataset({"exponent": power, "exponent_interval": 0.06, "end": 1e-15, "gain": 100.0})
+    cell = xr.Dataset({"exponent": power, "exponent_interval": 0.06, "late": 1e-15, "plain_late": 1e-13})
     sentence = words.walk("strang", cell)
     assert f"strang drifts as n^{power:.2f} +- 0.06 {says}" in sentence
-    assert "100 times less" in sentence
+    assert "1.0e-15, and 1.0e-13 from the same starts with plain sums, 100 times more" in sentence
 
 
 def test_the_shift_of_the_mean_energy_is_relative_to_its_band():

@@ -1,0 +1,114 @@
+"""The convergence study: rows are methods in charts, adaptive methods stand beside them, verdicts follow one rule."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from symtop_studies.convergence import figures, study, tables, words
+
+import symtop
+from symtop.judge.claims_order import measured_order
+from symtop.judge.ledger import CLAIMS
+from symtop.measure.order import BESIDE, order_verdict
+from symtop.methods.registry import integrator, integrators, rows, split_name
+from symtop.runner import store
+from symtop.runner.study import Case
+
+ROWS = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "strang[attitude]",
+        "rk4[angles]", "rk4[axis]", "gauss-12[attitude]", "rk45[angles]", "rk45-compiled[angles]", "radau[angles]",
+        "taylor[axis]")  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def data():
+    """A small grid on one scene."""
+    chosen = [case for case in study.cases(True) if case.integrator in ROWS and case.scene == "goldstein"]
+    assert {case.integrator for case in chosen} == set(ROWS)
+    longer = [Case(case.scene, case.integrator, case.settings | {"dense": True}) for case in chosen]
+    return store.combine([(case, study.measure(case)) for case in longer])
+
+
+def test_every_chart_of_every_method_is_a_row_and_a_formula_is_none():
+    names = {case.integrator for case in study.cases(False)}
+    assert names == {row.name for row in rows() if row.control is not None}
+    assert {split_name(name)[0] for name in names} == {name for name, one in integrators().items() if one.control}
+    assert not any(split_name(name)[0] == "exact" for name in names)
+
+
+def test_every_row_shows_the_axis_and_the_attitude_where_its_chart_does(data):
+    for name in ROWS:
+        cell = data.sel(scene="goldstein", integrator=name)
+        assert np.isfinite(cell["axis"]).any()
+        assert bool(np.isfinite(cell["attitude"]).any()) is (split_name(name)[1] != "axis")
+
+
+def test_verdicts_are_those_of_the_one_rule_and_no_interval_misses_the_order(data):
+    results = tables.judged(data)
+    assert {name for _, name in results} == {name for name in ROWS if integrator(name).fixed_step}
+    for (_, name), (word, slopes) in results.items():
+        declared, main = integrator(name).order, slopes["axis"]
+        others = [fit for quantity, fit in slopes.items() if quantity != "axis"]
+        assert word == order_verdict(declared, main, others)
+        if math.isfinite(main.slope):
+            assert abs(main.slope - declared) <= main.interval + BESIDE, name
+    assert sum(word == "confirmed" for word, _ in results.values()) >= 7
+
+
+def test_a_wrong_declaration_is_refuted(data, monkeypatch):
+    monkeypatch.setattr(tables, "declared_order", lambda name: 3)
+    assert {tables.judged(data)["goldstein", name].verdict for name in ("strang[axis]", "rk4[axis]")} == {"refuted"}
+
+
+def test_rows_with_the_same_errors_are_drawn_as_one(data):
+    labels = tables.merged(tables.stepping(data), "axis")
+    assert labels["strang[axis]"] == "strang[axis, attitude]"
+    assert "strang[attitude]" not in labels
+    assert labels["rk4[angles]"] == "rk4[angles]"  # another chart, other errors
+    assert labels["rk4[axis]"] == "rk4[axis]"
+
+
+def test_adaptive_methods_are_drawn_against_their_tolerance(data):
+    fitted = tables.tolerance_fits(data)
+    assert {name for _, name in fitted} == {name for name in ROWS if integrator(name).adaptive}
+    assert fitted["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
+    (sentence,) = words.tolerance_sentence(data)
+    assert "rk45[angles]: tolerance^" in sentence
+    assert words.tolerance_sentence(tables.stepping(data)) == []
+
+
+def test_the_first_figure_shows_the_five_named_methods_on_one_axis_of_work(data):
+    drawn = figures.pictures(data)
+    assert drawn[0].name == "named-methods"
+    _, labels = drawn[0].figure.axes[0].get_legend_handles_labels()
+    assert {split_name(label)[0] for label in labels if "[" in label} == set(figures.NAMED)
+    assert drawn[-1].name == "tolerance"
+    for picture in drawn:
+        picture.figure.clear()
+
+
+def test_work_is_counted_per_nutation(data):
+    cell = data.sel(scene="goldstein", integrator="stormer-verlet[angles]")
+    work = tables.evaluations_a_nutation(cell, "goldstein")
+    period = symtop.scene("goldstein").nutation_period
+    good = np.isfinite(work)
+    assert work[good] == pytest.approx(period / cell["step_size"].values[good], rel=0.05)
+
+
+def test_the_ledger_and_the_study_say_the_same_of_an_order():
+    """An interval that holds the order confirms it in both; what is neither 5 nor clearly another is open in both."""
+    assert "order" in CLAIMS
+    radau = measured_order(integrator("radau"), symtop.scene("spheroid"), quick=True)
+    assert order_verdict(5, radau.fits[radau.observed]) != "confirmed"
+    verlet = measured_order(integrator("stormer-verlet"), symtop.scene("spheroid"), quick=True)
+    assert order_verdict(2, verlet.fits[verlet.observed], verlet.fits.values()) == "confirmed"
+
+
+def test_tables_hold_a_row_for_every_pair_and_say_what_a_chart_does_not_show(data):
+    orders, tolerances = words.tables(data)
+    assert len(orders.rows) == len(tables.judged(data))
+    by_name = {row[1]: row for row in orders.rows}
+    assert "not shown" in by_name["strang[axis]"]
+    assert "not shown" not in by_name["strang[attitude]"]
+    assert {row[1] for row in tolerances.rows} == {name for name in ROWS if integrator(name).adaptive}
+    assert isinstance(data, xr.Dataset)
