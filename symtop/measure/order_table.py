@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.accuracy import error_table
+from symtop.measure.extended import extended_errors, extended_order_data
 from symtop.measure.order import Fit, order
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
@@ -48,20 +49,32 @@ def order_table(
         return table
     steps = asymptotic_steps(table, quantity, method.order or 2)
     more = error_table(scene, method, steps, horizon, observe=quantity) if steps else None
-    return table if more is None else xr.concat([table, more], "setting")
+    table = table if more is None else xr.concat([table, more], "setting")
+    if math.isfinite(order_fit(scene, method, table, quantity, horizon).slope):
+        return table
+    extended = extended_errors(scene, method)
+    return table if extended is None else table.merge(extended)
 
 
 def order_fit(scene: Scene, method: Integrator, table: xr.Dataset, quantity: str, horizon: float) -> Fit:
     """The order in one quantity of an error table, against the step, or the mean step of an adaptive method.
 
     A method of high order makes few steps a nutation, and the largest error at so few times scatters. Where
-    it cannot be judged, the error at the end is, which is smooth in h.
+    it cannot be judged, the error at the end is, which is smooth in h; and for axis and attitude, last, that of a run
+    in long double, whose steps are not among those of the table.
     """
     largest = _fit(scene, method, table, quantity, horizon)
     if math.isfinite(largest.slope) or f"{quantity}_end" not in table:
         return largest
     end = _fit(scene, method, table, f"{quantity}_end", horizon)
-    return end if math.isfinite(end.slope) else largest
+    if math.isfinite(end.slope) or quantity not in ("axis", "attitude"):
+        return end if math.isfinite(end.slope) else largest
+    extended = extended_order_data(table)
+    if extended is None:
+        return largest
+    omega = 2.0 * math.pi / scene.nutation_period
+    fit = order(*extended, omega, method.order, symmetric=method.symmetric)
+    return fit._replace(used=np.zeros_like(largest.used)) if math.isfinite(fit.slope) else largest
 
 
 def _fit(scene: Scene, method: Integrator, table: xr.Dataset, quantity: str, horizon: float) -> Fit:

@@ -7,7 +7,8 @@ import symtop
 from symtop.base.numbers import EPSILON
 from symtop.measure.accuracy import SAMPLES, enough_samples, error_table
 from symtop.measure.errors import attitude_error, error_bound, errors_against
-from symtop.measure.order import LARGEST_ERROR
+from symtop.measure.extended import extended_errors, extended_order_data
+from symtop.measure.order import LARGEST_ERROR, order
 from symtop.measure.order_table import asymptotic_steps
 from symtop.methods.registry import integrator
 from symtop.model.scenes import scene
@@ -84,3 +85,25 @@ def test_added_steps_lie_where_the_error_is_a_power_of_the_step():
     assert judged(table) >= 10 > judged(coarse)
     nothing = coarse.assign(attitude=coarse["attitude_bound"])
     assert asymptotic_steps(nothing, "attitude", 10) == []
+
+
+@pytest.mark.skipif(not have_heyoka(), reason="long double needs heyoka")
+@pytest.mark.skipif(np.finfo(np.longdouble).eps == np.finfo(float).eps, reason="long double is double here")
+def test_a_composition_in_long_double_has_its_order_where_double_runs_out():
+    """Order 10 falls from 1e-10 to 1e-17: in double only the first decades of it are above round-off."""
+    where = scene("goldstein")
+    data = extended_errors(where, integrator("sofroniou-spaletta-10"))
+    error = data["extended_error"].values
+    assert error.min() < 1e-17 < EPSILON < 1e-11 < error.max()
+    omega = 2.0 * np.pi / where.nutation_period
+    fit = order(*extended_order_data(data), omega, 10, symmetric=True)
+    assert abs(fit.slope - 10.0) <= fit.interval < 0.15
+    kept = error > 1e-13  # what double can judge
+    double = order(*(values[kept] for values in extended_order_data(data)), omega, 10, symmetric=True)
+    assert not double.interval < 0.15  # NaN, or wide
+
+
+def test_only_plain_compositions_are_run_in_long_double():
+    where = scene("goldstein")
+    for name in ("takahashi-imada", "cayley", "gauss-4", "stormer-verlet", "rk4", "rk45"):
+        assert extended_errors(where, integrator(name)) is None
