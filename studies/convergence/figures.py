@@ -129,7 +129,8 @@ def _by_step(data: xr.Dataset, quantity: str, power: int) -> Picture:
     caption = (
         f"Largest {quantity} error {HORIZON} against the step, {title}, every chart of each; charts of a method with "
         "the same errors share a line. Large points enter the fit; small ones are too large, too far from the series "
-        "in h, or within ten times round-off or the error bound of the reference (grey band). "
+        "in h, or within ten times round-off or the error bound of the reference (grey band). A line without large "
+        "points is judged by its errors at the end, or by a run in long double, or not at all: see the table. "
         f"{spans(fitted)}"
     )
     alt = f"Log-log plots of {quantity} error against step size, {title}, with the slope {power} as a guide."
