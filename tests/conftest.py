@@ -1,5 +1,6 @@
 """Shared fixtures: a cache of the tests' own, random tops, and the 30-digit states."""
 
+import contextlib
 import json
 import math
 import os
@@ -7,9 +8,11 @@ import random
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 os.environ.setdefault("SYMTOP_CACHE", str(Path(__file__).resolve().parent.parent / ".pytest_cache" / "symtop"))
 
+from symtop.cli.main import main
 from symtop.methods import registry
 from symtop.model import scenes
 from symtop.model.scenes import Scene
@@ -19,9 +22,17 @@ from symtop.runner import plugins, scripts
 scripts.install()  # tests import `symtop_studies`
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _registered_for_one_file():
-    """Forget the integrators, scenes and plug-ins that a file of tests registered, so that files run in any order."""
+PLUGIN = """\
+import symtop
+
+symtop.register(symtop.discrete_lagrangian("simpson-of-a-user", (0, 0.5, 1), (1 / 6, 2 / 3, 1 / 6), order=2))
+top, start = symtop.SymmetricTop(1.5, 1.0, 3.0), symtop.Angles(theta=1.0, psi_dot=4.0)
+symtop.register_scene(symtop.Scene("mine", top, start, horizon=6.0))
+"""
+
+
+@contextlib.contextmanager
+def _registered_for_a_while():
     registry.integrators()  # the built-in ones are registered first
     stores = (registry._registry, scenes._added, plugins._loaded, plugins._owners)
     before = [store.copy() for store in stores]
@@ -29,6 +40,27 @@ def _registered_for_one_file():
     for store, entries in zip(stores, before, strict=True):
         store.clear()
         store.update(entries)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _registered_for_one_file():
+    """Forget the integrators, scenes and plug-ins that a file of tests registered, so that files run in any order."""
+    with _registered_for_a_while():
+        yield
+
+
+@pytest.fixture(scope="session")
+def quick_results(tmp_path_factory) -> Path:
+    """Results of every study, quickly, with `plugin.py` beside them: four lines that add a method and a scene."""
+    folder = tmp_path_factory.mktemp("results")
+    plugin = folder / "plugin.py"
+    plugin.write_text(PLUGIN)
+    with _registered_for_a_while():
+        done = CliRunner().invoke(
+            main, ["study", "--all", "--quick", "--results", str(folder), "--plugin", str(plugin)]
+        )
+    assert done.exit_code == 0, done.output
+    return folder / "quick"
 
 
 @pytest.fixture(scope="session")

@@ -9,22 +9,23 @@ from matplotlib.ticker import NullFormatter
 
 from symtop.measure.conservation import CONSTANTS
 from symtop.measure.growth import ROUNDED, tops
+from symtop.methods.registry import split_name
 from symtop.report.style import BLACK, GREY, legend_below, look, panels, slope_guide
 from symtop.run.long_run import PER_NUTATION
 from symtop.runner.study import Picture
 
-from . import words
+from . import rows, words
 from .phase_loss import LOST
 from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS, by_integrator, losses
 
-SHOWN = ("midpoint", "trapezoidal", "stormer-verlet", "strang", "gauss-4", "rk4", "rk45", "taylor")
+SHOWN = ("midpoint", "trapezoidal", "stormer-verlet", "strang", "gauss-4", "rk4", "rk45", "taylor")  # methods
 LABELS = {
     "energy": "energy", "modified_energy": "modified energy", "p_phi": r"$p_\varphi$", "p_psi": r"$p_\psi$",
     "phase": "phase",
 }  # fmt: skip
 BANDS = ("energy", "modified_energy", "p_phi", "p_psi")
 LAWS = (0.0, 0.5, 1.0, 2.0)  # exponents that are drawn as lines
-FACES = ("full", "none", "left", "right")  # of a marker, by scene
+SIZES = (7.0, 4.0, 5.5, 3.0)  # of a marker, by scene
 SMALLEST = 1e-17  # what is smaller is drawn here
 
 
@@ -41,8 +42,9 @@ def envelope(t: np.ndarray, r: np.ndarray) -> tuple[list[float], list[float]]:
 
 
 def _residuals(histories: xr.Dataset) -> Picture:
-    names = [name for name in histories["integrator"].values if str(name) in SHOWN]
-    data = histories.sel(integrator=names or histories["integrator"].values)
+    small = without_repeats(histories)
+    names = [name for name in small["integrator"].values if split_name(str(name))[0] in SHOWN]
+    data = small.sel(integrator=names) if names else small
     figure, axes = panels(len(CONSTANTS), data.sizes["scene"], height=2.7, sharex="col", sharey="row")
     for line, constant in zip(axes, CONSTANTS, strict=True):
         for axis, scene in zip(line, data["scene"].values, strict=True):
@@ -54,31 +56,39 @@ def _residuals(histories: xr.Dataset) -> Picture:
                     t, r = t[good], np.maximum(r[good], SMALLEST)
                     axis.plot(t, r, ",", color=style.color, alpha=0.5, zorder=2)
                     axis.plot(*envelope(t, r), style.marker + "-", color=style.color, ms=0.8 * style.size,
-                              label=str(name), zorder=3)  # fmt: skip
+                              fillstyle=style.fill, label=str(name), zorder=3)  # fmt: skip
             axis.set(xscale="log", yscale="log")
         line[0].set_ylabel(f"|residual {LABELS[constant]}| (relative)")
     for axis, scene in zip(axes[0], data["scene"].values, strict=True):
         axis.set_title(scene)
         first, last = axis.get_xlim()
         axis.autoscale(enable=False)
-        slope_guide(axis, 1.0, (first * 2.0, last / 2.0), 1e-8, "$t$")
+        slope_guide(axis, 1.0, (first * 6.0, last / 2.0), 1e-8, "$t$")
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
     legend_below(figure, axes)
     caption = (
         "Change of energy since the start relative to E0 - min V, the energy of the nutation, and of both momenta "
         "relative to the larger one: samples as dots, the largest of each time window as a line with markers, at 1e-17 "
-        "if smaller; the dashed line rises as t. On every scene the energy error is at rounding or bounded (growth "
-        f"exponent nearest to 0, 95 % interval below 1/2) for {words.holding(data)}. Bounded is the energy, not the "
-        f"error of the motion. {' '.join(words.phase_growth(data))} The momenta are recomputed from the increments of "
-        f"the trajectory. {words.shortened(data)}"
+        "if smaller; open markers: rows in angles; the dashed line rises as t. "
+        f"{rows.setting(data)} {rows.charts_apart(data)} On every scene the energy error is at rounding or bounded "
+        f"(growth exponent nearest to 0, 95 % interval below 1/2) for {words.holding(data)}. Bounded is the energy, "
+        f"not the error of the motion. {' '.join(words.phase_growth(data))} The momenta are recomputed from the "
+        f"increments of the trajectory. {words.shortened(data)}"
     )
     alt = "Log-log plots of residuals over time: level for the discrete methods, rising for adaptive Runge-Kutta."
     return Picture("residuals", figure, caption.rstrip(), alt)
 
 
+def without_repeats(histories: xr.Dataset) -> xr.Dataset:
+    """The rows that are drawn: no attitude chart beside an axis chart, whose numbers it repeats."""
+    names = list(map(str, histories["integrator"].values))
+    repeats = {name.replace("[axis]", "[attitude]") for name in names if name.endswith("[axis]")}
+    return histories.sel(integrator=[name for name in names if name not in repeats])
+
+
 def dots(data: xr.Dataset, columns: dict[str, str], *, log: bool) -> Any:
-    """One row an integrator, one column a variable with its label, one dot a scene: large tables at a glance.
+    """One line a row ``method[chart]``, one column a variable with its label, one dot a scene: tables at a glance.
 
     On a logarithmic axis zeros are drawn at `SMALLEST`. A variable ``NAME`` with a companion ``NAME_interval`` gets a
     bar.
@@ -87,14 +97,14 @@ def dots(data: xr.Dataset, columns: dict[str, str], *, log: bool) -> Any:
     figure, axes = panels(1, len(columns), height=0.9 + 0.2 * len(names), sharey=True)
     shift = np.linspace(-0.22, 0.22, len(scenes)) if len(scenes) > 1 else np.zeros(1)
     for axis, (variable, label) in zip(axes[0], columns.items(), strict=True):
-        for scene, offset, face in zip(scenes, shift, FACES * 3, strict=False):
-            axis.plot([], [], "o", fillstyle=face, color=GREY, label=scene)
+        for scene, offset, size in zip(scenes, shift, SIZES * 3, strict=False):
+            axis.plot([], [], "o", color=GREY, ms=size, label=scene)
             for row, name in enumerate(names):
                 cell, style = data.sel(scene=scene, integrator=name), look(name)
                 value, bar = float(cell[variable]), float(cell.get(f"{variable}_interval", 0.0))
                 if np.isfinite(value):
                     axis.errorbar(max(value, SMALLEST) if log else value, row + offset, xerr=bar, fmt=style.marker,
-                                  fillstyle=face, color=style.color, ms=5, elinewidth=0.8)  # fmt: skip
+                                  fillstyle=style.fill, color=style.color, ms=size, elinewidth=0.8)  # fmt: skip
         axis.set(xlabel=label, yticks=range(len(names)), yticklabels=names, ylim=(len(names) - 0.5, -0.5))
         axis.set_xscale("log" if log else "linear")
     legend_below(figure, axes)
@@ -102,13 +112,14 @@ def dots(data: xr.Dataset, columns: dict[str, str], *, log: bool) -> Any:
 
 
 def _sizes(histories: xr.Dataset) -> Picture:
-    figure = dots(histories, {f"{name}_largest": f"largest residual {LABELS[name]}" for name in CONSTANTS}, log=True)
+    data = without_repeats(histories)
+    figure = dots(data, {f"{name}_largest": f"largest residual {LABELS[name]}" for name in CONSTANTS}, log=True)
     caption = (
-        "Largest relative residual of every method over the whole run, energies relative to E0 - min V; an exact zero "
-        f"is drawn at 1e-17. A million steps of rounding explain changes up to {ROUNDED:.0e} of a momentum or of |E|: "
-        "what a method conserves lies below. What it does not conserve shows the truncation error of a step, or, "
-        "farthest to the right, a drift. "
-        f"{words.shortened(histories)}"
+        "Largest relative residual of every row over the whole run, energies relative to E0 - min V; an exact zero "
+        f"is drawn at 1e-17. {rows.setting(data)} {rows.charts_apart(data)} A million steps of rounding explain "
+        f"changes up to {ROUNDED:.0e} of a momentum or of |E|: what a method conserves lies below. What it does not "
+        "conserve shows the truncation error of a step, or, farthest to the right, a drift. "
+        f"{words.shortened(data)}"
     )
     alt = "Dot plot of the largest residuals of energy and momenta for every integrator."
     return Picture("sizes", figure, caption.rstrip(), alt)
@@ -116,7 +127,8 @@ def _sizes(histories: xr.Dataset) -> Picture:
 
 def _exponents(histories: xr.Dataset) -> Picture:
     columns = {f"{name}_exponent": f"exponent of {LABELS[name]}" for name in (*CONSTANTS, "phase")}
-    figure = dots(histories, columns, log=False)
+    data = without_repeats(histories)
+    figure = dots(data, columns, log=False)
     for axis in figure.axes:
         axis.set(xlim=(-0.35, 2.5), xticks=(0.0, 0.5, 1.0, 1.5, 2.0))
         for law in LAWS:
@@ -125,7 +137,7 @@ def _exponents(histories: xr.Dataset) -> Picture:
         "Growth exponents of the largest residual of energy and momenta, over the last two decades of time, and of the "
         "phase error of the nutation, over the last one, with 95 % intervals. 0 is a bounded error, 1/2 the random "
         "walk of rounding, 1 a steady drift, 2 the phase error under a drifting energy. "
-        f"{words.quoted(histories)} {words.shortened(histories)}"
+        f"{rows.setting(data)} {words.quoted(data)} {words.shortened(data)}"
     )
     alt = "Dot plots of the growth exponents of energy, momenta and phase for every integrator."
     return Picture("exponents", figure, caption.rstrip(), alt)
@@ -148,7 +160,8 @@ def _windows(data: xr.Dataset) -> Picture:
         axis.set_xlabel("steps")
     momenta = [np.abs(data[f"{name}_{part}"]).max() for name in ("p_phi", "p_psi") for part in ("least", "largest")]
     caption = (
-        f"{float(data['steps'].max()):.0e} steps on {data['scene'].values[0]}, {PER_NUTATION:.0f} a nutation: the band "
+        f"{float(data['steps'].max()):.0e} steps of rows in angles and in the axis chart on {data['scene'].values[0]}, "
+        f"all with {PER_NUTATION:.0f} steps a nutation: the band "
         "reaches from the least to the largest relative change in each window, the line is its mean. The modified "
         "energy is the energy with the h^2 term of the discrete motion, less the oscillation of order h^4 that "
         f"remains. From the first window to the last {words.moved(data)} The momenta, recomputed inside the "
@@ -167,8 +180,9 @@ def _rounding(data: xr.Dataset) -> Picture:
         for drift in ensemble["drift"].values:
             axis.plot(steps, np.abs(drift), color=style.color, lw=0.5, alpha=0.45)
         axis.plot(
-            steps, ensemble["rms"], style.marker + "-", color=style.color, ms=4, label=f"{name}, compensated sums"
-        )
+            steps, ensemble["rms"], style.marker + "-", color=style.color, ms=4, fillstyle=style.fill,
+            label=f"{name}, compensated sums",
+        )  # fmt: skip
         axis.plot(steps, ensemble["plain_rms"], "x--", color=BLACK, ms=4, lw=1.0, label="plain sums")
         axis.set(xscale="log", yscale="log", title=name, xlabel="steps between the means")
         axis.xaxis.set_minor_formatter(NullFormatter())
@@ -177,8 +191,10 @@ def _rounding(data: xr.Dataset) -> Picture:
     axes[0, 0].set_ylabel("drift of modified energy (relative)")
     legend_below(figure, axes)
     caption = (
-        "Drift of the modified energy by rounding: each start as a thin line, their root mean square with markers, and "
-        "dashed that of the same kernels with plain sums. "
+        f"Drift of the modified energy by rounding near {data['scene'].values[0]}, {PER_NUTATION:.0f} steps a "
+        f"nutation, over {float(data['elapsed'].max()):.0e} steps: each of {data.sizes['member']} starts "
+        "as a thin line, their root mean square with markers, and dashed that of the first "
+        f"{data.sizes['plain_member']} with the same kernels and plain sums; the chart is in the row's name. "
         f"{' '.join(words.walk(name, ensemble) for name, ensemble in ensembles.items())}"
     )
     alt = "Log-log plots of the drift by rounding against steps for each method, with compensated and plain sums."
@@ -194,8 +210,8 @@ def _horizons(data: xr.Dataset) -> Picture:
         good = np.isfinite(nutations) & np.isfinite(error) & (nutations > 0.0) & (error > 0.0)
         left.plot(*envelope(nutations[good], error[good]), color=style.color, lw=0.9, alpha=0.8)
         left.plot(loss["predicted"], LOST, "o", mfc="none", color=style.color, ms=9)
-        left.plot(loss["measured"], LOST, style.marker, color=style.color, ms=4)
-        right.plot(1e2 * (loss["ratio"] - 1.0), row, style.marker, color=style.color, ms=6)
+        left.plot(loss["measured"], LOST, style.marker, color=style.color, ms=4, fillstyle=style.fill)
+        right.plot(1e2 * (loss["ratio"] - 1.0), row, style.marker, color=style.color, ms=6, fillstyle=style.fill)
     left.axhline(LOST, color=GREY, lw=0.8)
     left.axvspan(0.0, float(data["short"].min()), color=GREY, alpha=0.15, lw=0)
     left.set(xscale="log", yscale="log", xlabel="nutations", ylabel="phase error of the nutation (rad)")
@@ -207,7 +223,8 @@ def _horizons(data: xr.Dataset) -> Picture:
     right.set_xlabel("predicted less measured time (%)")
     legend_below(figure, axes)
     caption = (
-        "Phase error of the nutation of every fixed-step method, each with a step of its own. The time at which it "
+        f"Phase error of the nutation of {data['scene'].values[0]}, every fixed-step row (method[chart]) with a step "
+        "of its own, in the table below, so that all lose their phase at the same time. The time at which it "
         f"reaches {LOST:g} rad (line) is predicted from the grey part and then measured. {words.predictions(lost)}"
     )
     alt = (

@@ -4,14 +4,14 @@ import math
 
 import xarray as xr
 
-from symtop.measure.conservation import history
-from symtop.methods.registry import Integrator, integrator, integrators
+from symtop.methods.registry import Integrator, integrator
 from symtop.model.scenes import Scene, scene
 from symtop.run.long_run import PER_NUTATION
-from symtop.runner.grid import grid_scenes
+from symtop.runner.grid import grid_rows, grid_scenes
 from symtop.runner.study import Case, Study
 
 from . import figures, words
+from .histories import run_history
 from .long_runs import rounding, windows
 from .phase_loss import SHORT, TARGET, phase_loss
 from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS
@@ -26,13 +26,19 @@ LEFT_OUT = {  # a million steps of every method take minutes on each scene
     "unstable or nearly so: errors grow with the motion": ("sleeping", "sleeping-unstable", "separatrix"),
 }
 STEPS_A_NUTATION = 118.02  # not commensurate with the nutation
-TOLERANCES = {"rk45": 1e-8, "rk45-compiled": 1e-8}  # 1e-6 for the others
-SHORTENED = {"rk45": 0.2, "radau": 0.02, "taylor-quad": 0.005}  # share of the horizon: they take minutes otherwise
-MEASURES = {HISTORIES: history, WINDOWS: windows, ROUNDINGS: rounding, HORIZONS: phase_loss}
+TOLERANCE = 1e-8  # of every adaptive method without a default of its own
+SHORTENED = {  # share of the horizon: over all of it they take between 15 s (lsoda) and 8 minutes (radau) on each scene
+    "rk45": 0.2, "dop853": 0.2, "lsoda": 0.2, "radau": 0.02, "taylor-quad": 0.005,
+}  # fmt: skip
+MEASURES = {HISTORIES: run_history, WINDOWS: windows, ROUNDINGS: rounding, HORIZONS: phase_loss}
 
 
 def cases(quick: bool) -> list[Case]:
-    """A million steps of every fixed-step method (adaptive ones: the same horizon); losses of phase; long runs."""
+    """A million steps of every fixed-step row (adaptive ones: the same horizon); losses of phase; long runs.
+
+    Histories are run in every chart, on every scene: a million compiled steps take 0.03 to 1 s. Losses of phase, which
+    take up to a minute, leave out an attitude chart beside an axis chart.
+    """
     return grid(20_000, 2, 100_000, 200_000, 0.1) if quick else grid(1_000_000, 24, 10_000_000, 100_000_000, 1.0)
 
 
@@ -46,24 +52,29 @@ def grid(steps: int, members: int, walk: int, longest: int, share: float) -> lis
     long_run = {"steps": longest, "per_nutation": PER_NUTATION}
     ensemble = {"steps": walk, "per_nutation": PER_NUTATION, "count": members}
     loss = {"short": share * SHORT, "target": share * TARGET}
-    methods = integrators().values()
+    rows = grid_rows("nutation")
     return [
-        *(Case(name, method.name, history_settings(scene(name), method, steps), group=HISTORIES)
-          for name in grid_scenes(LEFT_OUT, lambda one: math.isfinite(one.nutation_period)) for method in methods),
-        *(Case(LONG, method.name, settings, group=group) for method in methods if method.modified_energy
+        *(Case(name, row.name, history_settings(scene(name), row, steps), group=HISTORIES)
+          for name in grid_scenes(LEFT_OUT, lambda one: math.isfinite(one.nutation_period))
+          for row in grid_rows("nutation", attitude=True)),
+        *(Case(LONG, row.name, settings, group=group) for row in rows if row.modified_energy
           for group, settings in ((WINDOWS, long_run), (ROUNDINGS, ensemble))),
-        *(Case(LONG, method.name, loss, group=HORIZONS) for method in methods if method.fixed_step),
+        *(Case(LONG, row.name, loss, group=HORIZONS) for row in rows if row.fixed_step),
     ]  # fmt: skip
 
 
 def history_settings(on: Scene, method: Integrator, steps: int) -> dict[str, float]:
-    """So many steps of a fixed-step method, or the same horizon at a tolerance."""
+    """So many steps of a fixed-step method, or the same horizon at a tolerance.
+
+    A Taylor method has a default tolerance, the rounding of its arithmetic, and keeps it: its order grows as the
+    tolerance falls, so that a looser one is another method and not the same one with less work.
+    """
     horizon = steps * on.nutation_period / STEPS_A_NUTATION
-    settings = {"samples": 4001 if steps > 100_000 else 601, "horizon": horizon * SHORTENED.get(method.name, 1.0)}
+    settings = {"samples": 4001 if steps > 100_000 else 601, "horizon": horizon * SHORTENED.get(method.method, 1.0)}
     if method.fixed_step:
         return settings | {"step_size": horizon / steps}
     chooses = method.adaptive and method.default_tolerance is None
-    return settings | ({"tolerance": TOLERANCES.get(method.name, 1e-6)} if chooses else {})
+    return settings | ({"tolerance": TOLERANCE} if chooses else {})
 
 
 def measure(case: Case) -> xr.Dataset:
@@ -76,7 +87,9 @@ STUDY = Study(
     title="Drift",
     question="What happens to energy, momenta and phase over a million steps, and over 10^8?",
     how_to_read=(
-        "A level line is a bounded error, slope one a steady drift, slope one half the random walk of rounding. The "
+        "A row is a method in one chart, method[chart]: rk4[angles] and rk4[axis] take the same step and differ in "
+        "their equations only. A level line is a bounded error, slope one a steady drift, slope one half the random "
+        "walk of rounding. The "
         "discrete methods have a larger but bounded energy error and conserve the momenta to rounding; a Runge-Kutta "
         "method begins with a smaller error and loses energy and momenta in time."
     ),

@@ -1,20 +1,24 @@
 """Tables of the study, and the sentences of its captions and its verdict."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sized
 from itertools import product
 
 import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS
+from symtop.run.long_run import PER_NUTATION
 from symtop.runner.study import Table
 
 from .long_runs import PLAIN_MEMBERS
 from .phase_loss import LOST, SHORT, TARGET
+from .rows import charts_apart, setting, used
 from .tables import FAILED, HISTORIES, HORIZONS, ROUNDINGS, WINDOWS, by_integrator, losses, rounding, worst_behaviour
 
-QUOTED = ("stormer-verlet", "rk4", "rk45-compiled", "taylor")  # whose exponents the caption quotes
+QUOTED = (  # whose exponents the caption quotes
+    "stormer-verlet[angles]", "rk4[angles]", "rk4[axis]", "rk45-compiled[angles]", "taylor[axis]",
+)  # fmt: skip
 FULL_LENGTH = 0.99  # of the longest run of a scene: a shorter run is named
 SEEN_PHASE = 1e-11  # rad
 ROUNDED_PHASE = 1e-9  # rad: symplectic methods of order 8 reach 4.6e-10 in a million steps, by rounding
@@ -41,23 +45,24 @@ def tables(data: xr.DataTree) -> list[Table]:
     made = [_residual_table(groups[HISTORIES])] if HISTORIES in groups else []
     if ROUNDINGS in groups:
         title = (
-            "Rounding: drift of the modified energy of an ensemble (late: rms over the last decade of steps of the "
+            f"Rounding near {_scene(groups[ROUNDINGS])}, {PER_NUTATION:.0f} steps a nutation: drift of the modified "
+            "energy of an ensemble (late: rms over the last decade of steps of the "
             f"{PLAIN_MEMBERS} starts that ran with both sums)"
         )
         made.append(_number_table(title, by_integrator(groups[ROUNDINGS]), ROUNDING_COLUMNS, ".2g"))
     if HORIZONS in groups:
-        title = f"Nutations until the phase error reaches {LOST:g} rad"
+        title = f"Nutations until the phase error reaches {LOST:g} rad on {_scene(groups[HORIZONS])}"
         made.append(_number_table(title, losses(groups[HORIZONS]), HORIZON_COLUMNS, ".6g"))
     return made
 
 
 def _residual_table(histories: xr.Dataset) -> Table:
-    header, rows = ["scene", "integrator", "outcome"], []
+    header, rows = ["scene", "row", "step or tolerance", "nutations", "outcome"], []
     for name in CONSTANTS:
         header += [f"largest {name} residual", f"trend of {name} over the run", f"exponent, law of {name}"]
     for scene, integrator in product(histories["scene"].values, histories["integrator"].values):
         cell = histories.sel(scene=scene, integrator=integrator)
-        row = [str(scene), str(integrator), str(cell["outcome"].item())]
+        row = [str(scene), str(integrator), used(cell), f"{cell['nutations']:.4g}", str(cell["outcome"].item())]
         for name in CONSTANTS:
             doubt = cell[f"{name}_interval"] * cell["sample_time"].max()  # 95 %, of the rise over the whole run
             trend = f"{_number(cell[f'{name}_rise'])} +- {_number(doubt)}"
@@ -69,7 +74,11 @@ def _residual_table(histories: xr.Dataset) -> Table:
 
 def _number_table(title: str, runs: Mapping[str, xr.Dataset], columns: Mapping[str, str], form: str) -> Table:
     rows = [[name, *(format(cell[column], form) for column in columns.values())] for name, cell in runs.items()]
-    return Table(title, ["integrator", *columns], rows)
+    return Table(title, ["row", *columns], rows)
+
+
+def _scene(group: xr.Dataset) -> str:
+    return str(group["scene"].values[0])
 
 
 def _number(value: xr.DataArray) -> str:
@@ -151,7 +160,7 @@ def quoted(histories: xr.Dataset) -> str:
 
 
 def shortened(histories: xr.Dataset) -> str:
-    """Which integrators ran over a part of the horizon only, with its share of the longest run; empty if none did."""
+    """Which rows ran over a part of the horizon only, with its share of the longest run; empty if none did."""
     ends = histories["sample_time"].max("sample")
     shares = (ends / ends.max("integrator")).min("scene").to_series()
     shares = shares[shares < FULL_LENGTH].sort_values(ascending=False, kind="stable")
@@ -194,7 +203,7 @@ def predictions(runs: Mapping[str, xr.Dataset]) -> str:
         f"{np.median(times or math.nan):.2g})."
     )
     if hits:
-        text += f" The prediction is right to {max(hits):.2g} % for {len(hits)} of {len(off)} methods."
+        text += f" The prediction is right to {max(hits):.2g} % for {len(hits)} of {len(off)} rows."
     return text + (f" Off by more than {CLOSE:.0%}: {', '.join(missed)}." if missed else "")
 
 
@@ -209,15 +218,23 @@ def verdict(data: xr.DataTree) -> list[str]:
         sentences = [sentence for name in CONSTANTS for sentence in _constant_sentences(groups[HISTORIES], name)]
         sentences += phase_growth(groups[HISTORIES])
         part = shortened(groups[HISTORIES])
+        sentences = list(filter(None, [setting(groups[HISTORIES]), *sentences, charts_apart(groups[HISTORIES])]))
     if WINDOWS in groups:
         steps, names = float(groups[WINDOWS]["steps"].max()), groups[WINDOWS]["integrator"].values
-        sentences.append(f"Over {steps:.0e} steps of {', '.join(names)} {moved(groups[WINDOWS])}")
+        of = f"{', '.join(names)}, {PER_NUTATION:.0f} a nutation of {_scene(groups[WINDOWS])},"
+        sentences.append(f"Over {steps:.0e} steps of {of} {moved(groups[WINDOWS])}")
     if ROUNDINGS in groups:
         sentences += [f"Rounding: {walk(name, cell)}" for name, cell in by_integrator(groups[ROUNDINGS]).items()]
     if HORIZONS in groups:
         predicted = predictions(losses(groups[HORIZONS]))
-        sentences.append(f"Time until the phase error reaches {LOST:g} rad: {predicted}")
+        on = _scene(groups[HORIZONS])
+        sentences.append(f"Time until the phase error reaches {LOST:g} rad on {on}: {predicted}")
     return [*sentences, part] if part else sentences
+
+
+def counted(rows: Sized) -> str:
+    """How many rows, in words."""
+    return f"{len(rows)} row{'' if len(rows) == 1 else 's'}"
 
 
 def _constant_sentences(histories: xr.Dataset, name: str) -> list[str]:
@@ -228,11 +245,11 @@ def _constant_sentences(histories: xr.Dataset, name: str) -> list[str]:
         groups.setdefault(worst_behaviour(cell, name), []).append((worst, str(integrator), rate))
     sentences = []
     if kept := groups.get("kept"):
-        sentences.append(f"{name} stays at rounding with {len(kept)} methods (at most {max(kept)[0]:.1e}).")
+        sentences.append(f"{name} stays at rounding with {counted(kept)} (at most {max(kept)[0]:.1e}).")
     if held := groups.get("bounded"):
         (least, best, _), (most, last, _) = min(held), max(held)
         span = f"from {least:.1e} ({best}) to {most:.1e} ({last})" if len(held) > 1 else f"{most:.1e} ({last})"
-        sentences.append(f"{name} has a bounded error with {len(held)} methods, {span}.")
+        sentences.append(f"{name} has a bounded error with {counted(held)}, {span}.")
     for word, verb in LOSING.items():
         if lost := groups.get(word):
             listed = ", ".join(f"{one} (to {worst:.1e}, as t^{rate:.2f})" for worst, one, rate in sorted(lost))

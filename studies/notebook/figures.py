@@ -14,17 +14,18 @@ from symtop.report.figures import largest_so_far
 from symtop.runner.study import Picture
 
 from . import solid, words
-from .tables import ALPHA, FILMED, MODIFIED, SOLVER, STEPS_A_NUTATION, Column
+from .long_energy import better_from
+from .tables import ALPHA, FILMED, MIDPOINT, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION, Column
 
 PARTS = {"spheroid": "first part", "goldstein": "second part"}  # of the notebook
-NAMED = (SOLVER, "midpoint", "trapezoidal", "stormer-verlet", "strang", "cayley")  # the others are thin grey lines
+NAMED = (SOLVER, *words.ORDER_TWO, "strang[axis]", "cayley[axis]")  # the others are thin grey lines
 LABELS = {"energy": "energy (J)", "p_phi": r"$p_\varphi$ (J s)", "p_psi": r"$p_\psi$ (J s)"}
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
     """All figures, in the notebook's order."""
-    drawn = [draw_motion(data), draw_derivations(data), draw_residuals(data), draw_spheres(data)]
-    return [*drawn, draw_film(data), draw_alpha(data), draw_modified_energy(data)]
+    drawn = [draw_motion(data), draw_derivations(data), draw_residuals(data), draw_hope(data)]
+    return [*drawn, draw_spheres(data), draw_film(data), draw_alpha(data), draw_modified_energy(data)]
 
 
 def draw_motion(data: xr.Dataset) -> Picture:
@@ -46,7 +47,8 @@ def draw_motion(data: xr.Dataset) -> Picture:
         "motion",
         figure,
         "Inclination theta and its rate in the first scene. Reproduced, left: the notebook's plot, by an LSODA solver "
-        f"on its six variables. Right: theta differs from the closed form by at most {gap:.0e} rad.",
+        f"on its six variables (angles and rates) at tolerance {SOLVER_TOLERANCE:g}, scene spheroid to t = "
+        f"{time[-1]:g}. Right: theta differs from the closed form by at most {gap:.0e} rad.",
         "Left, theta and its rate against time, a nutation between 23 and 99 degrees; right, their differences from "
         "the closed form, growing with time.",
     )
@@ -70,7 +72,8 @@ def draw_derivations(data: xr.Dataset) -> Picture:
     return Picture(
         "two-ways",
         figure,
-        "The notebook's two derivations. Reproduced: the hard way (three equations of second order) and the easy way "
+        "The notebook's two derivations, both in angles, over its own horizons on both scenes. Reproduced: the "
+        "hard way (three equations of second order) and the easy way "
         "(two of first order, one of second), both integrated at tolerance 1e-13, agree to "
         f"{float(data[Column.DERIVATIONS_GAP].max()):.0e} rad. Corrected: its two energies are not the same constant. "
         "The second scene's E1 leaves out the spin, E1 = E - p_psi^2/2 I3, and with it they agree to "
@@ -101,10 +104,12 @@ def draw_residuals(data: xr.Dataset) -> Picture:
     return Picture(
         "residuals",
         figure,
-        f"Energy and both momenta. Left: the solver's residuals. {words.MATCHED} Corrected: the notebook takes the "
+        f"Energy and both momenta on spheroid and goldstein. Left: the solver's residuals. {words.MATCHED} Corrected: "
+        "the notebook takes the "
         "mean of its momenta over a table with a single entry, so that its residuals of momenta count from the start. "
-        f"Right: the solver beside every discrete Lagrangian and splitting at {STEPS_A_NUTATION:.0f} steps a nutation, "
-        f"six of them named; the momenta of all discrete methods stay within {largest:.0e}.",
+        f"Right: {SOLVER} beside every discrete Lagrangian (in angles) and splitting (in angles or the axis chart) at "
+        f"{STEPS_A_NUTATION:.0f} steps a nutation, over the notebook's horizons, {len(NAMED) - 1} of "
+        f"them named; the momenta of all discrete methods stay within {largest:.0e}.",
         "Left, residuals of the library solver; right, on logarithmic scales, momenta of the discrete methods at "
         "rounding and their bounded energy errors, below or above the solver's.",
     )
@@ -115,8 +120,42 @@ def _residual_line(axis: Any, run: xr.Dataset, constant: str) -> None:
     good = np.isfinite(values)
     time, values = run[Column.SAMPLE_TIME].values[good][1:], values[good][1:]  # all are zero at the start
     look, grey = style.look(method), {"color": "#BBBBBB", "lw": 0.7, "zorder": 2, "label": "other discrete methods"}
-    bold = {"color": look.color, "lw": 1.6, "ms": 0.6 * look.size, "markevery": 0.12, "zorder": 3, "label": method}
+    bold = {
+        "color": look.color,
+        "lw": 1.6,
+        "ms": 0.6 * look.size,
+        "markevery": 0.12,
+        "zorder": 3,
+        "label": method,
+        "fillstyle": look.fill,
+    }
     axis.plot(time, values, look.marker + "-", **bold) if method in NAMED else axis.plot(time, values, **grey)
+
+
+def draw_hope(data: xr.Dataset) -> Picture:
+    """The largest energy error so far of the solver and of the discrete methods, far beyond the notebook's horizon."""
+    figure, axes = style.grid(2, 2, ("time (s)", "largest relative energy error so far"), height=3.6, sharey=True)
+    for axis, (name, part) in zip(axes, PARTS.items(), strict=True):
+        for method in (row for row in NAMED if row in data["integrator"].values):
+            run, look = data.sel(scene=name, integrator=method), style.look(method)
+            line = {"color": look.color, "fillstyle": look.fill, "ms": 0.7 * look.size, "markevery": 0.1}
+            axis.plot(run[Column.LONG_TIME], run[Column.LONG_ENERGY], look.marker + "-", **line, label=method)
+            since = better_from(data, name, method) if method != SOLVER else math.inf
+            if 0.0 < since < math.inf:
+                axis.axvline(since, color=look.color, lw=0.8, ls=":", zorder=1)
+        axis.set(xscale="log", yscale="log", title=f"{name} ({part})")
+        end = float(data[Column.SAMPLE_TIME].sel(scene=name).max())
+        axis.axvline(end, color=style.GREY, lw=1.0, zorder=1, label="end of the notebook")
+    axes[0].plot([], [], ":", color=style.GREY, label="from here on better than the solver")
+    style.legend_below(figure, axes)
+    return Picture(
+        "hope",
+        figure,
+        f"{' '.join(words.hopes(data))} Held fixed: start, {STEPS_A_NUTATION:.0f} steps a nutation of every discrete "
+        "row (open markers: angles, full: axis).",
+        "Two log-log plots: the solver's energy error rises with time and crosses the level lines of the discrete "
+        "methods, one after the other.",
+    )
 
 
 def draw_spheres(data: xr.Dataset) -> Picture:
@@ -139,7 +178,8 @@ def draw_spheres(data: xr.Dataset) -> Picture:
     return Picture(
         "spheres",
         figure,
-        "Path of the axis on the unit sphere with its coordinate discs, both scenes. Reproduced, red: the notebook's "
+        "Path of the axis on the unit sphere with its coordinate discs, spheroid and goldstein, by the solver in "
+        f"angles at tolerance {SOLVER_TOLERANCE:g}. Reproduced, red: the notebook's "
         "curve, which takes phi for the azimuth. Corrected, black: its own rotations (phi about z, theta about the "
         "line of nodes) carry the axis to (sin theta sin phi, -sin theta cos phi, cos theta), a quarter turn away, so "
         "that its animated triad and its curve do not meet. Bold: the first two nutations, from the dot on.",
@@ -156,7 +196,8 @@ def draw_film(data: xr.Dataset) -> Picture:
     return Picture(
         "triad",
         solid.Film(*attitudes, "midpoint rule, 30 steps a nutation; grey: truth", pause=50),
-        "The body-fixed triad over two nutations of the first scene, blue the axis, one frame a step; grey is the "
+        f"The body-fixed triad over two nutations of spheroid by {FILMED}, blue the axis, 30 steps a nutation; grey "
+        "is the "
         "truth. Reproduced: the notebook's animation. Added: the truth; at the end the axes are "
         f"{float(axis_distance(last, true)):.2f} rad apart.",
         "Animation of three coloured rods turning inside a sphere, a grey ghost just ahead of them.",
@@ -188,9 +229,11 @@ def draw_alpha(data: xr.Dataset) -> Picture:
     return Picture(
         "alpha",
         figure,
-        f"The second scene prints alpha = {ALPHA:g} and a release at rest from 43 degrees. Reproduced: its solver "
-        f"never uses alpha and starts at rest. Corrected: at rest alpha is {rest:.6f} 1/s^2, and alpha = {ALPHA:g} "
-        f"means |theta'(0)| = {rate:.6f} rad/s: the dashed cubic u'^2 is not zero at the start. Both are scenes here.",
+        f"The second scene, goldstein, prints alpha = {ALPHA:g} and a release at rest from 43 degrees. Reproduced: its "
+        f"solver never uses alpha and starts at rest. Corrected: at rest alpha is {rest:.6f} 1/s^2, and alpha = "
+        f"{ALPHA:g} "
+        f"means |theta'(0)| = {rate:.6f} rad/s: the dashed cubic u'^2 is not zero at the start. Both are scenes here. "
+        "All curves are the closed form, which has no step and no chart.",
         "Left, two cubics, one zero at cos 43 degrees; right, three different nutations.",
     )
 
@@ -198,7 +241,7 @@ def draw_alpha(data: xr.Dataset) -> Picture:
 def draw_modified_energy(data: xr.Dataset) -> Picture:
     """Energy and modified energy of two discrete methods, over time and against the step."""
     figure, axes = style.panels(1, 3, width=13.0, height=3.4)
-    midpoint = data.sel(scene="spheroid", integrator="midpoint")
+    midpoint = data.sel(scene="spheroid", integrator=MIDPOINT)
     kinds = ((Column.ENERGY_CHANGE, "energy", "-"), (Column.MODIFIED_CHANGE, "modified energy", "--"))
     for (column, kind, _), color in zip(kinds, (style.BLUE, style.BLACK), strict=True):
         values = midpoint[f"{column}_history"]
@@ -220,7 +263,8 @@ def draw_modified_energy(data: xr.Dataset) -> Picture:
     return Picture(
         "modified-energy",
         figure,
-        "Why the energy is bounded: the map conserves a modified Hamiltonian, from which the energy H differs by "
+        f"Why the energy is bounded, over the notebook's horizons on {' and '.join(PARTS)}, both rows in angles: the "
+        "map conserves a modified Hamiltonian, from which the energy H differs by "
         "O(h^2). H and the modified energy to its first term change with these powers of the step: "
         f"{words.modified_orders(data)}.",
         "Left, the energy oscillates and the modified energy hardly; right, log-log plots of slopes 2 and 4.",

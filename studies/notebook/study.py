@@ -13,15 +13,17 @@ from symtop.model.scenes import scene
 from symtop.runner.study import Case, Study
 
 from . import figures, tables, words
+from .long_energy import long_energy
 from .tables import ALPHA, FILMED, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION
 
 SCENES = ("spheroid", "goldstein")  # of the notebook's first and of its second part
-QUICK = ("midpoint", "trapezoidal", "stormer-verlet", "strang", "cayley")
+QUICK = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "cayley[axis]")
+LONG = 3000.0  # s: some 2500 nutations of the first scene, 1000 of the second
 
 
 def cases(quick: bool) -> list[Case]:
-    """The notebook's solver and every discrete method, on both scenes."""
-    settings = {"film": 20 if quick else 80, "shadow_steps": 3 if quick else 6}
+    """The notebook's solver and every discrete row, on both scenes."""
+    settings = {"film": 20 if quick else 80, "shadow_steps": 3 if quick else 6, "long": 0.2 * LONG if quick else LONG}
     methods = [*(QUICK if quick else tables.discrete_methods()), SOLVER]
     return [Case(name, method, settings) for name in SCENES for method in methods]
 
@@ -33,8 +35,10 @@ def measure(case: Case) -> xr.Dataset:
     if method == SOLVER:
         parts = [tables.residual_history(start, method, SOLVER_TOLERANCE)]
         parts += [tables.notebook_path(start), tables.both_derivations(start)]
+        parts.append(long_energy(start, method, SOLVER_TOLERANCE, case.settings["long"]))
         return xr.merge([*parts, tables.alpha_table(start, ALPHA)] if case.scene == "goldstein" else parts)
     parts = [tables.residual_history(start, method, period / STEPS_A_NUTATION)]
+    parts.append(long_energy(start, method, period / STEPS_A_NUTATION, case.settings["long"]))
     if method in MODIFIED:
         steps = [period / (40.3 * 2.0**k) for k in range(case.settings["shadow_steps"])]
         parts.append(tables.modified_energy_table(start, method, steps))

@@ -13,20 +13,22 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import residuals
-from symtop.methods.registry import integrator, integrators
+from symtop.methods.registry import integrator
 from symtop.methods.scipy_ivp import integrated
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.run.modified_energy import modified_energy
 from symtop.run.simulation import simulate
+from symtop.runner.grid import grid_rows
 
 from .derivations import easy_way, energies, hard_way, nutation_cubic, six_variables, with_alpha
 
-SOLVER = "lsoda"  # the default solver of the notebook's system is of this family
+SOLVER = "lsoda[angles]"  # the default solver of the notebook's system is of this family
 SOLVER_TOLERANCE = 2.6e-7  # chosen: at it LSODA keeps as many figures as the notebook reports; its own is not known
 STEPS_A_NUTATION = 118.02  # of every discrete method; no whole number, so that samples and nutation do not lock
-MODIFIED = ("midpoint", "stormer-verlet")  # methods whose modified energy is stored
-FILMED = "midpoint"
+MIDPOINT = "midpoint[angles]"
+MODIFIED = (MIDPOINT, "stormer-verlet[angles]")  # rows whose modified energy is stored
+FILMED = MIDPOINT
 ALPHA = 1.6  # of the second scene, as the notebook prints it
 SAMPLES = 301
 
@@ -55,11 +57,13 @@ class Column:
     ENERGY_CHANGE, MODIFIED_CHANGE = "energy_swing", "modified_swing"
     # attitudes as quaternions; frame, part
     FRAME_TIME, FRAME_ATTITUDE, TRUE_ATTITUDE = "frame_time", "frame_attitude", "true_attitude"
+    # largest relative energy error so far (s, 1) of a run far beyond the notebook's; long
+    LONG_TIME, LONG_ENERGY = "long_time", "long_energy"
 
 
 def discrete_methods() -> list[str]:
-    """Names of the discrete Lagrangians and splittings of the registry."""
-    return [m.name for m in integrators().values() if m.family in ("discrete-lagrangian", "splitting")]
+    """Rows of the discrete Lagrangians and splittings of the registry, in the angles or the axis chart."""
+    return [row.name for row in grid_rows("nutation") if row.family in ("discrete-lagrangian", "splitting")]
 
 
 def residual_history(scene: Scene, name: str, setting: float, samples: int = SAMPLES) -> xr.Dataset:

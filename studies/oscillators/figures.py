@@ -37,7 +37,8 @@ def draw_notebook(data: xr.Dataset) -> Picture:
     return Picture(
         "seed",
         figure,
-        f"The notebook's damped oscillator (m = k = 1, h = 0.1, T = {HORIZON:g}). Reproduced: its update, which is the "
+        f"The notebook's damped oscillator (m = k = 1, step 0.1, T = {HORIZON:g}; one coordinate x, no chart). "
+        "Reproduced: its update, which is the "
         "midpoint rule with forced discrete Euler-Lagrange equations, the same positions to "
         f"{float(data[Column.UPDATE_GAP].max()):.0e}. Corrected: its guess put dF/dx' = -b where the discrete force "
         "belongs, with the sign of a potential's slope; that is a constant push, which damps nothing and shifts the "
@@ -66,11 +67,14 @@ def draw_orders(data: xr.Dataset) -> Picture:
     axes[0, 0].set_ylabel("largest error of x")
     axes[1, 0].set_ylabel("relative error of\nthe slow exponent")
     style.legend_below(figure, axes)
+    least, most = (float(value(data[Column.STEP])) for value in (np.nanmin, np.nanmax))
     halved = (f"{m} {order(data, 'damping-2', m, Column.EXPONENT_ERROR).slope:.2f}" for m in ("trapezoidal", ONE_SIDED))
     return Picture(
         "orders",
         figure,
-        f"The oscillator released from rest, T = {HORIZON:g}. Above: both rules have order 2 in every regime; the "
+        f"The oscillator released from rest, T = {HORIZON:g}, steps from {least:.0e} to {most:.2g}; one coordinate x, "
+        "no "
+        "chart. Above: both rules have order 2 in every regime; the "
         "whole force at one end of the step costs an order. Below: the slow exponent lambda of exp(lambda t). At "
         "critical damping (b = 2) it is the square root of a perturbation of the discriminant, so that the errors "
         f"there have half the usual order ({', '.join(halved)}). The midpoint rule leaves critical damping "
@@ -94,7 +98,8 @@ def draw_decay(data: xr.Dataset) -> Picture:
     return Picture(
         "decay",
         figure,
-        f"Energy against its exact decay over T = {LONG:g}, at equal cost: {words.cost(data)}. {words.energy(data)}",
+        f"Energy of the oscillator (one coordinate x, no chart) against its exact decay over T = {LONG:g}, at equal "
+        f"cost: {words.cost(data)}. {words.energy(data)}",
         "Log-log plots of the relative energy error over time for two rules and RK45.",
     )
 
@@ -124,8 +129,10 @@ def draw_tops(data: xr.Dataset) -> Picture:
     return Picture(
         "damped-top",
         figure,
-        f"A top in gimbals with viscous bearings (torques -{FRICTION.precession:g} phi' and -{FRICTION.spin:g} psi'): "
-        "the momenta decay. Their balance p(t) - p(0) + c (angle(t) - angle(0)) is zero for the true motion; its "
+        f"{' and '.join(names)} in gimbals with viscous bearings (torques -{FRICTION.precession:g} phi' and "
+        f"-{FRICTION.spin:g} psi'), in angles, "
+        f"{words.finest(data)}: the momenta decay. Their balance p(t) - p(0) + c (angle(t) - angle(0)) is zero for "
+        "the true motion; its "
         f"defect is at most {words.largest_balance(data, RULES):.1e} with the discrete Lagrangians, which is rounding, "
         f"and {words.largest_balance(data, (RK45,)):.1e} with RK45 at tolerance {TOP_TOLERANCE:g}. Below, solid: phi, "
         "dashed: psi.",
@@ -153,7 +160,8 @@ def draw_top_orders(data: xr.Dataset) -> Picture:
     return Picture(
         "damped-top-orders",
         figure,
-        f"Order of the forced methods on the damped top: {'; '.join(orders)}. Reference: the six Euler-Lagrange "
+        f"Order of the forced methods on the damped top, in angles, {words.finest(data)} and up: {'; '.join(orders)}. "
+        "Reference: the six Euler-Lagrange "
         "equations with friction at tolerance 1e-13; the grey line is the largest difference of any angle from the "
         "form of four equations.",
         "Log-log plots of the error of theta against the step, slope 2.",

@@ -26,12 +26,22 @@ def largest_balance(data: xr.Dataset, methods: tuple[str, ...]) -> float:
     return max(float(np.abs(runs[name]).max()) for name in (Column.BALANCE_PHI, Column.BALANCE_PSI))
 
 
+def finest(data: xr.Dataset) -> str:
+    """The finest step and the horizon of each damped top."""
+    parts = []
+    for name in tops(data):
+        cell = data.sel(scene=name, integrator=RULES[0])
+        step, end = float(cell[Column.TOP_STEP].min()), float(cell[Column.TOP_TIME].max())
+        parts.append(f"step {step:.2g} s to t = {end:g} on {name}")
+    return " and ".join(parts)
+
+
 def cost(data: xr.Dataset) -> str:
     """Force evaluations of the discrete rules and of RK45."""
     evaluations = data[Column.EVALUATIONS].sel(scene=list(AGAINST_RK45))
     rules, rk45 = float(evaluations.sel(integrator=RULES[0]).max()), evaluations.sel(integrator=RK45)
     return (
-        f"{rules:.0f} force evaluations for a rule (h = {LONG / rules:g}), {float(rk45.min()):.0f} to "
+        f"{rules:.0f} force evaluations for a rule (step {LONG / rules:g}), {float(rk45.min()):.0f} to "
         f"{float(rk45.max()):.0f} for RK45"
     )
 
@@ -87,4 +97,4 @@ def tables(data: xr.Dataset) -> list[Table]:
     ]  # fmt: skip
     orders = ["order of x", "order of the slow exponent"]
     header = ["b", "regime", "rule", *orders, f"relative energy error to T = {LONG:g}"]
-    return [Table("Damped oscillator against the analytic solution", header, rows)]
+    return [Table(f"Damped oscillator against the analytic solution, T = {HORIZON:g}; no chart", header, rows)]

@@ -11,7 +11,7 @@ from symtop.report.figures import SMALLEST, largest_so_far
 from symtop.runner.study import Picture
 
 from . import words
-from .tables import COMMUTES, COMPARED_STEPS, GAPS, Column, commutation_order
+from .tables import CHART_PERIODS, COMMUTES, COMPARED_STEPS, GAPS, Column, commutation_order
 
 CHART_COLORS = {"angles": style.VERMILLION, "attitude": style.BLUE, "axis": style.GREEN}
 SCENE_MARKERS = "osv^" * 9
@@ -52,7 +52,8 @@ def draw_commutation(data: xr.Dataset) -> Picture:
     return Picture(
         "commutation",
         figure,
-        "Reduce, then discretise, against discretise, then reduce: largest difference in theta over two nutations. "
+        f"Reduce, then discretise, against discretise, then reduce: largest difference in theta over two nutations of "
+        f"{' and '.join(axes)}, both in angles, same rule, start and step. "
         f"{words.commuting(data)}",
         "Log-log plots of the difference against the step: lines of slope 2 and 4, and flat ones at 1e-16.",
     )
@@ -71,7 +72,8 @@ def draw_unreduced(data: xr.Dataset) -> Picture:
         "twins",
         figure,
         f"Reduced kernels against their unreduced forms, which eliminate nothing, {COMPARED_STEPS} steps over eight "
-        f"nutations: largest difference so far in each angle. It never exceeds {words.largest_gap(data):.1e} rad: the "
+        f"nutations of {' and '.join(axes)}, both in angles: largest difference so far in each angle. It never "
+        f"exceeds {words.largest_gap(data):.1e} rad: the "
         "two are one map, apart from rounding.",
         "Log-log plots of the differences of the three angles against time, growing from 1e-16 to about 1e-12.",
     )
@@ -80,17 +82,18 @@ def draw_unreduced(data: xr.Dataset) -> Picture:
 def draw_charts(data: xr.Dataset) -> Picture:
     """Time and error of a larger chart against the smallest."""
     ratios = words.ratios(data)
-    methods = list(dict.fromkeys(method for _, method, _ in ratios))
+    rows = list(dict.fromkeys(f"{method}[{ratio.chart}]" for _, method, ratio in ratios))
     markers = dict(zip(dict.fromkeys(scene for scene, _, _ in ratios), SCENE_MARKERS, strict=False))
-    figure, (times, errors) = style.grid(2, 2, height=1.6 + 0.24 * len(methods), sharey=True)
+    figure, (times, errors) = style.grid(2, 2, height=1.6 + 0.24 * len(rows), sharey=True)
     for scene, method, ratio in ratios:
         options = {"color": CHART_COLORS[ratio.chart], "ls": "none", "ms": 6, "marker": markers[scene]}
-        options["label"] = f"{ratio.chart} against {ratio.base}, {scene}"
-        times.plot(ratio.time, methods.index(method), **options)
-        errors.plot(ratio.error, methods.index(method), **options)
+        options |= {"label": f"{ratio.chart} against {ratio.base}, {scene}", "fillstyle": style.FILLS[ratio.chart]}
+        row = rows.index(f"{method}[{ratio.chart}]")
+        times.plot(ratio.time, row, **options)
+        errors.plot(ratio.error, row, **options)
     for axis, title in ((times, "time of a run (ratio)"), (errors, "error of the axis (ratio)")):
         axis.axvline(1.0, color=style.GREY, lw=0.9)
-        axis.set(xscale="log", yticks=range(len(methods)), yticklabels=methods, ylim=(len(methods) - 0.5, -0.5))
+        axis.set(xscale="log", yticks=range(len(rows)), yticklabels=rows, ylim=(len(rows) - 0.5, -0.5))
         axis.set(xlabel=title, xlim=(min(0.9, axis.get_xlim()[0]), max(1.1, axis.get_xlim()[1])))
         axis.xaxis.set_major_locator(FixedLocator(RATIO_TICKS))
         axis.xaxis.set_major_formatter("{x:g}")
@@ -100,8 +103,9 @@ def draw_charts(data: xr.Dataset) -> Picture:
     return Picture(
         "charts",
         figure,
-        "The same integrator at the same setting in a larger chart, relative to the smallest chart it has "
-        f"({', '.join(sorted({ratio.base for *_, ratio in ratios}))}): time of a run and error of the axis; "
+        "The same integrator at the same steps (adaptive: tolerances) in a larger chart, relative to the smallest "
+        f"chart it has ({', '.join(sorted({ratio.base for *_, ratio in ratios}))}), on {', '.join(markers)}: time of a "
+        f"run (median over the settings) and error of the axis (mean) after {CHART_PERIODS:g} nutations; "
         f"logarithmic scales. A larger chart takes {min(spans):.2f} to {max(spans):.2f} times as long.",
         "Two dot plots, a row for each integrator, a colour for each chart: ratios of time and of error to the "
         "smallest chart.",

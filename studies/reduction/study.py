@@ -26,7 +26,6 @@ LEFT_OUT = {
     ),
     "it passes too close to a pole for the angles chart": ("bruls-cardona-arnold", "grazing"),
 }  # fmt: skip
-CHART_PERIODS = 32.0  # nutations: long enough that the call itself does not count
 
 
 def cases(quick: bool) -> list[Case]:
@@ -38,8 +37,8 @@ def cases(quick: bool) -> list[Case]:
         start, period = scene(name), scene(name).nutation_period
         several = [method for method in integrators().values() if len(method.charts()) > 1 and name == FIRST]
         for method in several[:6] if quick else several:
-            settings = ladder(method, start, CHART_PERIODS * period, 8, 1e5)[1 :: 3 if quick else 2]
-            plan = {"settings": settings, "horizon": CHART_PERIODS * period, "batches": 2 if quick else 3}
+            settings = ladder(method, start, tables.CHART_PERIODS * period, 8, 1e5)[1 :: 3 if quick else 2]
+            plan = {"settings": settings, "horizon": tables.CHART_PERIODS * period, "batches": 2 if quick else 3}
             grid.append(Case(name, method.name, {"part": "charts", **plan}))
         plan = {"horizon": 8.0 * period, "step_sizes": [period / 30.7, period / 307.0], "batches": 3 if quick else 5}
         grid += [Case(name, reduced, {"part": "twins", **plan}) for reduced in tables.unreduced_forms()]

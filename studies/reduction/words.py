@@ -8,7 +8,17 @@ import xarray as xr
 from symtop.methods.registry import integrator
 from symtop.runner.study import Table
 
-from .tables import COMMUTES, COMPARED_STEPS, GAPS, SAME_MAP, Column, Ratio, chart_ratios, commutation_order
+from .tables import (
+    CHART_PERIODS,
+    COMMUTES,
+    COMPARED_STEPS,
+    GAPS,
+    SAME_MAP,
+    Column,
+    Ratio,
+    chart_ratios,
+    commutation_order,
+)
 
 HOW_TO_READ = (
     "Three comparisons. An integrator that works in several charts runs in each of them at the same setting. A reduced "
@@ -93,7 +103,10 @@ def larger_charts(data: xr.Dataset) -> list[str]:
     for (family, chart, base), times in groups.items():
         methods = f"median of {len(times)} {family} methods" if len(times) > 1 else next(iter(times))
         median = float(np.median([time for several in times.values() for time in several]))
-        sentences.append(f"A run in the {chart} chart takes {median:.2g} times as long as in {base} ({methods}).")
+        sentences.append(
+            f"A run in the {chart} chart takes {median:.2g} times as long as in {base}, with the same steps or "
+            f"tolerances over {CHART_PERIODS:g} nutations ({methods})."
+        )
     return sentences
 
 
@@ -119,7 +132,11 @@ def tables(data: xr.Dataset) -> list[Table]:
         power = "" if np.nanmax(gap) < COMMUTES else f"{commutation_order(cell):.3f}"
         gaps.append([scene, method, f"{np.nanmax(h):.3g}", f"{gap[0]:.2e}", f"{gap[np.isfinite(gap)][-1]:.2e}", power])
     return [
-        Table("A larger chart against the smallest", CHARTS, charts),
-        Table("Reduced kernels and their unreduced forms", COSTS, costs),
-        Table("Reduce first or last: largest difference in theta", GAPS_OVER_STEPS, gaps),
+        Table(
+            f"A larger chart against the smallest, same steps or tolerances, {CHART_PERIODS:g} nutations",
+            CHARTS,
+            charts,
+        ),
+        Table("Reduced kernels and their unreduced forms, in angles over eight nutations", COSTS, costs),
+        Table("Reduce first or last: largest difference in theta, in angles over two nutations", GAPS_OVER_STEPS, gaps),
     ]

@@ -2,7 +2,9 @@
 
 The *reach* of a row is the largest setting (step or tolerance) up to which every run of the row is accurate. "Slow" and
 "fast" tops are the rows below and above the spin that lets the top sleep upright, r < 1 and r > 3; a sentence quotes
-the reach that nine rows in ten have. A failure counts from the smallest setting at which one row in twenty shows it.
+the reach that nine rows in ten have. A run *fails* if it loses energy, crosses a turning point or ends early; a method
+fails from the smallest setting on at which, and at every larger one, at least half of the rows fail. One row that fails
+at one step says nothing of the next step, and is not quoted.
 """
 
 import math
@@ -13,15 +15,26 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, JUDGED, VERDICTS
-from symtop.methods.registry import integrators
+from symtop.methods.registry import Integrator, integrator, integrators, split_name
 
 from .outcome_maps import NOT_RUN
 from .tables import MECHANISMS, Column
 
 SLOW, FAST = 1.0, 3.0  # relative spin
 LOWER_SHARE = 0.1  # of the rows may reach less far than what is quoted
-COMMON = 0.05  # of the rows must fail before a failure counts
+COMMON = 0.5  # of the rows must fail, at every larger setting too, before a threshold is quoted
+LASTING = 3  # settings at least, beyond a threshold: at the last one "every larger" would say nothing
+NOTABLE = 0.1  # of the failed runs: a kind of failure with a smaller share is not named
 NEAR, FAR = 1e-4, 0.1  # gaps delta: next to a pole, and well away from it
+
+
+class Failure(NamedTuple):
+    """From which setting on a method commonly fails, and how."""
+
+    setting: float  # NaN if no `LASTING` settings follow at each of which at least `COMMON` of the rows fail
+    least: float  # the smallest share of failed rows from there on; the largest anywhere if there is no such setting
+    at_end: bool  # is the share at the largest setting at least `COMMON`?
+    kinds: dict[str, float]  # shares of the failed runs from there on (anywhere), by verdict, the largest first
 
 
 class OutcomeMap(NamedTuple):
@@ -64,15 +77,23 @@ class OutcomeMap(NamedTuple):
         wrong = self.outcome[self.outcome != 0]
         return float(np.mean(wrong < len(JUDGED))) if wrong.size else 0.0
 
-    def first_failures(self) -> list[tuple[float, str]]:
-        """Smallest setting at which each outcome but `accurate` and `bounded_but_wrong` is common, smallest first."""
-        rows = max(1, math.ceil(COMMON * self.outcome.shape[0]))
-        starts = []
-        for index, word in enumerate(VERDICTS):
-            columns = np.flatnonzero(np.sum(self.outcome == index, axis=0) >= rows)
-            if columns.size and index not in (0, BOUNDED_BUT_WRONG):
-                starts.append((float(self.settings[columns[0]]), word))
-        return sorted(starts)
+    @property
+    def failure(self) -> Failure:
+        """Where at least `COMMON` of the rows fail at every larger setting; `bounded_but_wrong` is no failure here."""
+        failed = self.outcome > BOUNDED_BUT_WRONG
+        share = failed.mean(axis=0)
+        rare = np.flatnonzero(share < COMMON)
+        first = int(rare[-1]) + 1 if rare.size else 0
+        lasting = share.size - first >= LASTING
+        part = slice(first, None) if lasting else slice(None)
+        counts = np.bincount(self.outcome[:, part][failed[:, part]], minlength=len(VERDICTS))
+        kinds = {word: float(count / counts.sum()) for word, count in zip(VERDICTS, counts, strict=True) if count}
+        return Failure(
+            float(self.settings[first]) if lasting else math.nan,
+            float(share[part].min() if lasting else share.max()),
+            bool(share[-1] >= COMMON),
+            dict(sorted(kinds.items(), key=lambda one: -one[1])),
+        )
 
 
 def map_of(cell: xr.Dataset) -> OutcomeMap | None:
@@ -93,6 +114,12 @@ def maps(data: xr.Dataset, scene: str) -> dict[str, OutcomeMap]:
         return {}
     read = {str(name): map_of(data.sel(scene=scene, integrator=name)) for name in data["integrator"].values}
     return {name: one for name, one in read.items() if one is not None}
+
+
+def methods_of(data: xr.Dataset) -> dict[str, Integrator]:
+    """The integrators of a dataset that are registered, by the names of their rows."""
+    names = map(str, data["integrator"].values)
+    return {name: integrator(name) for name in names if split_name(name)[0] in integrators()}
 
 
 def families(data: xr.Dataset) -> list[str]:
@@ -133,7 +160,7 @@ def pages(names: Sequence[str]) -> dict[str, list[str]]:
     """The integrators of the atlas by page: one a family, the large splitting family in three."""
     by_page: dict[str, list[str]] = {}
     for name in names:
-        method = integrators().get(name)
+        method = integrator(name) if split_name(name)[0] in integrators() else None
         page = method.family if method else "other"
         if method and page == "splitting":
             high = "splitting-high-order" if (method.order or 2) > 4 else "splitting-space"

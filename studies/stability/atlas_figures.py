@@ -119,10 +119,12 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
     over_spin, over_gap = maps(data, family), maps(data, "grazing")
     grazed = any(name in over_gap for name in names)
     ratios = {"width_ratios": [1.25, 1.0][: 1 + grazed]}
-    figure, axes = panels(len(names), 1 + grazed, width=8.4, height=1.7, gridspec_kw=ratios)
+    texts = [textwrap.wrap(sentences[name], 128) for name in names]
+    height = 1.25 + 0.16 * max(map(len, texts))
+    figure, axes = panels(len(names), 1 + grazed, width=8.4, height=height, gridspec_kw=ratios)
     drawn: dict[str, None] = {}  # outcomes and lines, for the legend
     controls = [over_spin[name].control for name in names]
-    for line, name, control, below in zip(axes, names, controls, [*controls[1:], None], strict=True):
+    for line, name, lines, control, below in zip(axes, names, texts, controls, [*controls[1:], None], strict=True):
         for axis, drawn_maps, label in zip(line, (over_spin, over_gap), ("spin r", r"gap $\delta$"), strict=False):
             one = drawn_maps.get(name)
             if one is None:
@@ -142,7 +144,6 @@ def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: M
                 drawn |= dict.fromkeys(_line(axis, *at, "passage"))
             if below != control:
                 axis.set_xlabel(CONTROLS[one.control], fontsize=8.5)
-        lines = textwrap.wrap(sentences[name], 128)
         line[0].set_title("\n".join(["", *lines]), loc="left", fontsize=8.0)
         line[0].annotate(
             name, (0.0, 1.0), (0.0, 5.5 + 11.2 * len(lines)), xycoords="axes fraction", textcoords="offset points",

@@ -1,30 +1,31 @@
 """The atlas in words: for each integrator when to use it and when it fails, and what a page of maps says."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from symtop.measure.verdicts import BOUNDED_BUT_WRONG
+from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT
+from symtop.methods.registry import split_name
 
-from .atlas import PAGES, OutcomeMap, maps, pole_effect
+from .atlas import COMMON, NOTABLE, PAGES, OutcomeMap, maps, pole_effect
 from .tables import PERIODS, Column
 
 FAILURES = {
-    "drifting": "loses energy",
-    "wrong_regime": "crosses a turning point of the true motion",
-    "left_chart": "leaves its chart",
-    "not_converged": "cannot solve its equation",
-    "not_finite": "overflows",
-    "step_too_small": "stops because its steps become too small",
-    "out_of_budget": "exceeds its budget of steps",
-}
+    "drifting": f"change their energy by more than {DRIFT:.0%} and ever more",
+    "wrong_regime": "cross a turning point of the true motion",
+    "left_chart": "leave their chart",
+    "not_converged": "cannot solve their equation",
+    "not_finite": "overflow",
+    "step_too_small": "stop because their steps become too small",
+    "out_of_budget": "exceed their budget of steps",
+}  # what runs do
 
 
 class Advice(NamedTuple):
-    """One line of the atlas."""
+    """One line of the atlas: a row ``method[chart]``."""
 
     integrator: str
     use: str
@@ -57,11 +58,8 @@ def _fails(one: OutcomeMap, over_gap: OutcomeMap | None) -> str:
     wrong = int(np.sum(one.outcome != 0))
     if one.control == "none" and wrong:
         return f"it fails in {wrong} of {one.outcome.size} tops"
-    parts, fixed = [], one.control == "step_size"
-    for k, (setting, outcome) in enumerate(one.first_failures()[:2]):
-        place = f"h = {setting:.2g}" if fixed else f"a tolerance of {setting:.2g}"
-        unit = " nutation periods" if fixed and k == 0 else ""
-        parts.append(f"first {FAILURES[outcome]} at {place}{unit}")
+    fixed = one.control == "step_size"
+    parts = [_commonly(one)] if one.failure.kinds else []
     share = one.shares[BOUNDED_BUT_WRONG]
     if share > 0.05:
         parts.append(f"is wrong with bounded energy in {share:.0%} of its map")
@@ -73,6 +71,22 @@ def _fails(one: OutcomeMap, over_gap: OutcomeMap | None) -> str:
     if not parts:
         return "it fails nowhere on the map"
     return "it " + " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
+
+
+def _commonly(one: OutcomeMap) -> str:
+    """From which setting on a method fails, in how large a share of the starts, and how."""
+    failure, starts, fixed = one.failure, one.outcome.shape[0], one.control == "step_size"
+    kinds = ", ".join(f"{share:.0%} {FAILURES[word]}" for word, share in failure.kinds.items() if share >= NOTABLE)
+    every = "step" if fixed else "tolerance"
+    if math.isfinite(failure.setting):
+        place = f"h = {failure.setting:.2g} nutation periods" if fixed else f"a tolerance of {failure.setting:.2g}"
+        where = f"at {place} and every larger {every} in at least {failure.least:.0%} of {starts} starts"
+    else:
+        last = f", half of them only at the largest {every}s of the map"
+        between = f", but not in half of them at every larger {every}"
+        rest = "" if failure.least < COMMON else last if failure.at_end else between
+        where = f"in up to {failure.least:.0%} of {starts} starts{rest}"
+    return f"fails {where} (of these runs {kinds})"
 
 
 def page_caption(data: xr.Dataset, family: str, page: str, names: Sequence[str]) -> str:
@@ -88,11 +102,12 @@ def page_caption(data: xr.Dataset, family: str, page: str, names: Sequence[str])
         else "No run ends early: an inaccurate run raises no error here."
     )
     return (
-        f"Outcome of every run of {PAGES.get(page, page)} ({len(names)} on this page). Left: the scene "
-        f"{family} over {PERIODS:g} nutation periods with another spin; r = 1 is the spin from which a top sleeps "
-        "(spins upright and stays so). Right: one fall past a pole that the axis misses by 1.1 delta (rad). In both, "
-        f"the step or the tolerance grows to the right. Accurate in the largest part of its map: {best}{smallest} "
-        f"{early}{_without_limit(data, family, shown)}"
+        f"Outcome of every run of {PAGES.get(page, page)} ({len(names)} rows on this page, each a method in one "
+        f"chart). Left: the scene {family} over {PERIODS:g} nutation periods with another spin and everything else "
+        "held fixed; r = 1 is the spin from which a top sleeps (spins upright and stays so). Right: one fall (one "
+        "nutation period) past a pole that the axis misses by 1.1 delta (rad). In both, the step or the tolerance "
+        f"grows to the right. Accurate in the largest part of its map: {best}{smallest} {early}"
+        f"{_without_limit(data, family, shown)}"
     )
 
 
@@ -115,6 +130,14 @@ def _without_limit(data: xr.Dataset, family: str, shown: Mapping[str, OutcomeMap
     )
 
 
+def _charts(names: Iterable[str]) -> dict[str, list[str]]:
+    """The rows of the methods that have several."""
+    rows: dict[str, list[str]] = {}
+    for name in names:
+        rows.setdefault(split_name(name)[0], []).append(name)
+    return {method: several for method, several in rows.items() if len(several) > 1}
+
+
 def summary(data: xr.Dataset, family: str) -> list[str]:
     """How far steps reach on fast and on slow tops, which methods end early, and how many wrong runs raise no error."""
     by_name = maps(data, family)
@@ -126,15 +149,18 @@ def summary(data: xr.Dataset, family: str) -> list[str]:
             best, worst = (", ".join(f"{name} ({reach[name]:.2g})" for name in part)
                            for part in (ranked[:4], ranked[:-4:-1]))  # fmt: skip
             sentences.append(
-                f"On {kind} tops of the family {family} the largest accurate steps, in nutation periods: {best}; the "
-                f"smallest: {worst}."
+                f"On {kind} tops of the family {family}, over {PERIODS:g} nutations, the largest accurate steps, in "
+                f"nutation periods: {best}; the smallest: {worst}."
             )
+    for method, rows in _charts(by_name).items():
+        listed = ", ".join(f"{by_name[name].shares[0]:.0%} with {name}" for name in rows)
+        sentences.append(f"The chart alone, same steps of {method}: accurate in {listed} of the map of {family}.")
     never = [name for name, one in by_name.items() if one.early == 0.0]
     if never:
-        sentences.append(f"{len(never)} of {len(by_name)} integrators never end early: {', '.join(never)}.")
+        sentences.append(f"{len(never)} of {len(by_name)} rows never end early: {', '.join(never)}.")
     if by_name:
         sentences.append(
-            f"For the median integrator, {np.median([one.silent for one in by_name.values()]):.0%} of inaccurate runs "
+            f"For the median row, {np.median([one.silent for one in by_name.values()]):.0%} of inaccurate runs "
             "end without an error; only the comparison with the truth shows that they are wrong."
         )
     return sentences

@@ -28,6 +28,7 @@ from symtop.run.linear_stability import trace, with_momenta
 
 RUNS_AWAY = 4.0  # times the displacement; an island that a resonance has bent is at most three times as long as wide
 LOST = 0.1  # rad, axis error at which a run next to the separatrix has lost its accuracy
+LONGEST = 80.0  # 1/g, of a run next to the separatrix
 SEEN = 6.0  # 1/g, the time at which its early error is read
 
 
@@ -82,7 +83,7 @@ class Horizon(NamedTuple):
     predicted: float  # from the error at `SEEN`
 
 
-def separatrix_horizon(method: Integrator, scene: Scene, setting: float, longest: float = 80.0) -> Horizon:
+def separatrix_horizon(method: Integrator, scene: Scene, setting: float, longest: float = LONGEST) -> Horizon:
     """When the axis error passes `LOST`; `setting` is the step in units of 1/g, or the tolerance."""
     g = math.sqrt(scene.top.mgl / scene.top.I1)
     if method.fixed_step:

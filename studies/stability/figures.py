@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from symtop.methods.registry import split_name
 from symtop.methods.splitting_space import cayley_sleeps_from, strang_sleeps_from
 from symtop.report.style import BLUE, GREEN, GREY, VERMILLION, Look, legend_below, look, panels
 from symtop.runner.study import Picture
@@ -18,7 +19,7 @@ from .atlas_figures import atlas_page
 from .atlas_words import advice, page_caption
 from .failures import LOST, SEEN
 from .tables import MECHANISMS, Column
-from .words import mechanism_sentences
+from .words import LEAST_SAMPLED, held_fixed, mechanism_sentences
 
 SHOWN = ("midpoint", "trapezoidal", "stormer-verlet", "galerkin-simpson", "strang", "cayley", "gauss-4", "rk4")
 SLEEPERS = ("strang", "cayley", "midpoint", "gauss-4", "yoshida-4")
@@ -36,7 +37,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
             drawn.append(Picture(f"atlas-{family}-{page}", figure, caption, f"Maps of outcomes: {', '.join(names)}."))
     if set(MECHANISMS) & set(map(str, data["scene"].values)):
         measured = mechanism_sentences(data, ("grazing", "separatrix"))
-        caption = " ".join(["Six ways to fail, each measured alone.", *measured])
+        caption = " ".join([f"Six ways to fail, each measured alone. {held_fixed(data)}", *measured])
         alt = "Six panels: pole grazing, resonances, sleeping threshold, separatrix, sampling, solver tolerance."
         drawn.append(Picture("mechanisms", mechanism_panels(data), caption, alt))
     return drawn
@@ -59,13 +60,24 @@ def mechanism_panels(data: xr.Dataset) -> Any:
 
 
 def _each(data: xr.Dataset, names: Sequence[str] = SHOWN) -> list[tuple[str, Look, xr.Dataset]]:
-    return [(name, look(name), data.sel(integrator=name)) for name in names if name in data["integrator"].values]
+    """Every row of the methods called `names`, with its look and its cell."""
+    shown = [str(name) for name in data["integrator"].values if split_name(str(name))[0] in names]
+    return [(name, look(name), data.sel(integrator=name)) for name in shown]
+
+
+def _methods(data: xr.Dataset) -> list[str]:
+    return [split_name(str(name))[0] for name in data["integrator"].values]
+
+
+def _marked(style: Look, size: float = 1.0) -> dict[str, Any]:
+    """Colour and marker of a row: open in angles, full in the axis chart."""
+    return {"color": style.color, "fillstyle": style.fill, "ms": size * style.size}
 
 
 def _pole(axis: Any, data: xr.Dataset) -> None:
     for name, style, cell in _each(data):
         x, y = cell[Column.PARAMETER].values, cell[Column.GRAZING_ERROR].values
-        axis.plot(x, y, style.marker + "-", color=style.color, ms=0.6 * style.size, markevery=4, lw=1.0, label=name)
+        axis.plot(x, y, style.marker + "-", **_marked(style, 0.6), markevery=4, lw=1.0, label=name)
         gone = np.isfinite(x) & ~np.isfinite(y)
         axis.plot(x[gone], np.full(int(gone.sum()), 1.0), "x", color=style.color, ms=4.0, mew=0.8)
     axis.plot([], [], "x", color=GREY, ms=4.0, label="run ended early")
@@ -79,7 +91,7 @@ def _resonance(axis: Any, data: xr.Dataset) -> None:
         x = np.append(cell[Column.PHASE].values, float(cell[Column.THIRD_TURN_PHASE]))
         y = np.append(cell[Column.SURVIVING].values, float(cell[Column.SURVIVING_AT_THIRD_TURN]))
         x, y = x[np.argsort(x)], y[np.argsort(x)]
-        axis.plot(x, y, style.marker + "-", color=style.color, ms=0.6 * style.size, markevery=5, lw=1.0, label=name)
+        axis.plot(x, y, style.marker + "-", **_marked(style, 0.6), markevery=5, lw=1.0, label=name)
     for place, label in ((3.0**0.5, r"$\sqrt{3}$"), (2.0, "2"), (12.0**0.5, r"$2\sqrt{3}$")):
         axis.axvline(place, color=GREY, lw=0.8, ls=(0, (5, 3)), zorder=1)
         axis.annotate(label, (place, 0.315), fontsize=8, ha="center", va="bottom", annotation_clip=False)
@@ -90,7 +102,7 @@ def _resonance(axis: Any, data: xr.Dataset) -> None:
 def _sleep(axis: Any, data: xr.Dataset) -> None:
     for name, style, cell in _each(data, SLEEPERS):
         x, y = cell[Column.SLEEPING_STEP].values, cell[Column.SLEEPING_THRESHOLD].values
-        axis.plot(x, y, style.marker, color=style.color, ms=style.size, label=name)
+        axis.plot(x, y, style.marker, **_marked(style), label=name)
     x = np.linspace(0.02, 1.0, 60)
     axis.plot(x, [cayley_sleeps_from(h) for h in x], label=r"$a^2 = 4 + h^2$", **GUIDE)
     axis.plot(x, [strang_sleeps_from(h) for h in x], ls=(0, (5, 3)), label=r"$a \tan(a h/4) = h$", **GUIDE)
@@ -98,11 +110,11 @@ def _sleep(axis: Any, data: xr.Dataset) -> None:
 
 
 def _separatrix(axis: Any, data: xr.Dataset) -> None:
-    for name, style, cell in _each(data, list(map(str, data["integrator"].values))):
-        main = {"zorder": 3, "ms": style.size, "label": name}
-        other = {"zorder": 2, "ms": 0.55 * style.size, "alpha": 0.6}
+    for name, style, cell in _each(data, _methods(data)):
+        main = {**_marked(style), "zorder": 3, "label": name}
+        other = {**_marked(style, 0.55), "zorder": 2, "alpha": 0.6}
         x, y = cell[Column.EARLY_ERROR].values, cell[Column.HORIZON].values
-        axis.plot(x, y, style.marker, color=style.color, **(main if name in SHOWN else other))
+        axis.plot(x, y, style.marker, **(main if split_name(name)[0] in SHOWN else other))
     error = np.geomspace(1e-16, 0.1, 50)
     axis.plot(error, SEEN + 2.0 * np.log(LOST / error), label=r"$6/g + (2/g) \ln(0.1/e)$", **GUIDE)
     axis.set(xscale="log", xlabel="axis error e at 6/g (rad)", ylabel="time to an error of 0.1 rad (1/g)")
@@ -110,9 +122,10 @@ def _separatrix(axis: Any, data: xr.Dataset) -> None:
 
 
 def _sampling(axis: Any, data: xr.Dataset) -> None:
-    for name, style, cell in _each(data, list(map(str, data["integrator"].values))):
+    for name, style, cell in _each(data, _methods(data)):
         x, y = float(cell[Column.ENERGY_EVERY]), max(float(cell[Column.ENERGY_ONCE]), 1e-16)
-        axis.plot(x, y, style.marker, color=style.color, ms=style.size, label=name if name in SHOWN else None)
+        axis.plot(x, y, style.marker, **_marked(style), label=name if split_name(name)[0] in SHOWN else None)
+    axis.axhspan(0.0, LEAST_SAMPLED, color=GREY, alpha=0.15, lw=0, label="below rounding")
     axis.plot([1e-15, 1e-2], [1e-15, 1e-2], **GUIDE)
     axis.set(xscale="log", yscale="log", xlabel="largest energy error, every step", ylabel="the same, once a nutation")
     axis.set_title("sampling")

@@ -50,6 +50,9 @@ class Column:
     SOLVER_TOLERANCE, SOLVER_ITERATIONS = "solver_tolerance", "solver_iterations"
     SOLVER_ENERGY, SOLVER_MOMENTUM = "solver_energy", "solver_momentum"
     TEXTBOOK_ENERGY, ONE_ITERATION_ENERGY = "plain_energy", "one_iteration_energy"
+    # what was held fixed: steps of a displaced precession; steps a nutation, nutations; step and steps of the solver
+    DISPLACED_STEPS, SAMPLED_STEPS, SAMPLED_PERIODS = "displaced_steps", "sampled_steps", "sampled_periods"
+    SOLVER_STEP, SOLVER_STEPS = "solver_step", "solver_steps"
 
 
 def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
@@ -105,6 +108,7 @@ def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) 
     columns: dict[str, Any] = {
         Column.PHASE: ("phase", phases),
         Column.SURVIVING: ("phase", [surviving(float(x) / omega) for x in phases]),
+        Column.DISPLACED_STEPS: float(settings["steps"]),
         Column.LIMIT_PHASE: limit * omega,
         Column.THIRD_TURN_PHASE: third * omega,
         Column.SOUGHT_PHASE: SOUGHT_PHASE,
@@ -134,7 +138,10 @@ def sampling_table(name: str, method: Integrator, settings: Mapping[str, Any]) -
     """An energy error as it looks once a nutation and at every step; for discrete Lagrangians, the solver's share."""
     scene, rule = scenes.scene(name), rule_of(method)
     once, every = sampled_energy_error(method, scene, settings["steps"], settings["periods"])
-    table: dict[str, Any] = {Column.ENERGY_ONCE: once, Column.ENERGY_EVERY: every}
+    table: dict[str, Any] = {
+        Column.ENERGY_ONCE: once, Column.ENERGY_EVERY: every,
+        Column.SAMPLED_STEPS: float(settings["steps"]), Column.SAMPLED_PERIODS: float(settings["periods"]),
+    }  # fmt: skip
     if rule is not None:
         run, tolerances = (scene, settings["step_size"], settings["solver_steps"]), settings["tolerances"]
         rows = [solver_sweep(rule, *run, float(value)) for value in tolerances]
@@ -144,6 +151,7 @@ def sampling_table(name: str, method: Integrator, settings: Mapping[str, Any]) -
             Column.SOLVER_MOMENTUM: [entry.momentum for entry in rows],
             Column.SOLVER_ITERATIONS: [entry.iterations for entry in rows],
         }
+        table[Column.SOLVER_STEP], table[Column.SOLVER_STEPS] = settings["step_size"], float(settings["solver_steps"])
         if is_midpoint(method):
             columns[Column.TEXTBOOK_ENERGY] = [textbook_midpoint(*run, float(value)) for value in tolerances]
             table[Column.ONE_ITERATION_ENERGY] = textbook_midpoint(*run, 0.0, 1)

@@ -9,13 +9,12 @@ from collections.abc import Collection, Mapping
 import numpy as np
 import xarray as xr
 
-from symtop.methods.registry import Integrator, integrators
 from symtop.runner.study import Table
 
-from .atlas import NEAR, families, map_of, pole_effect
+from .atlas import NEAR, families, map_of, methods_of, pole_effect
 from .atlas_words import advice, summary
-from .failures import LOST, SEEN
-from .tables import MECHANISMS, Column
+from .failures import LONGEST, LOST, SEEN
+from .tables import MECHANISMS, PERIODS, Column
 
 HOW_TO_READ = (
     "A map has one cell a run. To the right the step or the tolerance grows; upwards the spin r, or the gap delta "
@@ -23,9 +22,12 @@ HOW_TO_READ = (
     "cross a turning point of the true motion, or end early. Solid lines: the linear limit, the step beyond which "
     "small nutations about a steady precession grow; a fixed-step method without a solid line has no such limit on the "
     "map, or none that can be measured. Dashed lines: the step that advances such a nutation by a third of a turn. A "
-    "limit for fast tops (r > 3) or slow tops (r < 1) holds for nine rows in ten; a method first fails in some way at "
-    "the smallest step or tolerance at which one row in twenty does."
+    "limit for fast tops (r > 3) or slow tops (r < 1) holds for nine spins in ten. A method is said to fail from a "
+    "step or tolerance on if at least half of all spins fail there and at every larger one: they change their energy ever "
+    "more, cross a turning point of the true motion, or end early. A name method[chart], as rk4[axis], is a method in "
+    "one chart."
 )
+VERLET = "stormer-verlet[angles]"
 LOOSE = 10.0  # times the change of the solved equation: lost because the solver's tolerance is too loose
 BARELY = 0.02  # rad: a largest surviving displacement below this counts as none
 REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
@@ -39,19 +41,39 @@ def _rows(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
     return {name: cell for name, cell in cells.items() if np.isfinite(cell[variable].values).any()}
 
 
-def _methods(part: xr.Dataset) -> dict[str, Integrator]:
-    """The integrators of a dataset that are registered."""
-    return {name: method for name, method in integrators().items() if name in part["integrator"].values}
-
-
 def _listed(values: Mapping[str, float]) -> str:
     return ", ".join(f"{value:.4f} for {name}" for name, value in sorted(values.items(), key=lambda one: one[1]))
+
+
+def held_fixed(data: xr.Dataset) -> str:
+    """Scene, step or tolerance, and horizon of each mechanism; charts are in the names of the rows."""
+
+    def of(scene: str, *columns: str) -> list[float] | None:
+        known = scene in data["scene"].values and all(name in data for name in columns)
+        return [float(data[name].sel(scene=scene).max()) for name in columns] if known else None
+
+    parts = []
+    if of("grazing", Column.SHOWN_SETTING):
+        shown = data[Column.SHOWN_SETTING].sel(scene="grazing")
+        step = shown.where(data[Column.CONTROL].sel(scene="grazing") == "step_size").max()
+        parts.append(f"Pole: one fall (one nutation period), step {float(step):.2g} of it")
+    if values := of("steady-fast", Column.DISPLACED_STEPS):
+        parts.append(f"resonances: scene steady-fast, {values[0]:.0f} steps of each size")
+    if of("sleeping", Column.SLEEPING_STEP):
+        parts.append("the sleeping top: scene sleeping, linearised about the upright")
+    if of("separatrix", Column.EARLY_ERROR):
+        parts.append(f"the separatrix: scene separatrix, {LONGEST:g}/g, a point for each step or tolerance")
+    if values := of("goldstein", Column.SAMPLED_STEPS, Column.SAMPLED_PERIODS):
+        parts.append(f"sampling: scene goldstein, {values[0]:.0f} steps a nutation, {values[1]:.0f} nutations")
+    if values := of("goldstein", Column.SOLVER_STEP, Column.SOLVER_STEPS):
+        parts.append(f"the solver: scene goldstein, step {values[0]:g} s, {values[1]:.0f} steps")
+    return f"{'; '.join(parts)}. The name of a row is method[chart]."
 
 
 def poles(part: xr.Dataset) -> str:
     """Which methods need shorter steps where a pole is next to the path."""
     halved: dict[bool, list[bool]] = {True: [], False: []}  # by: is it in the angles chart
-    for name, method in _methods(part).items():
+    for name, method in methods_of(part).items():
         effect = pole_effect(map_of(part.sel(integrator=name)))
         if effect is not None and method.control == "step_size":
             halved[method.charts() == ("angles",)].append(effect.halves)
@@ -59,8 +81,8 @@ def poles(part: xr.Dataset) -> str:
         return ""
     return (
         f"A pole closer than {NEAR:g} rad to the path at least halves the accurate step of {sum(halved[True])} of "
-        f"{len(halved[True])} fixed-step methods in the angles chart, and of {sum(halved[False])} of "
-        f"{len(halved[False])} in charts without poles."
+        f"{len(halved[True])} rows of fixed step in the angles chart, and of {sum(halved[False])} of "
+        f"{len(halved[False])} in charts without poles (one fall past the pole, the rest of the start held fixed)."
     )
 
 
@@ -109,7 +131,7 @@ def resonances(part: xr.Dataset) -> str:
 
 def sleepers(part: xr.Dataset) -> str:
     """The sleeping thresholds of methods that move it, beside their closed forms."""
-    moved, methods = [], _methods(part)
+    moved, methods = [], methods_of(part)
     for name, cell in _rows(part, Column.SLEEPING_THRESHOLD).items():
         if name in methods and (theory := methods[name].sleeps_from) is not None:
             good = np.isfinite(cell[Column.SLEEPING_THRESHOLD].values)
@@ -128,7 +150,7 @@ def horizons(part: xr.Dataset) -> str:
     """Is the accurate time next to a separatrix what the early error says?"""
     names = (Column.HORIZON, Column.PREDICTED_HORIZON, Column.EARLY_ERROR)
     horizon, predicted, early = (part[name].values for name in names)
-    methods = _methods(part)
+    methods = methods_of(part)
     conserving = np.array([name in methods and "energy" in (methods[name].conserves or ())
                            for name in part["integrator"].values])  # fmt: skip
     good = np.isfinite(horizon) & np.isfinite(predicted) & (early < EARLY[1]) & (early > EARLY[0])
@@ -148,7 +170,7 @@ def horizons(part: xr.Dataset) -> str:
 
 
 def sampling(part: xr.Dataset) -> str:
-    """What an energy error sampled once a nutation hides."""
+    """What an energy error sampled once a nutation hides: no ratio is formed with a number at rounding."""
     once, every = part[Column.ENERGY_ONCE].values, part[Column.ENERGY_EVERY].values
     good = np.isfinite(once) & (every > 1e-12)
     if not good.any():
@@ -162,11 +184,11 @@ def sampling(part: xr.Dataset) -> str:
         worst = int(np.argmax(ratio))
         text += "; others appear" if hidden else "An energy error that is sampled once a nutation appears"
         text += f" up to {ratio[worst]:.0e} times too small ({names[worst]})"
-    if "stormer-verlet" in part["integrator"].values:
-        verlet = part.sel(integrator="stormer-verlet")
+    if VERLET in part["integrator"].values:
+        verlet = part.sel(integrator=VERLET)
         true, seen = float(verlet[Column.ENERGY_EVERY]), float(verlet[Column.ENERGY_ONCE])
-        text += f"; that of stormer-verlet is {true:.2g} and appears as {seen:.1g}"
-    return f"{text}."
+        text += f"; that of {VERLET} is {true:.2g} and appears as {seen:.1g}"
+    return f"{text} (on {part['scene'].values}, the same steps a nutation for all)."
 
 
 def solver(part: xr.Dataset) -> str:
@@ -223,8 +245,8 @@ LIMITS = (  # scene, variable, header, format
 def tables(data: xr.Dataset) -> list[Table]:
     """The atlas in words, and the limits in numbers."""
     shown = [
-        Table(f"The atlas in words: {family}", ["integrator", "use it", "it fails"],
-              [list(line) for line in advice(data, family).values()])
+        Table(f"The atlas in words: {family} with its spin changed, {PERIODS:g} nutations",
+              ["row", "use it", "it fails"], [list(line) for line in advice(data, family).values()])
         for family in families(data)
     ]  # fmt: skip
     columns = [one for one in LIMITS if one[0] in data["scene"].values and one[1] in data]
@@ -237,5 +259,5 @@ def tables(data: xr.Dataset) -> list[Table]:
             if name in free:
                 texts[columns.index(limit)] = f"none up to {free[name]:g}"
             rows.append([name, *texts])
-    limits_of_all = Table("Limits in numbers", ["integrator", *(one[2] for one in columns)], rows)
+    limits_of_all = Table("Limits in numbers", ["row", *(one[2] for one in columns)], rows)
     return [*shown, limits_of_all] if columns else shown

@@ -29,13 +29,14 @@ def published(values: list[Published]) -> str:
     """How many published values are reproduced, and what they test."""
     printed, others = ([entry for entry in values if (entry.kind == "printed") is wanted] for wanted in (True, False))
     right, agreeing = (f"{sum(entry.reproduced for entry in part)} of {len(part)}" for part in (printed, others))
-    tests = [entry.tests for entry in printed]
+    tests, other_tests = ([entry.tests for entry in part] for part in (printed, others))
     sources = ", ".join(dict.fromkeys(entry.source for entry in printed if entry.tests == TRAJECTORY))
     return (
         f"{right} printed values are reproduced to the last digit. Only {tests.count(TRAJECTORY)} of them test a "
         f"trajectory of the top ({sources or 'none'}); {tests.count(START)} tests the energy of a start, and "
         f"{tests.count(OTHER_BODY)} belong to an asymmetric free body, which SciPy integrates here, not symtop. Of the "
-        f"values that follow from a formula, or from the numbers that a source was built from, {agreeing} agree."
+        f"values that follow from a formula, or from the numbers that a source was built from, {agreeing} agree; "
+        f"{other_tests.count(TRAJECTORY)} of them test a trajectory and {other_tests.count(START)} a start."
     )
 
 
@@ -77,5 +78,9 @@ def tables(data: xr.Dataset) -> list[Table]:
     ends = ["longest horizon (s)", "axis error there (rad)", "claimed bound (rad)", "seconds"]
     return [
         Table("Published values", header, rows),
-        Table("Sources at their longest horizon", ["scene", "source", *ends], costs),
+        Table(
+            "Sources at their longest horizon, each at the tolerance of its arithmetic's rounding",
+            ["scene", "source", *ends],
+            costs,
+        ),
     ]

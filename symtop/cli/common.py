@@ -33,14 +33,15 @@ Completion = Callable[[click.Context, click.Parameter, str], list[str]]
 
 
 def completing(kind: str) -> Completion:
-    """Shell completion of the names of all scenes, integrators or studies."""
+    """Shell completion of the names of all scenes, integrators or studies; after a bracket, of rows like rk4[axis]."""
 
     def complete(_: click.Context, __: click.Parameter, prefix: str) -> list[str]:
-        from symtop.methods.registry import integrators
+        from symtop.methods.registry import integrators, rows
         from symtop.model.scenes import scenes
         from symtop.runner import scripts
 
-        names = {"scenes": list(scenes()), "integrators": list(integrators()), "studies": scripts.names()}[kind]
+        methods = [row.name for row in rows()] if "[" in prefix else list(integrators())
+        names = {"scenes": list(scenes()), "integrators": methods, "studies": scripts.names()}[kind]
         return [name for name in names if name.startswith(prefix)]
 
     return complete

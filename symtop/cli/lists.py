@@ -45,9 +45,12 @@ def _show(records: list[Record], short: list[Record], chosen: Record | None, pag
 def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool) -> None:
     """List every integrator with what it claims about itself, or show the one called NAME in full.
 
+    A NAME with a chart, rk4[axis], is the method in that chart alone. The column charts of --wide lists them.
+
     \b
     symtop integrators
     symtop integrators midpoint
+    symtop integrators "rk4[axis]"
     """
     from symtop.methods import registry
 
@@ -61,7 +64,7 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool) -> 
         for method in methods
     ]
     chosen = None if name is None else _described(methods[0])
-    note = f"flags: {FLAGS}. One in full: symtop integrators NAME."
+    note = f"flags: {FLAGS}. One in full: symtop integrators NAME; in one chart: NAME[CHART]."
     _show(records, short, chosen, _integrator_page, note, wide, as_json)
 
 

@@ -30,8 +30,12 @@ def run(
 ) -> None:  # fmt: skip
     """Run one INTEGRATOR on one SCENE and compare it with the exact motion.
 
+    INTEGRATOR is a method, which runs in the smallest of its charts that shows what the scene observes, or a method in
+    one chart: rk4[angles], rk4[axis], strang[attitude].
+
     \b
     symtop run spheroid midpoint --step-size 0.01
+    symtop run spheroid "rk4[axis]" --step-size 0.01
     symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
     """
     from symtop.base import datasets

@@ -62,6 +62,7 @@ def setup(fields: Mapping[str, Any]) -> Setup:
     top = SymmetricTop(*(finite(name, fields[name]) for name in TOP))
     start = Angles(*(finite(name, fields[name]) for name in START))
     method = integrator(str(fields["integrator"]))
+    method.chart_for("attitude")  # refuses a row such as rk4[axis]: the page shows the whole attitude
     scene = Scene("explored", top, start, positive("horizon", fields["horizon"]))
     if method.control is None:
         return Setup(scene, method, None)
@@ -169,6 +170,7 @@ def catalogue() -> dict[str, Any]:
     methods = [
         {
             **{name: getattr(entry, name) for name in ("name", "family", "summary", "control", "implementation")},
+            "chart": entry.chart_for("attitude"),
             "tolerance": max(entry.default_tolerance or 1e-6, entry.least_tolerance),
             "color": style.look(entry.name).color,
         }

@@ -21,7 +21,10 @@ from symtop.runner import run as runner, store
 TITLE = "Integrators on the heavy symmetric top"
 INTRODUCTION = (
     "One rigid body, one exact solution, and every method measured against it: accuracy, conservation, cost and "
-    "failure. All numbers and sentences below are generated from the datasets beside this page."
+    "failure. All numbers and sentences below are generated from the datasets beside this page. A row of a comparison "
+    "is a method in one chart: rk4[angles] integrates the Euler angles, rk4[axis] the axis and the angular momentum in "
+    "space, and an [attitude] row the rotation and the angular momentum. Markers of rows in angles are open, those of "
+    "rows in the axis chart full, those of the attitude chart half full."
 )
 
 

@@ -1,12 +1,13 @@
-"""Which scenes a study runs: all that are known and suit its question, but for those that it leaves out for a reason.
+"""Which scenes and rows a study runs: all that suit its question, but for those that it leaves out for a reason.
 
-A study does not list its scenes, so that a scene that is added, to the catalogue or by a user, is in every study whose
-question it suits. What a study leaves out, it names with the reason.
+A study does not list its scenes or methods, so that one that is added, to the catalogue or by a user, is in every study
+whose question it suits. What a study leaves out, it names with the reason.
 """
 
 from collections.abc import Callable, Iterable, Mapping
 
 from symtop.base.validate import SymtopError, one_of
+from symtop.methods.registry import Integrator, integrator, rows
 from symtop.model.scenes import Scene, scenes
 
 
@@ -23,3 +24,15 @@ def grid_scenes(left_out: Mapping[str, Iterable[str]], suits: Callable[[Scene], 
                 raise SymtopError(f"scene {name!r} is left out twice: {reasons[name]!r} and {reason!r}")
             reasons[name] = reason
     return [name for name, scene in known.items() if name not in reasons and suits(scene)]
+
+
+def grid_rows(observe: str, *, attitude: bool = False) -> list[Integrator]:
+    """Every method in each of its charts that shows the "nutation" or the "axis": the rows ``method[chart]`` of a grid.
+
+    Where a method has the axis chart, its attitude chart is left out unless `attitude` is true: it steps the same axis
+    and angular momentum, and the rotation about the axis besides, which neither quantity depends on.
+    """
+    return [
+        row for row in rows(observe)
+        if attitude or row.charts() != ("attitude",) or "axis" not in integrator(row.method).charts()
+    ]  # fmt: skip

@@ -46,6 +46,14 @@ def test_tables_are_complete_and_json_is_json():
         (["run", "sferoid", "midpoint", "--step-size", "0.1"], "did you mean spheroid"),
         (["run", "spheroid", "midpont", "--step-size", "0.1"], "did you mean midpoint"),
         (["run", "spheroid", "midpoint"], "needs --step-size"),
+        (["run", "spheroid", "rk4[axis]"], "rk4[axis] has a fixed step and needs --step-size"),
+        (
+            ["run", "spheroid", "rk4[attitude]", "--step-size", "0.1"],
+            "chart of rk4 'attitude' is unknown; known: angles",
+        ),
+        (["run", "spheroid", "rk4[axs]", "--step-size", "0.1"], "did you mean axis"),
+        (["run", "spheroid", "rk5[axis]", "--step-size", "0.1"], "did you mean rk45"),
+        (["run", "spheroid", "rk4[axis]", "--step-size", "0.1", "--observe", "attitude"], "cannot show the attitude"),
         (["run", "spheroid", "midpoint", "--step-size", "0"], "--step-size must be above zero"),
         (["run", "spheroid", "midpoint", "--step-size", "nan"], "--step-size must be a finite number"),
         (["run", "spheroid", "midpoint", "--step-size", "-1"], "--step-size must be above zero"),
@@ -111,9 +119,28 @@ def test_a_run_is_drawn_and_printed_as_json(tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_row_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_path):
+    changes = {}
+    for chart in ("angles", "axis"):
+        path = tmp_path / f"{chart}.nc"
+        done = call("run", "spheroid", f"rk4[{chart}]", "--step-size", 0.02, "--output", path, "--json")
+        assert done.exit_code == 0, done.output
+        assert datasets.read(path).attrs["chart"] == chart
+        changes[chart] = json.loads(done.output)["errors"]["p_phi"]["largest"]
+    assert changes["axis"] == 0.0 < changes["angles"]
+    assert "rk4[axis]" in call("run", "--help").output
+    assert "NAME[CHART]" in call("integrators").output
+
+
 @pytest.mark.parametrize(
     ("begun", "offered"),
-    [("symtop run sph", "spheroid"), ("symtop run spheroid midp", "midpoint"), ("symtop study cl", "claims")],
+    [
+        ("symtop run sph", "spheroid"),
+        ("symtop run spheroid midp", "midpoint"),
+        ("symtop study cl", "claims"),
+        ("symtop run spheroid rk4[", "rk4[axis]"),
+        ("symtop integrators strang[att", "strang[attitude]"),
+    ],
 )
 def test_the_shell_completes_names(begun, offered):
     words = begun.split()

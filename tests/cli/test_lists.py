@@ -59,6 +59,16 @@ def test_one_integrator_is_shown_in_full():
     assert record["source"] == symtop.integrator("rk45").reference
 
 
+def test_a_row_is_shown_in_full_and_has_one_chart():
+    page = printed("integrators", "rk4[axis]")
+    assert page.startswith("rk4[axis]: classical Runge-Kutta method")
+    assert re.search(r"^charts +axis$", page, re.MULTILINE)
+    assert re.search(r"^charts +angles, axis$", printed("integrators", "rk4"), re.MULTILINE)
+    done = CliRunner().invoke(main, ["integrators", "rk4[attitude]"])
+    assert done.exit_code == 2
+    assert "chart of rk4 'attitude' is unknown; known: angles, axis" in done.output
+
+
 def test_one_scene_is_shown_in_full():
     page = printed("scenes", "spheroid")
     spheroid = symtop.scene("spheroid")

@@ -85,13 +85,25 @@ def test_the_guard_is_heard():
     [
         ({"I3": 30.0}, "I3"), ({"I1": "heavy"}, "I1"), ({"theta": 4.0}, "theta"), ({"step_size": 0.0}, "step_size"),
         ({"step_size": None}, "step_size"), ({"step_size": 1e-9}, "2000000 steps"), ({"horizon": "nan"}, "horizon"),
-        ({"integrator": "midpont"}, "midpoint"), ({"integrator": "rk45", "tolerance": -1.0}, "tolerance"),
+        ({"integrator": "midpont"}, "midpoint"), ({"integrator": "rk4[axis]"}, "cannot show the attitude"),
+        ({"integrator": "rk45", "tolerance": -1.0}, "tolerance"),
         ({"mgl": float("inf")}, "mgl"), ({"psi_dot": []}, "psi_dot"),
     ],
 )  # fmt: skip
 def test_bad_questions_are_refused_in_one_sentence(changes, word):
     with pytest.raises(SymtopError, match=word):
         answers.setup(fields(**changes))
+
+
+def test_the_page_says_in_which_chart_a_method_runs_and_a_row_runs_in_its_own():
+    offered = {entry["name"]: entry["chart"] for entry in answers.catalogue()["integrators"]}
+    assert offered["rk4"] == "angles"
+    assert offered["strang"] == "attitude"
+    for name in ("rk4", "strang"):
+        row = f"{name}[{offered[name]}]"
+        runs = [answers.dataset(answers.setup(fields(integrator=one)), lambda _: None) for one in (name, row)]
+        assert [run.attrs["chart"] for run in runs] == [offered[name]] * 2
+        np.testing.assert_array_equal(runs[0]["theta"].values, runs[1]["theta"].values)
 
 
 def test_a_question_that_lacks_something_says_what():

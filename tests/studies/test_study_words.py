@@ -5,8 +5,11 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.drift import tables, words
+from symtop_studies.drift import rows, tables, words
+from symtop_studies.drift.histories import run_history
+from symtop_studies.drift.study import TOLERANCE, cases
 from symtop_studies.notebook import words as notebook_words
+from symtop_studies.notebook.long_energy import better_from
 from symtop_studies.notebook.tables import SOLVER, Column
 from symtop_studies.stability import words as stability_words
 from symtop_studies.truth import tables as truth_tables, words as truth_words
@@ -43,6 +46,70 @@ def test_runs_over_a_part_of_the_horizon_are_named():
                       coords={"scene": ["spheroid"], "integrator": ["rk4", "rk45", "radau"]})  # fmt: skip
     assert words.shortened(data).endswith("judged on it: radau 50 %, rk45 20 %.")
     assert words.shortened(data.sel(integrator=["rk4"])) == ""
+
+
+def histories(**changes):
+    """Rows with the largest changes of p_phi that are given, at rounding in everything else; the last is adaptive."""
+    names = ["rk4[angles]", "rk4[axis]", "strang[axis]", "strang[attitude]", "rk45[angles]", "taylor[axis]"]
+    sizes = [changes.get(name.replace("[", "_").rstrip("]"), 1e-15) for name in names]
+    per_row = {
+        "p_phi_largest": sizes, "energy_largest": [1e-15] * 6, "p_psi_largest": [0.0] * 6, "outcome": ["ok"] * 6,
+        "nutations": [100.0] * 6, "steps_a_nutation": [118.0] * 4 + [np.nan] * 2,
+        "tolerance": [np.nan] * 4 + [1e-8, 2.2e-18], "own_tolerance": [0.0] * 5 + [1.0],
+    }  # fmt: skip
+    coords = {"scene": ["spheroid"], "integrator": names}
+    return xr.Dataset({key: (("scene", "integrator"), [values]) for key, values in per_row.items()}, coords=coords)
+
+
+def test_what_a_chart_does_is_not_said_of_the_method():
+    said = rows.charts_apart(histories(rk4_angles=1.5e-4, rk4_axis=0.0))
+    assert "p_phi changes by 1.5e-04 with rk4[angles] and by exactly 0 with rk4[axis]" in said
+    assert "strang" not in said
+    assert "The other 1 methods" in said
+    for alike in ({"rk4_angles": 1.5e-4, "rk4_axis": 1.2e-4}, {"rk4_angles": 1e-14, "rk4_axis": 0.0}):
+        assert "The chart alone" not in rows.charts_apart(histories(**alike))
+
+
+def test_every_tolerance_is_stated_and_a_default_says_that_it_is_one():
+    said = rows.setting(histories())
+    assert "100 nutations of spheroid; 118 steps a nutation or tolerance 1e-08 (rk45[angles])" in said
+    assert "default tolerance, which is the rounding of the arithmetic: taylor[axis] 2.2e-18" in said
+    cells = [
+        histories().sel(scene="spheroid", integrator=name) for name in ("rk4[axis]", "rk45[angles]", "taylor[axis]")
+    ]
+    assert [rows.used(cell) for cell in cells] == [
+        "118.00 steps a nutation", "tolerance 1.0e-08", "tolerance 2.2e-18 (its default: rounding)",
+    ]  # fmt: skip
+
+
+def test_adaptive_methods_drift_at_one_tolerance():
+    """One value for all of them, except for those that have a default of their own and keep it."""
+    asked = [case for case in cases(quick=False) if case.group == tables.HISTORIES]
+    given = {case.settings["tolerance"] for case in asked if "tolerance" in case.settings}
+    assert given == {TOLERANCE}
+    for case in asked:
+        method = symtop.integrator(case.integrator)
+        assert len(method.charts()) == 1, case
+        own = method.adaptive and method.default_tolerance is not None
+        assert ("tolerance" in case.settings) == (method.adaptive and not own), case
+    assert {"rk4[angles]", "rk4[axis]", "strang[attitude]"} <= {case.integrator for case in asked}
+
+
+def test_a_history_says_with_what_it_ran():
+    on = symtop.scene("spheroid")
+    short = {"horizon": 20.0 * on.nutation_period, "samples": 101}
+    step = run_history(on, symtop.integrator("rk4[axis]"), step_size=on.nutation_period / 50.0, **short)
+    loose = run_history(on, symtop.integrator("rk45-compiled[angles]"), tolerance=1e-5, **short)
+    default = run_history(on, symtop.integrator("taylor[axis]"), **short)
+    assert [float(one["steps_a_nutation"]) for one in (step, loose)] == pytest.approx([50.0, math.nan], nan_ok=True)
+    assert [float(one["tolerance"]) for one in (loose, default)] == [
+        1e-5,
+        symtop.integrator("taylor").default_tolerance,
+    ]
+    assert [float(one["own_tolerance"]) for one in (step, loose, default)] == [0.0, 0.0, 1.0]
+    assert float(step["p_phi_largest"]) == 0.0
+    other = run_history(on, symtop.integrator("rk4[angles]"), step_size=on.nutation_period / 50.0, **short)
+    assert float(other["p_phi_largest"]) > 1e-9
 
 
 def test_a_change_of_law_is_told_above_rounding_only():
@@ -150,23 +217,23 @@ def test_a_loss_that_is_off_by_a_fifth_was_not_predicted():
 
     assert "right to 3 % for 2 of 2" in sentence(1.01, 0.97)
     assert "Off by more" not in sentence(1.01, 0.97)
-    assert "for 1 of 2 methods. Off by more than 10%: method-1 (20% off)" in sentence(1.01, 1.2)
+    assert "for 1 of 2 rows. Off by more than 10%: method-1 (20% off)" in sentence(1.01, 1.2)
     assert "is right" not in sentence(1.3)
     assert "method-0 (not reached)" in sentence(math.nan)
 
 
 def test_the_notebook_study_names_discrete_methods_that_lose_their_momenta():
     sizes = np.array([[1e-15, 1e-15, 1e-6]])
-    coords = {"scene": ["spheroid"], "integrator": ["midpoint", "strang", SOLVER]}
+    coords = {"scene": ["spheroid"], "integrator": ["midpoint[angles]", "strang[axis]", SOLVER]}
     data = xr.Dataset(dict.fromkeys(notebook_words.MOMENTA, (("scene", "integrator"), sizes)), coords=coords)
     assert "With all 2 discrete methods" in notebook_words.momenta(data)
     lost = data.assign({"p_phi_largest": (("scene", "integrator"), [[1e-15, 1e-9, 1e-6]])})
     assert "With 1 of 2 discrete methods" in notebook_words.momenta(lost)
-    assert "not with strang" in notebook_words.momenta(lost)
+    assert "not with strang[axis]" in notebook_words.momenta(lost)
 
 
-def test_the_notebook_study_names_methods_of_order_two_whose_energy_is_worse_than_the_solvers():
-    coords = {"scene": ["spheroid"], "integrator": ["midpoint", "stormer-verlet", SOLVER]}
+def test_the_notebook_study_says_how_many_discrete_methods_have_a_smaller_error_than_the_solver():
+    coords = {"scene": ["spheroid"], "integrator": ["midpoint[angles]", "stormer-verlet[angles]", SOLVER]}
     data = xr.Dataset(coords=coords).assign({
         "energy_largest": (("scene", "integrator"), [[3e-5, 1e-9, 1e-6]]),
         Column.ENERGY_CHANGE: ("shadow_setting", [4e-4]),
@@ -174,8 +241,35 @@ def test_the_notebook_study_names_methods_of_order_two_whose_energy_is_worse_tha
     })  # fmt: skip
     sentence = notebook_words.energy(data)
     assert "1 of 2 have a smaller one than the solver (1e-06)" in sentence
-    assert "Not among them: midpoint (3e-05)." in sentence
     assert "40-fold" in sentence
+
+
+def long_runs(level, slope):
+    """A discrete method of a level energy error beside a solver whose error grows with time, to t = 1000."""
+    time = np.geomspace(1.0, 1000.0, 301)
+    coords = {"scene": ["spheroid"], "integrator": ["midpoint[angles]", SOLVER]}
+    return xr.Dataset({
+        Column.LONG_TIME: (("scene", "integrator", "long"), [[time, time]]),
+        Column.LONG_ENERGY: (("scene", "integrator", "long"), [[np.full(301, level), slope * time]]),
+        "energy_largest": (("scene", "integrator"), [[level, slope * 8.0]]),
+        Column.SAMPLE_TIME: (("scene", "integrator", "sample"), np.full((1, 2, 1), 8.0)),
+    }, coords=coords)  # fmt: skip
+
+
+def test_the_notebooks_question_is_answered_and_the_time_from_which_its_hope_is_true_is_measured():
+    late = long_runs(3e-5, 1e-7)
+    assert better_from(late, "spheroid", "midpoint[angles]") == pytest.approx(300.0, rel=0.03)
+    (said,) = notebook_words.hopes(late)
+    assert (
+        "at the notebook's t = 8, it is kept worse with midpoint[angles] (3e-05), against 8e-07 of lsoda[angles]"
+        in said
+    )
+    assert "the hope comes true from t = 302 (midpoint[angles]) on" in said
+    never, always = long_runs(3e-5, 1e-9), long_runs(1e-9, 1e-7)
+    assert better_from(never, "spheroid", "midpoint[angles]") == math.inf
+    assert "it does not come true with midpoint[angles]" in notebook_words.hopes(never)[0]
+    assert better_from(always, "spheroid", "midpoint[angles]") == 0.0
+    assert "better with midpoint[angles]" in notebook_words.hopes(always)[0]
 
 
 @pytest.mark.parametrize(
@@ -209,10 +303,11 @@ def test_the_truth_study_says_what_the_printed_values_test():
         "Only 2 of them test a trajectory of the top (somebody); 1 tests the energy of a start, and 0 belong"
         in sentence
     )
-    assert "1 of 1 agree" in sentence
+    assert "1 of 1 agree; 0 of them test a trajectory and 1 a start." in sentence
     everything = truth_words.published(published.published_values())
     assert "7 of 7 printed values" in everything
     assert "Only 3 of them test a trajectory" in everything
+    assert "6 of 6 agree; 4 of them test a trajectory and 2 a start." in everything
 
 
 @pytest.mark.parametrize(("bound", "holding"), [(2e-9, 2), (5e-10, 1)])

@@ -55,8 +55,8 @@ function chooseScene(name) {
 
 function chooseIntegrator(name) {
   values.integrator = name;
-  const { summary, control, tolerance } = chosen();
-  $("summary").textContent = summary;
+  const { summary, chart, control, tolerance } = chosen();
+  $("summary").textContent = `${summary} (shown in the ${chart} chart)`;
   rows.step_size.row.hidden = control !== "step_size";
   rows.tolerance.row.hidden = control !== "tolerance";
   if (control === "tolerance") rows.tolerance.set(tolerance);
