@@ -23,8 +23,8 @@ HOW_TO_READ = (
     "small nutations about a steady precession grow; a fixed-step method without a solid line has no such limit on the "
     "map, or none that can be measured. Dashed lines: the step that advances such a nutation by a third of a turn. A "
     "limit for fast tops (r > 3) or slow tops (r < 1) holds for nine spins in ten. A method is said to fail from a "
-    "step or tolerance on if at least half of all spins fail there and at every larger one: they change their energy ever "
-    "more, cross a turning point of the true motion, or end early. A name method[chart], as rk4[axis], is a method in "
+    "step or tolerance on if at least half of all spins fail there and at every larger one: they change their energy "
+    "ever more, cross a turning point of the true motion, or end early. A name method[chart], as rk4[axis], is a method in "
     "one chart."
 )
 VERLET = "stormer-verlet[angles]"
@@ -188,7 +188,8 @@ def sampling(part: xr.Dataset) -> str:
         verlet = part.sel(integrator=VERLET)
         true, seen = float(verlet[Column.ENERGY_EVERY]), float(verlet[Column.ENERGY_ONCE])
         text += f"; that of {VERLET} is {true:.2g} and appears as {seen:.1g}"
-    return f"{text} (on {part['scene'].values}, the same steps a nutation for all)."
+    scene = f"on {part['scene'].values}, " if "scene" in part.coords else ""
+    return f"{text} ({scene}the same steps a nutation for all)."
 
 
 def solver(part: xr.Dataset) -> str:
