@@ -42,7 +42,7 @@ def envelope(t: np.ndarray, r: np.ndarray) -> tuple[list[float], list[float]]:
 
 
 def _residuals(histories: xr.Dataset) -> Picture:
-    small = without_repeats(histories)
+    small = rows.without_repeats(histories)
     names = [name for name in small["integrator"].values if split_name(str(name))[0] in SHOWN]
     data = small.sel(integrator=names) if names else small
     figure, axes = panels(len(CONSTANTS), data.sizes["scene"], height=2.7, sharex="col", sharey="row")
@@ -80,13 +80,6 @@ def _residuals(histories: xr.Dataset) -> Picture:
     return Picture("residuals", figure, caption.rstrip(), alt)
 
 
-def without_repeats(histories: xr.Dataset) -> xr.Dataset:
-    """The rows that are drawn: no attitude chart beside an axis chart, whose numbers it repeats."""
-    names = list(map(str, histories["integrator"].values))
-    repeats = {name.replace("[axis]", "[attitude]") for name in names if name.endswith("[axis]")}
-    return histories.sel(integrator=[name for name in names if name not in repeats])
-
-
 def dots(data: xr.Dataset, columns: dict[str, str], *, log: bool) -> Any:
     """One line a row ``method[chart]``, one column a variable with its label, one dot a scene: tables at a glance.
 
@@ -112,7 +105,7 @@ def dots(data: xr.Dataset, columns: dict[str, str], *, log: bool) -> Any:
 
 
 def _sizes(histories: xr.Dataset) -> Picture:
-    data = without_repeats(histories)
+    data = rows.without_repeats(histories)
     figure = dots(data, {f"{name}_largest": f"largest residual {LABELS[name]}" for name in CONSTANTS}, log=True)
     caption = (
         "Largest relative residual of every row over the whole run, energies relative to E0 - min V; an exact zero "
@@ -127,7 +120,7 @@ def _sizes(histories: xr.Dataset) -> Picture:
 
 def _exponents(histories: xr.Dataset) -> Picture:
     columns = {f"{name}_exponent": f"exponent of {LABELS[name]}" for name in (*CONSTANTS, "phase")}
-    data = without_repeats(histories)
+    data = rows.without_repeats(histories)
     figure = dots(data, columns, log=False)
     for axis in figure.axes:
         axis.set(xlim=(-0.35, 2.5), xticks=(0.0, 0.5, 1.0, 1.5, 2.0))

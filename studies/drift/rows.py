@@ -16,6 +16,13 @@ from .tables import rounding
 APART = 2.0  # times: two charts of one method differ by more than this, one of them above rounding
 
 
+def without_repeats(histories: xr.Dataset) -> xr.Dataset:
+    """The rows that are drawn and told of: no attitude chart beside an axis chart, whose numbers it repeats."""
+    names = list(map(str, histories["integrator"].values))
+    repeats = {name.replace("[axis]", "[attitude]") for name in names if name.endswith("[axis]")}
+    return histories.sel(integrator=[name for name in names if name not in repeats])
+
+
 def setting(histories: xr.Dataset) -> str:
     """Scene, horizon, and step or tolerance of all runs, in a sentence or two."""
     scenes, most = ", ".join(map(str, histories["scene"].values)), float(histories["nutations"].max())

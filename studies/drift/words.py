@@ -13,7 +13,7 @@ from symtop.runner.study import Table
 
 from .long_runs import PLAIN_MEMBERS
 from .phase_loss import LOST, SHORT, TARGET
-from .rows import charts_apart, setting, used
+from .rows import charts_apart, setting, used, without_repeats
 from .tables import FAILED, HISTORIES, HORIZONS, ROUNDINGS, WINDOWS, by_integrator, losses, rounding, worst_behaviour
 
 QUOTED = (  # whose exponents the caption quotes
@@ -215,10 +215,11 @@ def verdict(data: xr.DataTree) -> list[str]:
     groups = {name: group.to_dataset() for name, group in data.children.items()}
     sentences, part = [], ""
     if HISTORIES in groups:
-        sentences = [sentence for name in CONSTANTS for sentence in _constant_sentences(groups[HISTORIES], name)]
-        sentences += phase_growth(groups[HISTORIES])
-        part = shortened(groups[HISTORIES])
-        sentences = list(filter(None, [setting(groups[HISTORIES]), *sentences, charts_apart(groups[HISTORIES])]))
+        told = without_repeats(groups[HISTORIES])
+        sentences = [sentence for name in CONSTANTS for sentence in _constant_sentences(told, name)]
+        sentences += phase_growth(told)
+        part = shortened(told)
+        sentences = list(filter(None, [setting(told), *sentences, charts_apart(groups[HISTORIES])]))
     if WINDOWS in groups:
         steps, names = float(groups[WINDOWS]["steps"].max()), groups[WINDOWS]["integrator"].values
         of = f"{', '.join(names)}, {PER_NUTATION:.0f} a nutation of {_scene(groups[WINDOWS])},"

@@ -24,8 +24,8 @@ HOW_TO_READ = (
     "map, or none that can be measured. Dashed lines: the step that advances such a nutation by a third of a turn. A "
     "limit for fast tops (r > 3) or slow tops (r < 1) holds for nine spins in ten. A method is said to fail from a "
     "step or tolerance on if at least half of all spins fail there and at every larger one: they change their energy "
-    "ever more, cross a turning point of the true motion, or end early. A name method[chart], as rk4[axis], is a method in "
-    "one chart."
+    "ever more, cross a turning point of the true motion, or end early. A name method[chart], as rk4[axis], is a "
+    "method in one chart."
 )
 VERLET = "stormer-verlet[angles]"
 LOOSE = 10.0  # times the change of the solved equation: lost because the solver's tolerance is too loose
