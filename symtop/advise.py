@@ -35,7 +35,7 @@ from symtop.base.validate import SymtopError, one_of, positive
 from symtop.measure import ranking, settings
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
-from symtop.methods.registry import Integrator, integrators
+from symtop.methods.registry import Integrator, integrator, split_name
 from symtop.model import scenes
 from symtop.model.scenes import Scene
 from symtop.run.simulation import MOST_STEPS
@@ -137,7 +137,8 @@ def recommend(
     source += f" ({Path(results) / STORED_STUDY})" if results is not None else ""
     trials: list[_Trial] = []
     fails: dict[str, list[str]] = {}
-    methods, patience = integrators(), math.inf
+    patience = math.inf
+    methods = {name: integrator(name) for name in guesses}
     # Methods of high order first: they are the cheapest at most accuracies, and their cost ends the other searches.
     for name in sorted(guesses, key=lambda name: -(methods[name].order or 0)):
         trial = _try(question, methods[name], guesses[name], patience)
@@ -165,21 +166,32 @@ def _stored(file: Path) -> xr.Dataset:
     """The dataset of the work-precision study; refused with a sentence if it is not there or cannot be read."""
     if not file.is_file():
         raise SymtopError(f"results holds no {file.name}: {str(file.parent)!r}; run symtop study work_precision first")
+    remedy = "run symtop study work_precision --fresh"
     try:
-        return datasets.read(file)
+        data = datasets.read(file)
     except SymtopError as error:
-        remedy = "run symtop study work_precision --fresh"
         raise SymtopError(f"{file} cannot be read ({error.__cause__}); {remedy}") from error
+    if missing := [name for name in ranking.NEEDS if name not in data]:
+        raise SymtopError(f"{file} is of an older version, without {', '.join(missing)}; {remedy}")
+    return data
 
 
-def _usable(quantity: str) -> dict[str, Integrator]:
-    """Methods that can be recommended: compiled, with a step or tolerance, and able to show the quantity."""
-    charts = {"angles", "attitude"} | ({"axis"} if settings.observed(quantity) == "axis" else set())
-    return {
-        name: method
-        for name, method in integrators().items()
-        if method.control is not None and method.implementation == "compiled" and charts & method.solvers.keys()
-    }
+def _usable(quantity: str) -> list[str]:
+    """What can be recommended: compiled methods with a step or a tolerance, in each chart that shows the quantity.
+
+    A method is named with its chart, ``rk4[axis]``, if it has several.
+    """
+    return [
+        row.name if len(integrator(row.method).charts()) > 1 else row.method
+        for row in settings.compared(settings.observed(quantity))
+        if row.control is not None and row.implementation == "compiled"
+    ]
+
+
+def _same(row: str, usable: Sequence[str]) -> str | None:
+    """The usable name of a stored row, of the same method in another chart if need be; None if there is none."""
+    method = split_name(row)[0]
+    return next((name for name in (row, *usable) if name in usable and split_name(name)[0] == method), None)
 
 
 def _candidates(question: _Question, data: xr.Dataset | None) -> tuple[dict[str, float | None], str]:
@@ -199,10 +211,12 @@ def _candidates(question: _Question, data: xr.Dataset | None) -> tuple[dict[str,
     column = int(np.argmin(np.abs(np.log(data["horizon"].values / max(nutations, 1e-3)))))
     cell = data.sel(scene=nearest).isel(horizon=column)
     chosen: dict[str, float | None] = {}
-    for place in ranking.cheapest(cell, accuracy, quantity):
-        if place.integrator in usable and len(chosen) < CANDIDATES:
+    stored_as = "axis" if quantity == "attitude" else quantity  # the study runs what shows the axis
+    for place in ranking.cheapest(cell, accuracy, stored_as):
+        name = _same(place.integrator, usable)
+        if name is not None and name not in chosen and len(chosen) < CANDIDATES:
             row = cell.sel(integrator=place.integrator).isel(setting=place.setting)
-            chosen[place.integrator] = _setting(row, scene, stored[nearest])
+            chosen[name] = _setting(row, scene, stored[nearest])
     if not chosen:
         cause = f"none met it on {nearest}, the nearest stored scene"
         return everyone, f"tried all {len(everyone)} compiled methods ({cause})"

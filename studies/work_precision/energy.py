@@ -1,19 +1,26 @@
-"""Energy errors of methods that preserve the structure of the problem, beside classical ones at equal run time."""
+"""Energy errors at equal run time of symplectic methods and classical ones, within one chart.
 
+The chart changes the energy error of a method as much as the method does, so that rows are compared only with rows of
+the same chart: the splittings and the Gauss methods with rk4 and taylor on (e, L), the discrete Lagrangians and the
+compositions of Verlet with rk4 and rk45-compiled in Euler angles.
+"""
+
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
+from symtop.methods.registry import split_name
 
-STRUCTURE = ("midpoint", "trapezoidal", "stormer-verlet", "galerkin-simpson")
-CLASSIC = ("rk4", "rk45-compiled")
-COMPARED = (*STRUCTURE, *CLASSIC)
+CHARTS = {"axis": "the axis and the angular momentum (e, L)", "angles": "Euler angles"}
+CLASSIC = ("rk4", "rk45-compiled", "taylor")  # compared in each chart that they have
+STEPS = 118.0  # a nutation, of the comparison at equal steps
 
 
 class Crossing(NamedTuple):
-    """Energy at equal time on a scene: the share of the common times at which the first of two methods is better."""
+    """Energy at equal time on a scene: the share of the common times at which the first of two rows is better."""
 
     scene: str
     share: float  # of the common range, in the logarithm of time
@@ -24,8 +31,27 @@ class Crossing(NamedTuple):
     gain: float  # ratio of the energy errors there, second over first
 
 
+def in_chart(data: xr.Dataset, chart: str) -> tuple[list[str], list[str]]:
+    """The compiled rows of a chart that are compared: the classical ones, and those that claim to be symplectic."""
+    names = [str(name) for name in ranking.ranked(data)]
+    over = [dim for dim in data["symplectic"].dims if dim != "integrator"]
+    symplectic = data["symplectic"].max(over)
+    kept = [
+        name
+        for name in names
+        if chart in data["chart"].sel(integrator=name) and "compiled" in data["implementation"].sel(integrator=name)
+    ]
+    classic = [name for name in kept if split_name(name)[0] in CLASSIC]
+    return classic, [name for name in kept if name not in classic and float(symplectic.sel(integrator=name)) == 1.0]
+
+
+def in_comparison(data: xr.Dataset) -> list[str]:
+    """All rows whose energy errors are compared, in both charts."""
+    return [name for chart in CHARTS for names in in_chart(data, chart) for name in names]
+
+
 def crossing(cell: xr.Dataset, first: str, second: str) -> Crossing | None:
-    """Compare the least energy error that each of two methods has for a time; None if their times do not overlap.
+    """Compare the least energy error that each of two rows has for a time; None if their times do not overlap.
 
     The error for a time is that of the most accurate run that takes no longer, joined by straight lines in the
     logarithms. `cell` is one scene and one horizon.
@@ -51,15 +77,29 @@ def crossing(cell: xr.Dataset, first: str, second: str) -> Crossing | None:
     return Crossing(str(cell["scene"].values), float(ahead.mean()), bool(ahead[0]), bool(ahead[-1]), won, error, gain)
 
 
-def crossings(data: xr.Dataset) -> dict[tuple[str, str], list[Crossing]]:
-    """All comparisons over the long horizon by (classical method, other method), on the scenes that count."""
-    kept = ranking.counted(data)[0].isel(horizon=-1)
-    cells = [kept.sel(scene=name) for name in kept["scene"].values]
+def crossings(data: xr.Dataset, chart: str) -> dict[str, dict[str, list[Crossing]]]:
+    """All comparisons of a chart over the long horizon, by the classical row and by the symplectic one."""
+    last = data.isel(horizon=-1)
+    cells = [last.sel(scene=name) for name in last["scene"].values]
+    classic, symplectic = in_chart(data, chart)
     return {
-        (classic, method): [one for cell in cells if (one := crossing(cell, method, classic))]
-        for classic in CLASSIC
-        for method in STRUCTURE
+        second: {first: [one for cell in cells if (one := crossing(cell, first, second))] for first in symplectic}
+        for second in classic
     }
+
+
+def at_steps(runs: xr.Dataset, steps: float) -> tuple[float, float]:
+    """Energy error and force evaluations a step of a row at so many steps, on the lines between its runs in logarithms.
+
+    NaN if no two runs have that number between them. `runs` is one scene, one horizon and one row.
+    """
+    x, y, work = (runs[name].values for name in ("steps", "energy", "force_evaluations"))
+    good = np.isfinite(x) & (y > 0.0) & (runs["outcome"].values == "ok")
+    order = np.argsort(x[good])
+    x, y, work = (values[good][order] for values in (x, y, work))
+    if x.size < 2 or not x[0] <= steps <= x[-1]:
+        return np.nan, np.nan
+    return tuple(float(np.exp(np.interp(np.log(steps), np.log(x), np.log(one)))) for one in (y, work / x))
 
 
 def growth_at_equal_settings(runs: xr.Dataset, quantity: str) -> float:
@@ -73,3 +113,50 @@ def growth_at_equal_settings(runs: xr.Dataset, quantity: str) -> float:
     ]
     good = [ratio for ratio in ratios if np.isfinite(ratio)]
     return float(np.median(good)) if good else np.nan
+
+
+def sentence(data: xr.Dataset, chart: str) -> str:
+    """How often symplectic rows have less energy error than the classical ones of their chart at equal run time."""
+    said = []
+    for classic, compared in crossings(data, chart).items():
+        pairs = [one for listed in compared.values() for one in listed]
+        if not pairs:
+            continue
+        always = [name for name, listed in compared.items() if listed and all(one.share == 1.0 for one in listed)]
+        never = [name for name, listed in compared.items() if listed and all(one.share == 0.0 for one in listed)]
+        text = (
+            f"With {classic} as the classical one, of {len(pairs)} pairs of a symplectic method and a scene the "
+            f"symplectic one has the smaller energy error at all common run times in "
+            f"{sum(one.share == 1.0 for one in pairs)}, at short ones only in "
+            f"{sum(one.at_least and not one.at_most for one in pairs)}, at long ones only in "
+            f"{sum(one.at_most and not one.at_least for one in pairs)}, and at none in "
+            f"{sum(one.share == 0.0 for one in pairs)}."
+        )
+        text += f" On every scene and at all run times: {', '.join(always)}." if always else ""
+        text += f" On no scene: {', '.join(never)}." if never else ""
+        said.append(text)
+    horizon = f"{float(data['horizon'].values[-1]):g}"
+    if not said:
+        return ""
+    return f"Energy over {horizon} nutation periods in the chart of {CHARTS[chart]}, compared at equal run time. " + (
+        " ".join(said)
+    )
+
+
+def at_equal_steps(data: xr.Dataset, names: Sequence[str], scene: str) -> str:
+    """Energy errors of rows of one chart over the long horizon at the same steps; empty if they were not run there."""
+    last = data.sel(scene=scene).isel(horizon=-1)
+    periods = float(data["horizon"].values[-1])
+    known = [name for name in names if name in last["integrator"].values]
+    ends = {name: at_steps(last.sel(integrator=name), STEPS * periods) for name in known}
+    listed = [
+        f"{name} ({work:.2g} force evaluations a step) {error:.1e}"
+        for name, (error, work) in ends.items()
+        if np.isfinite(error)
+    ]
+    if len(listed) < 2:
+        return ""
+    return (
+        f"At equal steps, {STEPS:g} a nutation, the largest energy errors on {scene} over {periods:g} nutation periods "
+        f"are: {', '.join(listed)}."
+    )

@@ -1,6 +1,7 @@
 """The two tables of the work-precision study.
 
-Dimensions: scene, integrator, horizon (in nutation periods), setting (coarse to fine, each method its own), batch.
+Dimensions: scene, integrator (a row, method[chart]), horizon (in nutation periods), setting (coarse to fine, each row
+its own), target (rad), batch.
 
     step_size or tolerance, setting_value, steps, force_evaluations, newton_iterations, outcome,     of one run
     reached_time
@@ -9,8 +10,13 @@ Dimensions: scene, integrator, horizon (in nutation periods), setting (coarse to
     nutation_period, precession_rate (and _bound)   relative errors of the mean frequencies
     shape, nutation_lag, precession_lag             parts of the axis error
     seconds, seconds_samples(batch), spread         time of one run, NaN if it was not timed, see `timing_rounds`
-    first_call, implementation                      of a method: seconds of its first run, "compiled" or "python"
+    seconds_forecast                                what the row's other times foretell for it; drawn nowhere
+    first_call, implementation, chart, control,     of a row: seconds of its first run, "compiled" or "python", its
+    symplectic                                      chart, "step_size", "tolerance" or "", 1 if it claims to be so
+    set_up, one_sample                              seconds of a row without steps, NaN of the others
     stopped(horizon)                                why it tried nothing finer
+    reached(horizon, target)                        "met", or why not: one of `work.STOPS`, `TOO_WIDE` or `CAPPED`
+    nutation_width                                  of a scene: angle between the turning points, rad
 """
 
 import xarray as xr
@@ -24,10 +30,11 @@ from .timing_rounds import Effort, TimedRun, timing_rounds
 
 
 def errors_and_work(case: Case) -> xr.Dataset:
-    """Errors and counted work of one method on a scene, over all horizons."""
-    scene, periods = scenes.scene(case.scene), case.settings["periods"]
-    table = work_table(scene, integrator(case.integrator), spans(scene, periods), case.settings["budget"])
-    return table.assign_coords(horizon=periods)
+    """Errors and counted work of one row on a scene, over all horizons."""
+    scene, periods, row = scenes.scene(case.scene), case.settings["periods"], integrator(case.integrator)
+    table = work_table(scene, row, spans(scene, periods), case.settings["budget"])
+    traits = {"chart": ((), row.chart_for("axis")), "symplectic": ((), float(bool(row.symplectic)))}
+    return table.assign(traits).assign_coords(horizon=periods)
 
 
 def run_times(case: Case) -> xr.Dataset:

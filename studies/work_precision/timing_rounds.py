@@ -1,12 +1,14 @@
-"""Times of many methods on one scene; most of the timing goes to those that may be the fastest.
+"""Times of many rows on one scene; most of the timing goes to those that may be the fastest.
 
-A run is timed if, of its method's runs that meet some target over some horizon, it has the fewest force evaluations;
-of the methods whose energy errors are compared at equal run time, every run over the last horizon is timed. No other
-run has a time.
+A run is timed if, of its row's runs that meet some target over some horizon, it has the fewest force evaluations; of
+the rows whose energy errors are compared at equal run time, every run over the last horizon is timed. No other run has
+a time, and no time is computed from others.
 
 All of them take part in a few rounds of short batches: in each round every run once, in random order. The contenders
 for a target, those within `WITHIN` of the fastest compiled or plain Python one, then take part in further rounds of
-longer batches. A contender whose two times differ by more than a quarter (`NOISY`) takes part in as many rounds again.
+longer batches. Then each time is compared with what the row's other times foretell (`timing.forecasts`); one that
+misses that by a quarter (`MISSED`), or has no forecast, is taken again. A time that still misses is kept with its
+forecast beside it, and a lead must then hold for both.
 
 `seconds` is the smallest sample. Everything runs on one thread; compilation and first use are in `first_call`.
 """
@@ -17,22 +19,24 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.measure.timing import NOISY, Timing, bare_run, timings
+from symtop.measure.timing import MISSED, Timing, bare_run, forecasts, timings
 from symtop.measure.work import TARGETS, least_work
-from symtop.methods.registry import integrator
+from symtop.methods.registry import Integrator, integrator
 from symtop.model.scenes import Scene
 
 WITHIN = 1.6  # of the fastest
-MOST_NEAR = 4  # contenders for one target
+MANY = 1002  # samples that show what one of a closed form costs
 
 
 class TimedRun(NamedTuple):
-    """One run to be timed: of which method, over which horizon, and its place in the table of settings."""
+    """One run to be timed: of which row, over which horizon, and its place in the table of settings."""
 
     name: str
     far: int  # index of the horizon
     place: int  # index of the setting
     setting: float
+    evaluations: float
+    steps: float
     targets: tuple[int, ...]  # which targets it is the cheapest run for
 
 
@@ -44,7 +48,7 @@ class Effort(NamedTuple):
 
 
 def timed_runs(data: xr.Dataset, compared: Collection[str] = ()) -> list[TimedRun]:
-    """The runs of one scene to be timed; of the methods in `compared`, all that ended well over the last horizon.
+    """The runs of one scene to be timed; of the rows in `compared`, all that ended well over the last horizon.
 
     `data` has dimensions integrator, horizon and setting.
     """
@@ -58,19 +62,37 @@ def timed_runs(data: xr.Dataset, compared: Collection[str] = ()) -> list[TimedRu
             for number, target in enumerate(TARGETS):
                 if (least := int(least_work(cell, target))) >= 0:
                     serves.setdefault(least, []).append(number)
-            setting = cell["setting_value"].values
-            runs += [TimedRun(name, far, k, float(setting[k]), tuple(served)) for k, served in serves.items()]
+            setting, work, steps = (
+                cell[key].values.astype(float) for key in ("setting_value", "force_evaluations", "steps")
+            )
+            runs += [
+                TimedRun(name, far, k, float(setting[k]), float(work[k]), float(steps[k]), tuple(served))
+                for k, served in serves.items()
+            ]
     return runs
 
 
 def contenders(runs: Sequence[TimedRun], cost: Mapping[TimedRun, float], kind: Mapping[str, str]) -> list[TimedRun]:
-    """The runs near the fastest, compiled or plain Python, for some horizon and target; that one is among them."""
+    """The runs near the fastest of their kind for some horizon and target; the fastest is among them."""
     rivals: dict[tuple[str, int, int], list[TimedRun]] = {}
     for run in sorted(runs, key=lambda run: cost[run]):
         for number in run.targets:
             rivals.setdefault((kind[run.name], run.far, number), []).append(run)
-    near = [[run for run in group[:MOST_NEAR] if cost[run] <= WITHIN * cost[group[0]]] for group in rivals.values()]
+    near = [[run for run in group if cost[run] <= WITHIN * cost[group[0]]] for group in rivals.values()]
     return list(dict.fromkeys(run for group in near if len(group) > 1 for run in group))
+
+
+def foretold(cost: Mapping[TimedRun, float], methods: Mapping[str, Integrator]) -> dict[TimedRun, float]:
+    """What the other times of its row foretell for every run; NaN where there are too few of them."""
+    expected: dict[TimedRun, float] = {}
+    for name, method in methods.items():
+        own = [run for run in cost if run.name == name]
+        values = forecasts(
+            [cost[run] for run in own], [run.evaluations for run in own], [run.steps for run in own],
+            fixed_step=method.fixed_step,
+        )  # fmt: skip
+        expected |= dict(zip(own, map(float, values), strict=True))
+    return expected
 
 
 def timing_rounds(
@@ -79,7 +101,8 @@ def timing_rounds(
     """Seconds of the runs of a scene: dimensions integrator, horizon, setting, batch.
 
     Variables: ``seconds``; ``seconds_samples``, one column a round, NaN for the rounds that a run has no part in;
-    ``spread`` of the samples; and for each integrator ``first_call``.
+    ``spread`` of the samples; ``seconds_forecast``, from the row's other runs; for each row ``first_call``; and for a
+    row that takes no steps ``set_up`` and ``one_sample``, its seconds before the first sample and for each of them.
     """
     methods = {run.name: integrator(run.name) for run in runs}
 
@@ -91,11 +114,12 @@ def timing_rounds(
         return dict(zip(chosen, timings(calls, *effort, seed), strict=True))
 
     once = measured(runs, first, 0)
-    kind = {name: method.implementation for name, method in methods.items()}
+    kind = {name: method.implementation if method.control else "closed form" for name, method in methods.items()}
     twice = measured(contenders(runs, {run: timing.best for run, timing in once.items()}, kind), further, 1)
-    pairs = {run: sorted((once[run].best, timing.best)) for run, timing in twice.items()}
-    differing = [run for run, (less, more) in pairs.items() if more > (1.0 + NOISY) * less]
-    again = measured(differing, further, 2)
+    cost = {run: min(timing.best, twice[run].best if run in twice else np.inf) for run, timing in once.items()}
+    expected = foretold(cost, methods)
+    missed = [run for run in runs if not abs(cost[run] / expected[run] - 1.0) <= MISSED]
+    again = measured(missed, further, 2)
 
     row = {name: k for k, name in enumerate(methods)}
     size = 1 + max(run.place for run in runs)
@@ -103,12 +127,31 @@ def timing_rounds(
     for stage, column in ((once, 0), (twice, first.rounds), (again, first.rounds + further.rounds)):
         for run, timing in stage.items():
             samples[row[run.name], run.far, run.place, column : column + len(timing.samples)] = timing.samples
+    cost = {run: min(price, again[run].best if run in again else np.inf) for run, price in cost.items()}
+    forecast = np.full(samples.shape[:-1], np.nan)
+    for run, seconds in foretold(cost, methods).items():
+        forecast[row[run.name], run.far, run.place] = seconds
     firsts = {run.name: once[run].first_call for run in reversed(runs)}
+    beside = [_closed_form(scene, method, horizons[-1], further) for method in methods.values()]
     dims = ("integrator", "horizon", "setting")
     table = xr.Dataset({"seconds_samples": ((*dims, "batch"), samples)}, coords={"integrator": list(row)})
     best = table["seconds_samples"].min("batch")
     return table.assign(
         seconds=best,
         spread=table["seconds_samples"].median("batch") / best - 1.0,
+        seconds_forecast=(dims, forecast),
         first_call=("integrator", [firsts[name] for name in row]),
+        set_up=("integrator", [before for before, _ in beside]),
+        one_sample=("integrator", [each for _, each in beside]),
     )
+
+
+def _closed_form(scene: Scene, method: Integrator, horizon: float, effort: Effort) -> tuple[float, float]:
+    """Seconds before the first sample and for each sample of a method without steps; NaN of one that steps."""
+    if method.control is not None:
+        return np.nan, np.nan
+    chart = method.chart_for("axis")
+    calls = [bare_run(scene, method, chart, np.nan, horizon, count) for count in (2, MANY)]
+    few, many = (timing.best for timing in timings(calls, *effort))
+    each = (many - few) / (MANY - 2)
+    return few - 2.0 * each, each

@@ -7,24 +7,30 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
-from symtop.measure.timing import NOISY
-from symtop.measure.work import TARGETS
+from symtop.measure.timing import MISSED, NOISY
+from symtop.measure.work import CAPPED, TARGETS, TOO_WIDE
 from symtop.runner.study import Table
 
-from .energy import CLASSIC, STRUCTURE, crossings, growth_at_equal_settings
+from . import energy
 
 MOST_NAMES = 3  # of a list of names; the others are counted
+COMPARED = ("rk4[axis]", "takahashi-imada[axis]", "strang[axis]", "gauss-4[axis]")  # energies at equal steps
 
 HOW_TO_READ = (
-    "Choose the error that you accept on the vertical axis: the first curve to the right of it is the fastest method. "
-    "Seconds include the call of the compiled loop, about twenty microseconds, so that all curves bend where runs are "
-    "that short. A run is timed, and drawn against seconds, if it is its method's cheapest in force evaluations for "
-    "some target, or belongs to the comparison of energy errors; no time is computed from others. A force evaluation "
-    "is one evaluation of the equations of motion: a Newton iteration at one node, a kick, a stage, or one derivative "
-    "of a Taylor series, which costs more the higher it is. The settings of a method were searched for, so that they "
-    "just meet 1e-3, 1e-6, 1e-9 and 1e-12; no fixed step is longer than a quarter of a nutation, and no run was longer "
-    "than a million force evaluations (25 thousand in plain Python, 40 thousand in quadruple precision). `exact` "
-    "spends its time on constants in 40 digits, whatever the horizon."
+    "Choose the error that you accept on the vertical axis: the first curve to the right of it is the fastest row. A "
+    "row is a method in one chart: angles (Euler angles), axis (the axis e and the angular momentum L) or attitude (a "
+    "quaternion and L). Every method is here in each chart that shows the axis, but not in that of the attitude where "
+    "it has the axis chart, because the attitude costs more for the same axis (see the reduction study). Held fixed "
+    "are the scene, the horizon, the machine and the call: the compiled loop from the start to the horizon, without "
+    "`simulate` around it. The settings of a row, steps or tolerances, were searched for, so that they just meet 1e-3, "
+    "1e-6, 1e-9 and 1e-12 rad. A target is asked only where it is less than the width of the nutation: a motion "
+    "without any nutation meets the others. A step may be as long as the method is accurate, up to 6 steps a run. No "
+    "run takes more than a million force evaluations (25 thousand in plain Python, 40 thousand in quadruple "
+    "precision); a target that is not met within that is marked `budget`. A run is timed, and drawn against seconds, "
+    "if it is its row's cheapest in force evaluations for some target, or belongs to the comparison of energy errors; "
+    "no time is computed from others. A force evaluation is one evaluation of the equations of motion: a Newton "
+    "iteration at one node, a kick, a stage, or one derivative of a Taylor series, which costs more the higher it is. "
+    "`exact`, the closed form, is what errors are measured by and is not ranked; its time stands beside the others."
 )
 
 
@@ -50,133 +56,153 @@ def level(won: ranking.Win) -> str:
 
 
 def lead(target: float, cell: xr.Dataset) -> str:
-    """The fastest compiled method at a target and its lead; `cell` is one scene and one horizon."""
+    """The fastest compiled row at a target and its lead; `cell` is one scene and one horizon."""
     won = ranking.win(cell, target)
     if won is None:
-        return f"{target:.0e} no method"
+        return f"{target:.0e} no row ({reasons(cell, target)})"
     text = f"{target:.0e} {won.best.integrator} in {seconds(won.best.cost)}"
     if won.level:
         text += f" ({level(won)})"
     elif won.behind:
         text += f" ({won.ratio:.1f} times faster than {won.behind.integrator})"
-    if won.best.integrator == "exact" and (other := ranking.win(cell, target, without=("exact",))):
-        text += f", the fastest that steps {other.best.integrator} in {seconds(other.best.cost)}"
     return text
 
 
-def left_out(names: Sequence[str]) -> str:
-    """Which scenes are shown but not counted, and why; nothing if there are none."""
-    if not names:
-        return ""
-    return (
-        f" Not counted: {', '.join(names)} (no nutation). Such a motion is a fixed point of some methods, which then "
-        "have no error at any step."
-    )
+def reasons(cell: xr.Dataset, target: float, names: Sequence[str] | None = None) -> str:
+    """Why rows do not meet a target, the most frequent reason first; empty if all do."""
+    rows = ranking.ranked(cell) if names is None else names
+    why = [str(value) for value in cell["reached"].sel(integrator=rows, target=target).values]
+    count = Counter(reason for reason in why if reason not in ("met", CAPPED, ""))
+    return ", ".join(reason for reason, _ in count.most_common())
+
+
+def not_asked(data: xr.Dataset) -> str:
+    """Which targets are not asked on which scenes, and why; empty if all are."""
+    listed = []
+    for name in data["scene"].values:
+        cell = data.sel(scene=name)
+        asked = ranking.targets(cell)
+        left = [f"{target:.0e}" for target in TARGETS if target not in asked]
+        if left:
+            listed.append(f"{' and '.join(left)} on {name} ({float(cell['nutation_width'].max()):.2g} rad wide)")
+    return f" Not asked, because the nutation itself is narrower: {'; '.join(listed)}." if listed else ""
+
+
+def beside(data: xr.Dataset) -> str:
+    """What the rows without steps cost: they stand beside the ranking. Empty if there is none."""
+    ranked = ranking.ranked(data)
+    said = []
+    for name in (str(name) for name in data["integrator"].values if name not in ranked):
+        before, each = (data[key].sel(integrator=name).values for key in ("set_up", "one_sample"))
+        if np.isfinite(before).any():
+            said.append(
+                f"{name} is not ranked, because errors are measured by it. Whatever the horizon, its set-up, constants "
+                f"in 40 digits, takes {seconds(float(np.nanmin(before)))} to {seconds(float(np.nanmax(before)))}, and "
+                f"each sample {seconds(float(np.nanmedian(each)))}."
+            )
+    return " ".join(said)
 
 
 def growth(data: xr.Dataset, names: Sequence[str], part: str) -> str:
     """Median growth of a part of the error from the first to the last horizon."""
-    grown = {name: growth_at_equal_settings(data.sel(integrator=name), part) for name in names}
+    grown = {name: energy.growth_at_equal_settings(data.sel(integrator=name), part) for name in names}
     listed = ", ".join(f"{value:.3g} with {name}" for name, value in grown.items() if np.isfinite(value))
     rest = [name for name, value in grown.items() if not np.isfinite(value)]
     return listed + (f" (not judged: {', '.join(rest)}, at rounding or over budget)" if rest else "")
 
 
-def energy_of_each(data: xr.Dataset) -> str:
-    """For each classical method, which structure-preserving ones have less energy error at equal time, and where."""
-    parts: dict[str, list[str]] = {classic: [] for classic in CLASSIC}
-    for (classic, method), compared in crossings(data).items():
-        won = [one for one in compared if one.share > 0.0]
-        lost = [one.scene for one in compared if one.share == 0.0]
-        if not compared:
-            parts[classic].append(f"{method} nowhere, because no run times are common")
-        elif not won:
-            parts[classic].append(f"{method} on none of {len(compared)} scenes")
-        else:
-            top = max(won, key=lambda one: one.gain)
-            longest = seconds(float(np.median([one.longest_won for one in won])))
-            never = f", not on {', '.join(lost)}" if lost else ""
-            parts[classic].append(
-                f"{method} on {len(won)} of {len(compared)} scenes{never} (for runs up to {longest} in the median; at "
-                f"best {top.gain:.2g} times smaller, on {top.scene}, where it is {top.error:.1g})"
-            )
-    return " ".join(
-        f"At equal run time the energy error is smaller than that of {classic} with {'; '.join(listed)}."
-        for classic, listed in parts.items()
-    )
-
-
-def energy_in_all(data: xr.Dataset) -> str:
-    """How often structure-preserving methods have less energy error at equal time, in one sentence."""
-    compared = [one for listed in crossings(data).values() for one in listed]
-    coarse = sum(one.at_least and not one.at_most for one in compared)
-    fine = sum(one.at_most and not one.at_least for one in compared)
-    return (
-        f"Of {len(compared)} comparisons at equal run time of a structure-preserving method ({', '.join(STRUCTURE)}) "
-        f"with a classical one ({', '.join(CLASSIC)}), the structure-preserving one has the smaller energy error at "
-        f"all run times in {sum(one.share == 1.0 for one in compared)}, at short ones only in {coarse}, at long ones "
-        f"only in {fine}, and at none in {sum(one.share == 0.0 for one in compared)}."
-    )
-
-
 def sentences(data: xr.Dataset) -> list[str]:
-    """The fastest method for each scene, horizon and target, the crossover in energy, and what the times are worth."""
-    kept, uncounted = ranking.counted(data)
-    wins = [won for won in ranking.winners(kept).values() if won]
+    """The fastest row for each scene, horizon and target, the energies, and what the times are worth."""
+    wins = [won for won in ranking.winners(data).values() if won]
     count = Counter(won.best.integrator for won in wins)
     spoken = [
-        f"Of {len(wins)} combinations of scene, horizon and target that a compiled method met, the fastest is "
+        f"Of {len(wins)} combinations of scene, horizon and target that a compiled row met, the fastest is "
         + ", ".join(f"{name} in {times}" for name, times in count.most_common())
         + f"; in {sum(not won.level for won in wins)} its lead is larger than the noise."
-        + left_out(uncounted),
-        f"Energy error {spans(data)[-1]}. {energy_of_each(data)}",
+        + not_asked(data),
+        *filter(None, [beside(data), *(energy.sentence(data, chart) for chart in energy.CHARTS)]),
+        *filter(None, [energy.at_equal_steps(data, COMPARED, str(data["scene"].values[0]))]),
     ]
     if python := of_implementation(data, "python"):
         spoken.append(
-            f"Only compiled methods are ranked. Those in plain Python ({', '.join(python)}) are ranked "
-            "among themselves in the table; compare them with the rest by force evaluations."
+            f"Only compiled rows are ranked. Those in plain Python ({', '.join(python)}) are ranked among themselves "
+            "in the table; compare them with the rest by force evaluations. Where the table says budget, such a row "
+            "was stopped at 25 thousand force evaluations, which says nothing of what it could reach."
         )
-    spoken.append(
-        f"{int(data['seconds'].notnull().sum())} of the {int((data['outcome'] == 'ok').sum())} runs that ended well "
-        f"were timed, every one in at least {ranking.LEAST_ROUNDS} rounds with the other methods of its scene. "
-        f"{int((data['spread'] >= NOISY).sum())} of the times are too noisy to trust: the median of their samples is "
-        f"more than {NOISY:.0%} above the smallest."
-    )
+    spoken.append(times(data))
     for name in data["scene"].values:
+        asked = ranking.targets(data.sel(scene=name))
         for far, span in enumerate(spans(data)):
             cell = data.sel(scene=name).isel(horizon=far)
-            fastest = "; ".join(lead(target, cell) for target in TARGETS)
+            fastest = "; ".join(lead(target, cell) for target in asked)
             spoken.append(f"{name}, the fastest to an axis error {span}: {fastest}.")
     return spoken
 
 
+def times(data: xr.Dataset) -> str:
+    """How many runs were timed, and how far their times can be trusted."""
+    taken = data["seconds"]
+    rounds = data["seconds_samples"].notnull().sum("batch").where(taken.notnull())
+    miss = abs(taken / data["seconds_forecast"] - 1.0)
+    return (
+        f"{int(taken.notnull().sum())} of the {int((data['outcome'] == 'ok').sum())} runs that ended well were timed, "
+        f"every one in at least {int(rounds.min())} rounds with the other rows of its scene; what is shown against "
+        f"seconds is these, {measured(data):.0%} of them measured. The median distance of a time from what the row's "
+        f"other times foretell is {float(miss.median()):.1%}; a time that misses that by {MISSED:.0%} was taken again, "
+        f"and {int((miss > MISSED).sum())} still do, whose leads must hold for the forecast too. "
+        f"{int((data['spread'] >= NOISY).sum())} of the times are noisy: the median of their samples is more than "
+        f"{NOISY:.0%} above the smallest."
+    )
+
+
+def measured(data: xr.Dataset) -> float:
+    """The share of the times that are the smallest of the samples that were taken of that very run."""
+    taken = data["seconds"].values
+    shown = np.isfinite(taken)
+    least = data["seconds_samples"].min("batch").transpose(*data["seconds"].dims).values
+    return float((taken[shown] == least[shown]).mean()) if shown.any() else 1.0
+
+
 def tables(data: xr.Dataset) -> list[Table]:
-    """The fastest methods, and every method's time."""
+    """The fastest rows, and every row's time."""
     shown = []
     header = [f"axis error {target:.0e}" for target in TARGETS]
     for far, span in enumerate(spans(data)):
-        fastest, times = [], []
+        fastest, all_times = [], []
         for name in data["scene"].values:
             cell = data.sel(scene=name).isel(horizon=far)
+            asked = ranking.targets(cell)
             for implementation in ("compiled", "python"):
-                won = [ranking.win(cell, target, implementation) for target in TARGETS]
-                fastest.append([str(name), implementation, *map(_winner, won)])
-            met = [{place.integrator: seconds(place.cost) for place in ranking.cheapest(cell, target)}
-                   for target in TARGETS]  # fmt: skip
-            for method, stopped in zip(map(str, cell["integrator"].values), cell["stopped"].values, strict=True):
-                times.append([str(name), method, *(cost.get(method, "-") for cost in met), str(stopped)])
+                rows = of_implementation(cell, implementation)
+                if rows := [row for row in rows if row in ranking.ranked(cell)]:
+                    won = [_winner(ranking.win(cell, target, implementation), cell, target, rows) for target in TARGETS]
+                    fastest.append([str(name), implementation, *won])
+            met = {target: {place.integrator: seconds(place.cost) for place in ranking.cheapest(cell, target)}
+                   for target in asked}  # fmt: skip
+            for row in ranking.ranked(cell):
+                why = {target: str(cell["reached"].sel(integrator=row, target=target).values) for target in TARGETS}
+                cells = [met.get(target, {}).get(row, f"({why[target]})") for target in TARGETS]
+                all_times.append([str(name), row, *cells])
+            for row in (str(row) for row in cell["integrator"].values if row not in ranking.ranked(cell)):
+                least = float(cell["seconds"].sel(integrator=row).min())
+                if np.isfinite(least):
+                    text = f"{seconds(least)}, set-up {seconds(float(cell['set_up'].sel(integrator=row).min()))}"
+                    all_times.append([str(name), f"{row}, not ranked", text, *[""] * (len(TARGETS) - 1)])
+        chart = "in the chart that the row names, call of the compiled loop"
         shown += [
-            Table(f"Fastest method to an axis error {span}", ["scene", "implementation", *header], fastest),
+            Table(f"Fastest row to an axis error (rad) {span}", ["scene", "implementation", *header], fastest),
             Table(
-                f"Time of every method to the same errors {span}",
-                ["scene", "integrator", *header, "nothing finer because of"],
-                times,
+                f"Time of every row to the same errors {span}, {chart}; in brackets why an error is not reached",
+                ["scene", "integrator", *header],
+                all_times,
             ),
         ]
     return shown
 
 
-def _winner(won: ranking.Win | None) -> str:
+def _winner(won: ranking.Win | None, cell: xr.Dataset, target: float, rows: Sequence[str]) -> str:
+    if target not in ranking.targets(cell):
+        return f"({TOO_WIDE})"
     if won is None:
-        return "none"
+        return f"none ({reasons(cell, target, rows)})"
     return ", ".join([won.best.integrator, seconds(won.best.cost), *([level(won)] if won.level else [])])

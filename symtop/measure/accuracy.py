@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.base.numbers import GOLDEN
-from symtop.measure.errors import QUANTITIES, attitude_error, error_bound, errors_against
+from symtop.measure.errors import QUANTITIES, error_bound, errors_against
 from symtop.measure.phase import phase
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
@@ -73,11 +73,7 @@ def error_row(
     *,
     phases: bool = False,
 ) -> dict[str, float | str]:
-    """One run's entries in an error table.
-
-    With `phases` also its frequencies, shape error and lags (see `phase`), and, if the chart that shows what is
-    observed does not show the attitude, the attitude error of a second run in the chart that does.
-    """
+    """One run's entries in an error table; with `phases` also its frequencies, shape error and lags (see `phase`)."""
     control = method.setting(setting).kwargs()
     samples = enough_samples(scene, horizon)
     run = simulate(scene, method, **control, horizon=horizon, samples=samples, observe=observe, guard=False)
@@ -90,13 +86,7 @@ def error_row(
         row[name] = math.nan if failed else float(np.max(values))
         row[f"{name}_end"] = math.nan if failed else float(values[-1])
         row[f"{name}_bound"] = judge_limit(scene, run, truth, name)
-    if not phases:
-        return row
-    if not failed and "attitude" not in shown:
-        wide = simulate(scene, method, **control, horizon=horizon, samples=samples, observe="attitude", guard=False)
-        values = attitude_error(wide, truth)
-        row["attitude"], row["attitude_end"] = float(np.max(values)), float(values[-1])
-    return row | phase(scene, run, truth)._asdict()
+    return row | phase(scene, run, truth)._asdict() if phases else row
 
 
 _COUNTS = (

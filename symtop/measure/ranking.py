@@ -1,11 +1,14 @@
-"""Which method is the fastest at an accuracy, and whether its lead is more than noise.
+"""Which row, a method in one chart, is the fastest at an accuracy, and whether its lead is more than noise.
 
-The cost of a target is that of a method's cheapest timed run that meets it. Samples of one round were taken within
-seconds of each other, so that a slow spell of the machine hits both of two methods: they are compared by the ratios of
-their samples round by round, over the last `MOST_ROUNDS` rounds that both took part in. A lead is sure if both methods'
+The cost of a target is that of a row's cheapest timed run that meets it. Samples of one round were taken within
+seconds of each other, so that a slow spell of the machine hits both of two rows: they are compared by the ratios of
+their samples round by round, over the last `MOST_ROUNDS` rounds that both took part in. A lead is sure if both rows'
 samples are steady (see `timing`), every round agrees on it, and both its median and the ratio of the smallest samples
 are at least `MARGIN`, because the same code in another process, elsewhere in memory, may differ by some per cent;
-otherwise the two are level.
+otherwise the two are level. A time that misses its forecast by more than `MISSED` leads only if its forecast leads too.
+
+Only rows that take steps are ranked. The closed form is what errors are measured by, and its cost is that of its
+constants, whatever the horizon: it stands beside the rankings. A target that is wider than the nutation is not asked.
 """
 
 from typing import NamedTuple
@@ -13,20 +16,27 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.measure.timing import NOISY
+from symtop.measure.timing import MISSED, NOISY
 from symtop.measure.work import TARGETS
 
 MARGIN = 1.1
-LEAST_ROUNDS, MOST_ROUNDS = 3, 5
+NEEDS = ("control", "nutation_width", "outcome", "implementation", "seconds", "seconds_samples", "seconds_forecast")
+LEAST_ROUNDS, MOST_ROUNDS = 2, 8
 
 
 class Place(NamedTuple):
-    """A method's cheapest run that meets a target."""
+    """A row's cheapest run that meets a target."""
 
     cost: float  # seconds
     integrator: str
     setting: int
     samples: np.ndarray  # seconds, one a round; NaN for a round without it
+    forecast: float  # seconds, from the row's other runs; NaN if there are too few
+
+    @property
+    def doubtful(self) -> bool:
+        """Does the time miss its forecast, though it was taken again?"""
+        return abs(self.cost / self.forecast - 1.0) > MISSED
 
 
 class Lead(NamedTuple):
@@ -37,7 +47,7 @@ class Lead(NamedTuple):
 
 
 class Win(NamedTuple):
-    """The fastest method at one target, the methods that are level with it, and the lead over the first behind them."""
+    """The fastest row at one target, the rows that are level with it, and the lead over the first behind them."""
 
     best: Place
     level: tuple[str, ...]
@@ -45,19 +55,33 @@ class Win(NamedTuple):
     ratio: float  # of the times, `behind` over `best`; NaN if nothing is behind
 
 
+def ranked(data: xr.Dataset) -> list[str]:
+    """The rows that take steps."""
+    steps = (data["control"] != "") & data["control"].notnull()
+    apart = [dim for dim in steps.dims if dim != "integrator"]
+    return [str(name) for name in data["integrator"].values[steps.any(apart).values]]
+
+
+def targets(cell: xr.Dataset) -> list[float]:
+    """The targets that are asked on a scene: those below the width of its nutation."""
+    width = float(cell["nutation_width"].max())
+    return [target for target in TARGETS if target < width]
+
+
 def cheapest(cell: xr.Dataset, target: float, quantity: str = "axis", implementation: str | None = None) -> list[Place]:
-    """The cheapest timed run of each method that meets a target, cheapest first.
+    """The cheapest timed run of each ranked row that meets a target, cheapest first.
 
     `cell` is one scene and one horizon of the study's dataset.
     """
-    table = cell[[quantity, "seconds", "outcome"]].transpose("integrator", "setting")
-    seconds = table["seconds"].values
+    cell = cell.sel(integrator=ranked(cell))
+    table = cell[[quantity, "seconds", "seconds_forecast", "outcome"]].transpose("integrator", "setting")
+    seconds, forecast = table["seconds"].values, table["seconds_forecast"].values
     good = (table[quantity].values <= target) & (table["outcome"].values == "ok")
     price = np.where(good & np.isfinite(seconds), seconds, np.inf)
     samples = cell["seconds_samples"].transpose("integrator", "setting", "batch").values
     implementations = cell["implementation"].transpose("integrator", ...).values.reshape(len(price), -1)[:, 0]
     places = [
-        Place(float(price[row, k]), str(name), k, samples[row, k])
+        Place(float(price[row, k]), str(name), k, samples[row, k], float(forecast[row, k]))
         for row, (name, k) in enumerate(zip(cell["integrator"].values, map(int, price.argmin(axis=1)), strict=True))
         if np.isfinite(price[row, k]) and implementation in (None, str(implementations[row]))
     ]
@@ -73,14 +97,14 @@ def lead(first: Place, second: Place) -> Lead:
     ours, theirs = first.samples[both], second.samples[both]
     middle = float(np.median(theirs / ours))
     steady = all(np.median(row) < (1.0 + NOISY) * row.min() for row in (ours, theirs))
-    return Lead(middle, bool(steady and (theirs > ours).all() and min(middle, ratio) >= MARGIN))
+    slowest = max(first.cost, first.forecast) if first.doubtful else first.cost
+    soonest = min(second.cost, second.forecast) if second.doubtful else second.cost
+    return Lead(middle, bool(steady and (theirs > ours).all() and min(middle, ratio, soonest / slowest) >= MARGIN))
 
 
-def win(cell: xr.Dataset, target: float, implementation: str = "compiled", without: tuple[str, ...] = ()) -> Win | None:
-    """The fastest compiled (or plain Python) method at a target, or None if none met it."""
-    places = [
-        place for place in cheapest(cell, target, implementation=implementation) if place.integrator not in without
-    ]
+def win(cell: xr.Dataset, target: float, implementation: str = "compiled") -> Win | None:
+    """The fastest compiled (or plain Python) row at a target, or None if none met it."""
+    places = cheapest(cell, target, implementation=implementation)
     if not places:
         return None
     best, *others = places
@@ -91,47 +115,44 @@ def win(cell: xr.Dataset, target: float, implementation: str = "compiled", witho
 
 
 def winners(data: xr.Dataset) -> dict[tuple[str, int, float], Win | None]:
-    """The compiled winners in axis error of every scene, horizon (by index) and target."""
+    """The compiled winners in axis error of every scene, horizon (by index) and target that is asked there."""
     return {
         (str(scene), far, target): win(data.sel(scene=scene).isel(horizon=far), target)
         for scene in data["scene"].values
         for far in range(data.sizes["horizon"])
-        for target in TARGETS
+        for target in targets(data.sel(scene=scene))
     }
 
 
-def counted(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
-    """The scenes that may be counted, and the names of those left out: those without a nutation.
-
-    A steady precession starts in a fixed point of several maps, which then have no error at any step: their wins there
-    say nothing about any other motion. If there are no other scenes, nothing is left out.
-    """
-    nutating = {str(name): bool(data["nutation_lag"].sel(scene=name).notnull().any()) for name in data["scene"].values}
-    kept = [name for name, moves in nutating.items() if moves]
-    return (data.sel(scene=kept), [name for name in nutating if name not in kept]) if kept else (data, [])
-
-
 def relative_costs(data: xr.Dataset, among: list[str]) -> xr.DataArray:
-    """Seconds of every method's cheapest run to each target, over the least that any method of `among` needs.
+    """Seconds of every ranked row's cheapest run to each target, over the least that any row of `among` needs.
 
-    Dimensions target, integrator, problem; a problem is a scene with a horizon. Infinite where a method does not meet
-    the target, or none of `among` does.
+    Dimensions target, integrator, problem; a problem is a scene with a horizon. Infinite where a row does not meet the
+    target, or none of `among` does; NaN where the target is not asked.
     """
-    names = [str(name) for name in data["integrator"].values]
+    names = ranked(data)
     problems = [data.sel(scene=scene).isel(horizon=far)
                 for scene in data["scene"].values for far in range(data.sizes["horizon"])]  # fmt: skip
     table = np.full((len(TARGETS), len(names), len(problems)), np.inf)
-    for number, target in enumerate(TARGETS):
-        for k, cell in enumerate(problems):
+    for k, cell in enumerate(problems):
+        asked = targets(cell)
+        for number, target in enumerate(TARGETS):
+            if target not in asked:
+                table[number, :, k] = np.nan
+                continue
             for place in cheapest(cell, target):
                 table[number, names.index(place.integrator), k] = place.cost
     costs = xr.DataArray(table, {"target": list(TARGETS), "integrator": names}, ("target", "integrator", "problem"))
     best = costs.sel(integrator=among).min("integrator")
-    return (costs / best.where(np.isfinite(best))).fillna(np.inf)
+    return (costs / best.where(np.isfinite(best))).fillna(np.inf).where(costs.notnull())
 
 
 def leaders(ratios: xr.DataArray, count: int) -> list[str]:
-    """The methods that come closest to the best most often: by the mean of 1/ratio over problems and targets."""
-    merit = (1.0 / ratios).mean(("target", "problem"))
-    order = np.argsort(-merit.values, kind="stable")
-    return [str(merit["integrator"].values[k]) for k in order[:count] if merit.values[k] > 0.0]
+    """The rows that meet the targets on the most problems, and of these first those that come closest to the best.
+
+    How close a row comes is the mean of 1/ratio over problems and targets.
+    """
+    met = np.isfinite(ratios).sum(("target", "problem")).values
+    merit = (1.0 / ratios).mean(("target", "problem")).values
+    order = np.lexsort((-merit, -met))
+    return [str(ratios["integrator"].values[k]) for k in order[:count] if met[k] > 0]

@@ -14,11 +14,13 @@ from typing import NamedTuple
 from symtop.measure.accuracy import error_row
 from symtop.measure.phase import FREQUENCIES
 from symtop.measure.timing import bare_run, timings
-from symtop.methods.registry import Integrator, integrators
+from symtop.methods.registry import Integrator, integrator, integrators, rows
 from symtop.model.scenes import Scene
 
-LEAST_STEPS = 4.37  # a nutation; not commensurate with it
+LEAST_RUN = 6.37  # steps of a run: fewer samples do not show its error; not commensurate with the nutation
+LEAST_STEPS = 4.37  # a nutation, where the error of a constant is asked: long steps may keep it and miss the motion
 LOOSEST = 0.4  # tolerance
+ANGLES = ("axis", "attitude", "theta")
 COARSEST_TOLERANCE = 1e-2  # of a ladder or a walk
 TEDIOUS = 1e-8  # the least tolerance of an implicit method in Python: radau at 1e-12 takes a minute for ten nutations
 SHORT = 12.37  # nutations of a trial run
@@ -33,6 +35,19 @@ FAILED = "No run ended well"
 TRIED = f"Not within {TRIES} runs"
 
 
+def compared(observe: str) -> list[Integrator]:
+    """Every method in each chart that shows the "axis" or the "attitude".
+
+    The attitude costs more than the axis: a method that has a chart of the axis alone is not run in the larger one
+    where the axis is observed.
+    """
+    return [
+        row
+        for row in rows(observe)
+        if observe == "attitude" or row.charts() != ("attitude",) or "axis" not in integrator(row.method).charts()
+    ]
+
+
 def least_tolerance(method: Integrator) -> float:
     """The least tolerance that an adaptive method is tried with."""
     return max(
@@ -40,10 +55,16 @@ def least_tolerance(method: Integrator) -> float:
     )
 
 
-def limits(scene: Scene, method: Integrator, horizon: float) -> tuple[float, float]:
-    """The finest and the coarsest setting; a step is at most a quarter of the horizon and about that of a nutation."""
+def limits(scene: Scene, method: Integrator, horizon: float, quantity: str = "axis") -> tuple[float, float]:
+    """The finest and the coarsest setting.
+
+    A step may be as long as the angles that it leads to are right: the states between two steps are reached by shorter
+    ones, whose errors are smaller. A run needs a few steps, whose errors are what is measured. Constants of the motion
+    and frequencies say nothing of the angles, and where their error is asked a step is at most a quarter of a nutation.
+    """
     if method.fixed_step:
-        return 0.0, min(0.25 * horizon, scene.nutation_period / LEAST_STEPS)
+        longest = math.inf if quantity in ANGLES else scene.nutation_period / LEAST_STEPS
+        return 0.0, min(horizon / LEAST_RUN, longest)
     return 1.001 * least_tolerance(method), LOOSEST
 
 
@@ -52,7 +73,7 @@ def coarse_setting(scene: Scene, method: Integrator, horizon: float) -> float:
     if not method.fixed_step:
         return COARSEST_TOLERANCE
     power = method.order or 2
-    step = scene.time_scale(horizon) / (7.37 if power <= 2 else 5.37 if power <= 4 else LEAST_STEPS)
+    step = scene.time_scale(horizon) / (7.37 if power <= 2 else 5.37 if power <= 4 else 4.37)
     return min(step, limits(scene, method, horizon)[1])
 
 
@@ -156,9 +177,8 @@ def observed(quantity: str) -> str:
 
 def growth(method: Integrator, quantity: str) -> int:
     """The exponent a of the error's growth with the horizon that the method's traits promise."""
-    angles = quantity in ("axis", "attitude", "theta")
     structured = bool(method.symplectic) or bool(method.symmetric)
-    return (1 if angles else 0) + (0 if structured else 1)
+    return (1 if quantity in ANGLES else 0) + (0 if structured else 1)
 
 
 def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Met:
@@ -183,7 +203,7 @@ def search(
     It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess. No run is begun that is
     foreseen to take more than `patience` force evaluations.
     """
-    ends, patience = limits(scene, method, horizon), min(patience, MOST_EVALUATIONS[method.implementation])
+    ends, patience = limits(scene, method, horizon, quantity), min(patience, MOST_EVALUATIONS[method.implementation])
     power = float(method.order or 2) if method.fixed_step else 1.0
     if guess is None:
         guess = 0.2 * scene.time_scale(horizon) * accuracy ** (1.0 / power) if method.fixed_step else 0.1 * accuracy
