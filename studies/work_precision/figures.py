@@ -11,7 +11,7 @@ from symtop.measure import ranking
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import PARTS
 from symtop.report.figures import error_band, pareto
-from symtop.report.style import BLACK, GREY, grid, legend_below, look, slope_guide
+from symtop.report.style import BLACK, GREY, grid, legend_below, look
 from symtop.runner.study import Picture
 
 from . import energy, words
@@ -86,7 +86,7 @@ def _fronts(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
         name,
         figure,
         f"Largest axis error {words.spans(data)[far]} against {labels[0]}, one panel a scene; each line is a row, a "
-        "method in one chart, whose step or tolerance varies along it. The black step line is the front of the "
+        "method in one chart, whose step or tolerance varies along it. The wide grey step line is the front of the "
         "compiled rows: none of their runs is below or left of it. Most of its points belong to "
         f"{most}. {FILLS} Grey band: below the error bound of the reference.{timed}",
         f"Log-log work-precision plots of the axis error against {labels[0]}, one panel a scene.",
@@ -108,7 +108,7 @@ def _front(axis: Any, cell: xr.Dataset, cost: str, floor: float) -> list[str]:
         return []
     order = np.argsort(x[on])
     x, y, owners = (part[on][order] for part in (x, y, np.broadcast_to(cell["integrator"].values[:, None], x.shape)))
-    axis.step(x, y, where="post", color=BLACK, lw=1.4, zorder=3, label="front of the compiled rows")
+    axis.step(x, y, where="post", color=BLACK, alpha=0.2, lw=5.0, zorder=1, label="front of the compiled rows")
     return [str(owner) for owner in owners]
 
 
@@ -140,9 +140,6 @@ def _energy(data: xr.Dataset, chart: str) -> Picture:
         axis.set_title(scene)
     axes[0].set_ylim(1e-16, 30.0)
     axes[0].plot([], [], color=GREY, lw=0.8, label="all other symplectic rows")
-    middle = float(np.sqrt(np.prod(axes[0].get_xlim())))
-    for power, level in ((-2.0, 1e-6), (-4.0, 1e-10)):
-        slope_guide(axes[0], power, (0.1 * middle, 0.6 * middle), level, f"cost$^{{{power:g}}}$")
     legend_below(figure, axes)
     return Picture(
         f"energy-{chart}",

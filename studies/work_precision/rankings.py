@@ -50,7 +50,12 @@ def winners(data: xr.Dataset) -> Picture:
         )  # fmt: skip
         axis.grid(visible=False)
         axis.tick_params(length=0)
-    kinds = {"splitting": "strang", "Runge-Kutta and Gauss": "rk4", "Taylor": "taylor", "Lagrangian": "midpoint"}
+    kinds = {
+        "splitting": "strang",
+        "Runge-Kutta and Gauss": "rk4",
+        "Taylor": "taylor",
+        "discrete Lagrangian": "midpoint",
+    }
     for kind, name in kinds.items():
         axes[0, 0].plot([], [], "s", color=look(name).color, ms=9, label=kind)
     legend_below(figure, axes)

@@ -7,8 +7,8 @@ a time, and no time is computed from others.
 All of them take part in a few rounds of short batches: in each round every run once, in random order. The contenders
 for a target, those within `WITHIN` of the fastest compiled or plain Python one, then take part in further rounds of
 longer batches. Then each time is compared with what the row's other times foretell (`timing.forecasts`); one that
-misses that by a quarter (`MISSED`), or has no forecast, is taken again. A time that still misses is kept with its
-forecast beside it, and a lead must then hold for both.
+misses that by a quarter (`MISSED`), has no forecast, or whose smallest sample no other comes near (`AGAIN`), is taken
+again. A time that still misses is kept with its forecast beside it, and a lead must then hold for both.
 
 `seconds` is the smallest sample. Everything runs on one thread; compilation and first use are in `first_call`.
 """
@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.measure.timing import MISSED, Timing, bare_run, forecasts, timings
+from symtop.measure.timing import MISSED, Timing, bare_run, forecasts, met_again, timings
 from symtop.measure.work import TARGETS, least_work
 from symtop.methods.registry import Integrator, integrator
 from symtop.model.scenes import Scene
@@ -116,9 +116,12 @@ def timing_rounds(
     once = measured(runs, first, 0)
     kind = {name: method.implementation if method.control else "closed form" for name, method in methods.items()}
     twice = measured(contenders(runs, {run: timing.best for run, timing in once.items()}, kind), further, 1)
-    cost = {run: min(timing.best, twice[run].best if run in twice else np.inf) for run, timing in once.items()}
+    so_far = {run: [*timing.samples, *(twice[run].samples if run in twice else ())] for run, timing in once.items()}
+    cost = {run: min(samples) for run, samples in so_far.items()}
     expected = foretold(cost, methods)
-    missed = [run for run in runs if not abs(cost[run] / expected[run] - 1.0) <= MISSED]
+    missed = [
+        run for run in runs if not (abs(cost[run] / expected[run] - 1.0) <= MISSED and met_again(so_far[run]))
+    ]  # fmt: skip
     again = measured(missed, further, 2)
 
     row = {name: k for k, name in enumerate(methods)}

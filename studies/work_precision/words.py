@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
-from symtop.measure.timing import MISSED, NOISY
+from symtop.measure.timing import AGAIN, MISSED
 from symtop.measure.work import CAPPED, TARGETS, TOO_WIDE
 from symtop.runner.study import Table
 
@@ -126,8 +126,8 @@ def sentences(data: xr.Dataset) -> list[str]:
     if python := of_implementation(data, "python"):
         spoken.append(
             f"Only compiled rows are ranked. Those in plain Python ({', '.join(python)}) are ranked among themselves "
-            "in the table; compare them with the rest by force evaluations. Where the table says budget, such a row "
-            "was stopped at 25 thousand force evaluations, which says nothing of what it could reach."
+            "in the table; compare them with the rest by force evaluations. Where the table says budget, the row was "
+            "stopped at its budget of force evaluations, which says nothing of what it could reach."
         )
     spoken.append(times(data))
     for name in data["scene"].values:
@@ -144,14 +144,16 @@ def times(data: xr.Dataset) -> str:
     taken = data["seconds"]
     rounds = data["seconds_samples"].notnull().sum("batch").where(taken.notnull())
     miss = abs(taken / data["seconds_forecast"] - 1.0)
+    samples = np.sort(data["seconds_samples"].transpose(..., "batch").values, axis=-1)
+    alone = int((samples[..., 1] > (1.0 + AGAIN) * samples[..., 0]).sum())
     return (
         f"{int(taken.notnull().sum())} of the {int((data['outcome'] == 'ok').sum())} runs that ended well were timed, "
         f"every one in at least {int(rounds.min())} rounds with the other rows of its scene; what is shown against "
         f"seconds is these, {measured(data):.0%} of them measured. The median distance of a time from what the row's "
         f"other times foretell is {float(miss.median()):.1%}; a time that misses that by {MISSED:.0%} was taken again, "
         f"and {int((miss > MISSED).sum())} still do, whose leads must hold for the forecast too. "
-        f"{int((data['spread'] >= NOISY).sum())} of the times are noisy: the median of their samples is more than "
-        f"{NOISY:.0%} above the smallest."
+        f"{alone} of the times are noisy: no other sample comes to within {AGAIN:.0%} of the smallest, and no lead of "
+        "theirs, or over them, is called more than noise."
     )
 
 
@@ -184,9 +186,9 @@ def tables(data: xr.Dataset) -> list[Table]:
                 cells = [met.get(target, {}).get(row, f"({why[target]})") for target in TARGETS]
                 all_times.append([str(name), row, *cells])
             for row in (str(row) for row in cell["integrator"].values if row not in ranking.ranked(cell)):
-                least = float(cell["seconds"].sel(integrator=row).min())
-                if np.isfinite(least):
-                    text = f"{seconds(least)}, set-up {seconds(float(cell['set_up'].sel(integrator=row).min()))}"
+                before, each = (float(cell[key].sel(integrator=row).min()) for key in ("set_up", "one_sample"))
+                if np.isfinite(before):
+                    text = f"set-up {seconds(before)}, each sample {seconds(each)}"
                     all_times.append([str(name), f"{row}, not ranked", text, *[""] * (len(TARGETS) - 1)])
         chart = "in the chart that the row names, call of the compiled loop"
         shown += [

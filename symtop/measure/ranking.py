@@ -1,11 +1,11 @@
 """Which row, a method in one chart, is the fastest at an accuracy, and whether its lead is more than noise.
 
-The cost of a target is that of a row's cheapest timed run that meets it. Samples of one round were taken within
-seconds of each other, so that a slow spell of the machine hits both of two rows: they are compared by the ratios of
-their samples round by round, over the last `MOST_ROUNDS` rounds that both took part in. A lead is sure if both rows'
-samples are steady (see `timing`), every round agrees on it, and both its median and the ratio of the smallest samples
-are at least `MARGIN`, because the same code in another process, elsewhere in memory, may differ by some per cent;
-otherwise the two are level. A time that misses its forecast by more than `MISSED` leads only if its forecast leads too.
+The cost of a target is that of a row's cheapest timed run that meets it: the smallest of its samples, because noise
+only adds. A lead is sure if it would be found again. The last `MOST_ROUNDS` rounds that both rows took part in are
+dealt to two halves, and in each half the ratio of the smallest samples is at least `MARGIN`, because the same code in
+another process, elsewhere in memory, may differ by some per cent. Each row has met its smallest sample again
+(`timing.met_again`). And if a time misses its forecast by more than `MISSED`, the forecast leads too. Otherwise the two
+are level.
 
 Only rows that take steps are ranked. The closed form is what errors are measured by, and its cost is that of its
 constants, whatever the horizon: it stands beside the rankings. A target that is wider than the nutation is not asked.
@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.measure.timing import MISSED, NOISY
+from symtop.measure.timing import MISSED, met_again
 from symtop.measure.work import TARGETS
 
 MARGIN = 1.1
 NEEDS = ("control", "nutation_width", "outcome", "implementation", "seconds", "seconds_samples", "seconds_forecast")
-LEAST_ROUNDS, MOST_ROUNDS = 2, 8
+LEAST_ROUNDS, MOST_ROUNDS = 3, 8
 
 
 class Place(NamedTuple):
@@ -40,7 +40,7 @@ class Place(NamedTuple):
 
 
 class Lead(NamedTuple):
-    """How far the first of two is ahead: the median of the paired ratios, and whether that is more than noise."""
+    """How far the first of two is ahead, second time over first, and whether that is more than noise."""
 
     ratio: float
     sure: bool
@@ -94,12 +94,11 @@ def lead(first: Place, second: Place) -> Lead:
     ratio = second.cost / first.cost
     if both.size < LEAST_ROUNDS:
         return Lead(ratio, False)
-    ours, theirs = first.samples[both], second.samples[both]
-    middle = float(np.median(theirs / ours))
-    steady = all(np.median(row) < (1.0 + NOISY) * row.min() for row in (ours, theirs))
     slowest = max(first.cost, first.forecast) if first.doubtful else first.cost
     soonest = min(second.cost, second.forecast) if second.doubtful else second.cost
-    return Lead(middle, bool(steady and (theirs > ours).all() and min(middle, ratio, soonest / slowest) >= MARGIN))
+    halves = [second.samples[half].min() / first.samples[half].min() for half in (both[::2], both[1::2])]
+    steady = all(met_again(place.samples) for place in (first, second))
+    return Lead(ratio, bool(steady and min(*halves, soonest / slowest) >= MARGIN))
 
 
 def win(cell: xr.Dataset, target: float, implementation: str = "compiled") -> Win | None:
@@ -152,7 +151,7 @@ def leaders(ratios: xr.DataArray, count: int) -> list[str]:
 
     How close a row comes is the mean of 1/ratio over problems and targets.
     """
-    met = np.isfinite(ratios).sum(("target", "problem")).values
+    met = np.isfinite(ratios.transpose("integrator", ...).values).reshape(ratios.sizes["integrator"], -1).sum(axis=1)
     merit = (1.0 / ratios).mean(("target", "problem")).values
     order = np.lexsort((-merit, -met))
     return [str(ratios["integrator"].values[k]) for k in order[:count] if met[k] > 0]

@@ -26,6 +26,7 @@ BATCH = 0.02  # seconds
 CLEAR = 1e-3  # seconds: a trial that long shows how many calls make a batch
 STRIDE = 16  # the calls of a trial grow at most so much
 NOISY = 0.25  # relative spread beyond which a timing is not called reliable
+AGAIN = 0.1  # a smallest sample that no other comes so close to may be an accident
 MISSED = 0.25  # relative miss of a forecast beyond which a time is taken again
 
 
@@ -49,6 +50,12 @@ class Timing(NamedTuple):
     def reliable(self) -> bool:
         """Is the spread small enough for a verdict?"""
         return self.spread < NOISY
+
+
+def met_again(samples: ArrayLike) -> bool:
+    """Does another sample come to within `AGAIN` of the smallest? NaN is no sample."""
+    least = np.sort(np.asarray(samples, dtype=float), axis=None)[:2]  # NaN comes last
+    return bool(least.size == 2 and least[1] <= (1.0 + AGAIN) * least[0])
 
 
 def _batch(function: Callable[[], object], calls: int) -> float:
