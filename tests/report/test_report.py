@@ -14,8 +14,8 @@ from symtop.runner.study import Case
 from tests.browser import Browser
 
 FEW = (
-    "midpoint", "trapezoidal", "galerkin-simpson", "stormer-verlet", "takahashi-imada", "rk4", "rk45-compiled",
-    "gauss-8", "taylor", "rk45",
+    "midpoint[angles]", "trapezoidal[angles]", "galerkin-simpson[angles]", "stormer-verlet[angles]",
+    "takahashi-imada[axis]", "rk4[axis]", "rk45-compiled[angles]", "gauss-8[axis]", "taylor[axis]", "rk45[angles]",
 )  # fmt: skip
 
 
