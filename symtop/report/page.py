@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from symtop.base.validate import SymtopError
-from symtop.methods.registry import integrators
+from symtop.methods.registry import integrators, split_name
 from symtop.model.scenes import scenes
 from symtop.report import markdown
 from symtop.report.style import look
@@ -36,7 +36,7 @@ def prepared(chart: Mapping[str, Any]) -> str:
 
 
 def _series(name: str, points: Sequence[tuple[float | None, float | None, str]]) -> dict[str, Any]:
-    method, style = integrators().get(name), look(name)
+    method, style = integrators().get(split_name(name)[0]), look(name)
     return {
         "name": name,
         "family": method.family if method else "other",
