@@ -118,7 +118,7 @@ def _closed_form(axis: Any, cell: xr.Dataset) -> None:
         at = float(cell["seconds"].sel(integrator=row).min())
         if np.isfinite(at):
             axis.axvline(at, color=look(row).color, ls=":", lw=1.2, zorder=1)
-            before = words.seconds(float(cell["set_up"].sel(integrator=row).min()))
+            before = words.seconds(float(cell["set_up_seconds"].sel(integrator=row).min()))
             axis.annotate(
                 f"exact: set-up {before}", (at, 1.5), rotation=90, fontsize=7.5, color="#444444", ha="right", va="top"
             )

@@ -13,7 +13,7 @@ its own), target (rad), batch.
     seconds_forecast                                what the row's other times foretell for it; drawn nowhere
     first_call, implementation, chart, control,     of a row: seconds of its first run, "compiled" or "python", its
     symplectic                                      chart, "step_size", "tolerance" or "", 1 if it claims to be so
-    set_up, one_sample                              seconds of a row without steps, NaN of the others
+    set_up_seconds, sample_seconds                  seconds of a row without steps, NaN of the others
     stopped(horizon)                                why it tried nothing finer
     reached(horizon, target)                        "met", or why not: one of `work.STOPS`, `TOO_WIDE` or `CAPPED`
     nutation_width                                  of a scene: angle between the turning points, rad

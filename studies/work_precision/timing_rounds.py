@@ -4,7 +4,8 @@ A run is timed if, of its row's runs that meet some target over some horizon, it
 the rows whose energy errors are compared at equal run time, every run over the last horizon is timed. No other run has
 a time, and no time is computed from others.
 
-All of them take part in a few rounds of short batches: in each round every run once, in random order. The contenders
+All of them take part in a few rounds of short batches: in each round every run once, in random order. What serves the
+comparison of energies alone, over decades of time, has one round less. The contenders
 for a target, those within `WITHIN` of the fastest compiled or plain Python one, then take part in further rounds of
 longer batches. Then each time is compared with what the row's other times foretell (`timing.forecasts`); one that
 misses that by a quarter (`MISSED`), has no forecast, or whose smallest sample no other comes near (`AGAIN`), is taken
@@ -13,18 +14,19 @@ again. A time that still misses is kept with its forecast beside it, and a lead 
 `seconds` is the smallest sample. Everything runs on one thread; compilation and first use are in `first_call`.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from symtop.measure.timing import MISSED, Timing, bare_run, forecasts, met_again, timings
+from symtop.measure.timing import MISSED, Timing, bare_run, first_call, forecasts, met_again, timings
 from symtop.measure.work import TARGETS, least_work
 from symtop.methods.registry import Integrator, integrator
 from symtop.model.scenes import Scene
 
 WITHIN = 1.6  # of the fastest
+AGAIN_ROUNDS = 4
 MANY = 1002  # samples that show what one of a closed form costs
 
 
@@ -102,18 +104,22 @@ def timing_rounds(
 
     Variables: ``seconds``; ``seconds_samples``, one column a round, NaN for the rounds that a run has no part in;
     ``spread`` of the samples; ``seconds_forecast``, from the row's other runs; for each row ``first_call``; and for a
-    row that takes no steps ``set_up`` and ``one_sample``, its seconds before the first sample and for each of them.
+    row that takes no steps ``set_up_seconds``, before the first sample, and ``sample_seconds``, for each of them.
     """
     methods = {run.name: integrator(run.name) for run in runs}
 
-    def measured(chosen: Sequence[TimedRun], effort: Effort, seed: int) -> dict[TimedRun, Timing]:
-        calls = [
-            bare_run(scene, methods[run.name], methods[run.name].chart_for("axis"), run.setting, horizons[run.far])
-            for run in chosen
-        ]
-        return dict(zip(chosen, timings(calls, *effort, seed), strict=True))
+    def call(run: TimedRun) -> Callable[[], object]:
+        method = methods[run.name]
+        return bare_run(scene, method, method.chart_for("axis"), run.setting, horizons[run.far])
 
-    once = measured(runs, first, 0)
+    def measured(chosen: Sequence[TimedRun], effort: Effort, seed: int) -> dict[TimedRun, Timing]:
+        return dict(zip(chosen, timings([call(run) for run in chosen], *effort, seed, warm=True), strict=True))
+
+    least = {run.name: run for run in sorted(runs, key=lambda run: -run.evaluations)}
+    firsts = {name: first_call(call(least[name])) for name in methods}
+    energies = [run for run in runs if not run.targets]
+    once = measured([run for run in runs if run.targets], first, 0)
+    once |= measured(energies, first._replace(rounds=first.rounds - 1), 0)
     kind = {name: method.implementation if method.control else "closed form" for name, method in methods.items()}
     twice = measured(contenders(runs, {run: timing.best for run, timing in once.items()}, kind), further, 1)
     so_far = {run: [*timing.samples, *(twice[run].samples if run in twice else ())] for run, timing in once.items()}
@@ -122,11 +128,11 @@ def timing_rounds(
     missed = [
         run for run in runs if not (abs(cost[run] / expected[run] - 1.0) <= MISSED and met_again(so_far[run]))
     ]  # fmt: skip
-    again = measured(missed, further, 2)
+    again = measured(missed, first._replace(rounds=AGAIN_ROUNDS), 2)
 
     row = {name: k for k, name in enumerate(methods)}
     size = 1 + max(run.place for run in runs)
-    samples = np.full((len(row), len(horizons), size, first.rounds + 2 * further.rounds), np.nan)
+    samples = np.full((len(row), len(horizons), size, first.rounds + further.rounds + AGAIN_ROUNDS), np.nan)
     for stage, column in ((once, 0), (twice, first.rounds), (again, first.rounds + further.rounds)):
         for run, timing in stage.items():
             samples[row[run.name], run.far, run.place, column : column + len(timing.samples)] = timing.samples
@@ -134,7 +140,6 @@ def timing_rounds(
     forecast = np.full(samples.shape[:-1], np.nan)
     for run, seconds in foretold(cost, methods).items():
         forecast[row[run.name], run.far, run.place] = seconds
-    firsts = {run.name: once[run].first_call for run in reversed(runs)}
     beside = [_closed_form(scene, method, horizons[-1], further) for method in methods.values()]
     dims = ("integrator", "horizon", "setting")
     table = xr.Dataset({"seconds_samples": ((*dims, "batch"), samples)}, coords={"integrator": list(row)})
@@ -144,8 +149,8 @@ def timing_rounds(
         spread=table["seconds_samples"].median("batch") / best - 1.0,
         seconds_forecast=(dims, forecast),
         first_call=("integrator", [firsts[name] for name in row]),
-        set_up=("integrator", [before for before, _ in beside]),
-        one_sample=("integrator", [each for _, each in beside]),
+        set_up_seconds=("integrator", [before for before, _ in beside]),
+        sample_seconds=("integrator", [each for _, each in beside]),
     )
 
 

@@ -93,7 +93,7 @@ def beside(data: xr.Dataset) -> str:
     ranked = ranking.ranked(data)
     said = []
     for name in (str(name) for name in data["integrator"].values if name not in ranked):
-        before, each = (data[key].sel(integrator=name).values for key in ("set_up", "one_sample"))
+        before, each = (data[key].sel(integrator=name).values for key in ("set_up_seconds", "sample_seconds"))
         if np.isfinite(before).any():
             said.append(
                 f"{name} is not ranked, because errors are measured by it. Whatever the horizon, its set-up, constants "
@@ -186,7 +186,9 @@ def tables(data: xr.Dataset) -> list[Table]:
                 cells = [met.get(target, {}).get(row, f"({why[target]})") for target in TARGETS]
                 all_times.append([str(name), row, *cells])
             for row in (str(row) for row in cell["integrator"].values if row not in ranking.ranked(cell)):
-                before, each = (float(cell[key].sel(integrator=row).min()) for key in ("set_up", "one_sample"))
+                before, each = (
+                    float(cell[key].sel(integrator=row).min()) for key in ("set_up_seconds", "sample_seconds")
+                )
                 if np.isfinite(before):
                     text = f"set-up {seconds(before)}, each sample {seconds(each)}"
                     all_times.append([str(name), f"{row}, not ranked", text, *[""] * (len(TARGETS) - 1)])

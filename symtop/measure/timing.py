@@ -65,27 +65,46 @@ def _batch(function: Callable[[], object], calls: int) -> float:
     return time.perf_counter() - start
 
 
-def _calibrate(function: Callable[[], object], batch: float) -> int:
-    """How many calls last at least `batch` seconds, and a little more."""
+def first_call(function: Callable[[], object]) -> float:
+    """Seconds of one call, with the compilation that it may bring about."""
+    return _batch(function, 1)
+
+
+def _calibrate(function: Callable[[], object], batch: float) -> tuple[int, float | None]:
+    """How many calls last at least `batch` seconds, and a little more; with the time of one call, if that is enough."""
     count = 1
     while (elapsed := _batch(function, count)) < min(CLEAR, batch):
         count *= max(2, min(STRIDE, int(1.2 * CLEAR / max(elapsed, 1e-9))))
-    return max(1, math.ceil(1.15 * count * batch / elapsed)) if elapsed < batch else count
+    if elapsed < batch:
+        return max(1, math.ceil(1.15 * count * batch / elapsed)), None
+    return count, elapsed if count == 1 else None
 
 
 def timings(
-    functions: Sequence[Callable[[], object]], batches: int = 5, batch: float = BATCH, seed: int = 0
+    functions: Sequence[Callable[[], object]],
+    batches: int = 5,
+    batch: float = BATCH,
+    seed: int = 0,
+    *,
+    warm: bool = False,
 ) -> list[Timing]:
-    """Time several functions against each other."""
+    """Time several functions against each other.
+
+    Those that are `warm`, called before, have no first call (NaN), and a call that turns out to be longer than a batch
+    is the first sample of its function: a long run costs no more calls than it has samples.
+    """
     firsts, calls = [], []
+    samples: list[list[float]] = []
     for function in functions:
-        firsts.append(_batch(function, 1))
-        calls.append(_calibrate(function, batch))
+        firsts.append(math.nan if warm else first_call(function))
+        count, long = _calibrate(function, batch)
+        calls.append(count)
+        samples.append([long] if warm and long is not None else [])
     draw = random.Random(seed)  # noqa: S311
-    samples: list[list[float]] = [[] for _ in functions]
-    for _ in range(batches):
+    for number in range(batches):
         for index in draw.sample(range(len(functions)), len(functions)):
-            samples[index].append(_batch(functions[index], calls[index]) / calls[index])
+            if len(samples[index]) <= number:
+                samples[index].append(_batch(functions[index], calls[index]) / calls[index])
     return [Timing(tuple(taken), first) for taken, first in zip(samples, firsts, strict=True)]
 
 

@@ -18,7 +18,7 @@ from symtop.runner.run import Round
 from symtop.runner.study import Combined, Study
 
 SAMPLE = 5  # cases of each study
-CLOCKED = ("seconds", "reliable", "spread", "first_call", "foreseen")  # in the names of variables of measured times
+CLOCKED = ("seconds", "reliable", "spread", "first_call")  # in the names of variables of measured times
 
 
 class Checked(NamedTuple):

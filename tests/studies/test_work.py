@@ -2,6 +2,9 @@
 
 import dataclasses
 import math
+import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -235,33 +238,35 @@ def test_a_time_that_misses_its_forecast_by_a_quarter_is_taken_again(monkeypatch
     runs += [timed("strang[axis]", place=k, targets=[k] if k < 4 else ()) for k in range(5)]
     stages = []
 
-    def pretended(calls, rounds, batch, seed=0):
+    def pretended(calls, rounds, batch, seed=0, *, warm=True):
         stages.append((sorted(calls), rounds, batch))
-        slow = {("strang[axis]", 3, 0): 2.8, ("strang[axis]", 3, 1): 2.8}
+        slow = {("strang[axis]", 3, 0): 2.8}
         unit = {"rk4[axis]": 1.0, "strang[axis]": 9.0}
         return [
-            Timing((unit[name] * (place + 1) * slow.get((name, place, seed), 1.0),) * rounds, 7.0 + seed)
+            Timing((unit[name] * (place + 1) * slow.get((name, place, seed), 1.0),) * rounds, math.nan)
             for name, place in calls
         ]
 
     monkeypatch.setattr(rounds_module, "timings", pretended)
+    monkeypatch.setattr(rounds_module, "first_call", lambda _: 7.0)
     monkeypatch.setattr(
         rounds_module, "bare_run", lambda _scene, method, _chart, setting, *_: (method.name, round(10.0 * setting) - 1)
     )
     table = timing_rounds(scene, [1.0], runs, Effort(3, 0.005), Effort(5, 0.01)).isel(horizon=0)
-    assert stages[0][0] == sorted((run.name, run.place) for run in runs)
-    assert stages[1][0] == []  # nobody is near the fastest
-    again, rounds, batch = stages[2]
+    assert stages[0] == (sorted((run.name, run.place) for run in runs if run.targets), 3, 0.005)
+    assert stages[1] == (sorted((run.name, run.place) for run in runs if not run.targets), 2, 0.005)
+    assert stages[2][0] == []  # nobody is near the fastest
+    again, rounds, batch = stages[3]
     assert ("strang[axis]", 3) in again
     assert {name for name, _ in again} == {"strang[axis]"}  # its neighbours are foretold from it
-    assert (rounds, batch) == (5, 0.01)
+    assert (rounds, batch) == (4, 0.005)
     row = table.sel(integrator="strang[axis]")
     assert row["seconds"].values.tolist() == [9.0, 18.0, 27.0, 36.0, 45.0]  # the glitch is gone
     assert row["seconds_forecast"].values == pytest.approx(row["seconds"].values)
     assert row["seconds_samples"].isel(setting=3).values[:3].tolist() == [36.0 * 2.8] * 3
     assert np.isnan(table["seconds_samples"].sel(integrator="rk4[axis]").values[:, 3:]).all()
     assert table["first_call"].values.tolist() == [7.0, 7.0]
-    assert table["set_up"].isnull().all()
+    assert table["set_up_seconds"].isnull().all()
 
 
 def test_batches_of_a_round_are_neighbours_in_time():
@@ -297,7 +302,7 @@ def test_the_cheapest_runs_of_each_method_have_a_time_and_no_other_run(timed_stu
     assert (expected == has_time).all()
     assert 0 < has_time.sum() < ran.sum()
     samples = timed_study["seconds_samples"]
-    assert ((samples.notnull().sum("batch") >= 3) == has_time).all()
+    assert ((samples.notnull().sum("batch") >= 2) == has_time).all()
     assert (timed_study["seconds"] == samples.min("batch")).where(has_time, True).all()
     assert work_words.measured(timed_study) == 1.0
     modelled = timed_study.assign(seconds=timed_study["seconds"] * 1.01)
@@ -367,7 +372,9 @@ def test_the_closed_form_is_not_ranked_but_stands_beside_the_others():
     data = cell([[0.1] * 3, [1.0] * 3, [2.0] * 3], errors=[1e-16, 1e-7, 1e-7])
     assert ranking.win(data, 1e-6).best.integrator == "a"
     data["control"][0] = ""
-    data = data.assign(set_up=("integrator", [0.1, np.nan, np.nan]), one_sample=("integrator", [6e-7, np.nan, np.nan]))
+    data = data.assign(
+        set_up_seconds=("integrator", [0.1, np.nan, np.nan]), sample_seconds=("integrator", [6e-7, np.nan, np.nan])
+    )
     assert ranking.ranked(data) == ["b", "c"]
     assert ranking.win(data, 1e-6).best.integrator == "b"
     assert ranking.win(data, 1e-12) is None  # it alone would meet that
@@ -495,6 +502,41 @@ def test_costs_relative_to_the_best_keep_failures_visible():
     assert ratios.sel(target=1e-6).values.ravel().tolist() == [1.0, math.inf]
     assert np.isinf(ratios.sel(target=1e-12).values).all()
     assert ranking.leaders(ratios, 2) == ["a", "b"]
+
+
+def called(seconds, table):
+    """The winners that are called beyond the noise, by horizon and target, with all winners."""
+    data = store.combine([*table, (Case("goldstein", "together"), seconds)])
+    wins = ranking.winners(data)
+    return {key: won.best.integrator for key, won in wins.items() if won and not won.level}, {
+        key: won.best.integrator for key, won in wins.items() if won
+    }
+
+
+TIMED_AGAIN = """
+import pickle, sys
+from symtop_studies.work_precision.timing_rounds import Effort, TimedRun, timing_rounds
+scene, far, runs = pickle.load(open(sys.argv[1], "rb"))
+timing_rounds(scene, far, [TimedRun(*run) for run in runs], Effort(3, 0.004), Effort(8, 0.01)).to_netcdf(sys.argv[2])
+"""
+
+
+@pytest.mark.slow
+def test_a_winner_that_is_called_beyond_the_noise_wins_in_another_process_too(tmp_path):
+    scene = symtop.scene("goldstein")
+    far = [count * scene.nutation_period for count in (10.0, 100.0)]
+    names = [*LEADERS, "takahashi-imada[axis]", "rk4[axis]", "rk4[angles]", "gauss-8[axis]", "srkn-14-6[axis]"]
+    table = [(Case("goldstein", name), work_table(scene, symtop.integrator(name), far, 2e5)) for name in names]
+    runs = [tuple(run) for run in timed_runs(store.combine(table).sel(scene="goldstein"))]
+    question = tmp_path / "question.pickle"
+    question.write_bytes(pickle.dumps((scene, far, runs)))
+    outcomes = []
+    for number in range(2):
+        answer = tmp_path / f"{number}.nc"
+        subprocess.run([sys.executable, "-c", TIMED_AGAIN, str(question), str(answer)], check=True)
+        outcomes.append(called(xr.load_dataset(answer), table))
+    for (sure, _), (_, wins) in (outcomes, outcomes[::-1]):
+        assert {key: wins[key] for key in sure} == sure
 
 
 def _first(case):
