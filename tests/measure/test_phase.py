@@ -1,0 +1,101 @@
+"""Parts of an error: shape, and lags of the nutation and the precession."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import symtop
+from symtop.measure.phase import phase, split
+from symtop.model import charts
+from symtop.model.scenes import closed_form
+from symtop.run.reference import reference
+
+
+def moved(name, periods=20.0, early=0.0, faster=0.0, turned=0.0, turning=0.0, lifted=0.0, samples=301):
+    """The true motion, early, too fast, turned about the vertical, turning, or lifted: a run whose errors are known."""
+    scene = symtop.scene(name)
+    times = np.linspace(0.0, periods * scene.nutation_period, samples)
+    motion = closed_form(scene)(times * (1.0 + faster) + early)
+    columns = {
+        "theta": motion.theta + lifted,
+        "phi": motion.phi + turned + turning * times,
+        "p_theta": scene.top.I1 * motion.theta_dot,
+    }
+    run = xr.Dataset({key: ("time", value) for key, value in columns.items()}, {"time": times}, {"outcome": "ok"})
+    return scene, run, reference(scene, times, precision="closed-form")
+
+
+@pytest.mark.parametrize("name", ["spheroid", "cusp", "hairer-lubich-wanner", "bruls-cardona-arnold"])
+def test_a_motion_that_is_early_and_turned_has_the_right_shape(name):
+    scene, run, truth = moved(name, early=0.013, turned=-0.2)
+    parts = phase(scene, run, truth)
+    omega = 2.0 * math.pi / scene.nutation_period
+    sine = np.sin(run["theta"].values)
+    assert parts.shape < 1e-13
+    assert parts.nutation_lag == pytest.approx(0.013 * omega, rel=1e-9)
+    assert parts.precession_lag == pytest.approx(0.2 * sine.max(), rel=1e-9)
+    assert parts.nutation_period < 1e-12
+    assert parts.precession_rate < 1e-10
+
+
+def test_lags_may_be_longer_than_a_nutation_and_a_turn():
+    scene, run, truth = moved("goldstein", early=0.3, faster=0.1, turned=9.0)
+    parts = split(scene, run)
+    assert np.max(np.abs(parts.lag - (0.3 + 0.1 * run["time"].values))) < 1e-11
+    assert np.max(np.abs(parts.turn - 9.0)) < 1e-10
+    assert phase(scene, run, truth).shape < 1e-12
+
+
+def test_wrong_frequencies_are_found_one_by_one():
+    scene, run, truth = moved("spheroid", faster=1e-5)
+    parts = phase(scene, run, truth)
+    assert parts.nutation_period == pytest.approx(1e-5, rel=1e-4)
+    assert parts.precession_rate == pytest.approx(1e-5, rel=1e-4)  # it turns faster by as much
+    scene, run, truth = moved("spheroid", turning=1e-5)
+    parts, form = phase(scene, run, truth), closed_form(scene)
+    assert parts.nutation_period < 1e-14
+    assert parts.precession_rate == pytest.approx(1e-5 * form.nutation_period / form.phi_per_period, rel=1e-9)
+
+
+def test_a_motion_of_another_shape_is_not_called_late():
+    scene, run, truth = moved("spheroid", lifted=1e-4)
+    parts = phase(scene, run, truth)
+    assert 3e-5 < parts.shape < 2e-4
+    omega = 2.0 * math.pi / scene.nutation_period
+    assert parts.nutation_lag < 1e-3
+    assert parts.nutation_period < 3.0 * parts.nutation_lag / (omega * float(run["time"][-1]))  # a bounded lag
+
+
+def test_a_pole_that_is_passed_on_the_other_side_is_not_a_turn():
+    scene = symtop.scene("bruls-cardona-arnold")
+    period = scene.nutation_period
+    run = symtop.simulate(
+        scene, "strang", step_size=period / 40.37, horizon=400.0 * period, samples=331, observe="axis", guard=False
+    )
+    truth = reference(scene, run["time"], precision="closed-form")
+    distance = charts.axis_distance(run["axis"].values, truth["axis"].values).max()
+    assert phase(scene, run, truth).precession_lag < 2.0 * distance
+
+
+def test_a_steady_precession_has_no_nutation_to_be_late():
+    scene, run, truth = moved("steady", turned=1e-6)
+    parts = phase(scene, run, truth)
+    assert math.isnan(parts.nutation_lag)
+    assert math.isnan(parts.nutation_period)
+    assert parts.shape < 1e-14
+    assert parts.precession_lag == pytest.approx(1e-6 * math.sin(scene.start.theta), rel=1e-8)
+
+
+@pytest.mark.parametrize("name", ["spheroid", "fast"])
+def test_frequencies_of_the_exact_motion_are_wrong_by_no_more_than_their_bounds(name):
+    scene = symtop.scene(name)
+    run = symtop.simulate(scene, "exact", horizon=10.0 * scene.nutation_period, samples=331, observe="axis")
+    parts = phase(scene, run, reference(scene, run["time"], precision="closed-form"))
+    assert parts.nutation_period <= parts.nutation_period_bound
+    assert parts.precession_rate <= parts.precession_rate_bound
+    failed = phase(
+        scene, run.assign_attrs(outcome="left_chart"), reference(scene, run["time"], precision="closed-form")
+    )
+    assert all(math.isnan(value) for value in failed)

@@ -1,0 +1,163 @@
+"""Times against each other: forecasts, samples met again, rankings and their leads."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from symtop_studies.work_precision import words as work_words
+
+from symtop.measure import ranking
+from symtop.measure.timing import forecasts, met_again, timings
+from symtop.measure.work import TARGETS
+
+
+def test_times_are_foretold_by_the_other_runs_of_a_method():
+    steps = np.array([40.0, 90.0, 300.0, 1e3, 5e3, 2e4])
+    work = steps * np.array([9.0, 8.0, 8.0, 7.0, 6.0, 6.0])
+    exact = 1e-5 + 2e-8 * work + 3e-8 * steps
+    assert forecasts(exact, work, steps, fixed_step=True) == pytest.approx(exact, rel=1e-9)
+    derivatives = 1e-5 + 1e-9 * work**2 / steps
+    assert forecasts(derivatives, work, steps, fixed_step=False) == pytest.approx(derivatives, rel=1e-9)
+    glitch = exact.copy()
+    glitch[3] *= 2.8  # as one winner of 72 once
+    assert glitch[3] / forecasts(glitch, work, steps, fixed_step=True)[3] == pytest.approx(2.8, rel=1e-9)
+    assert np.isnan(forecasts(exact[:2], work[:2], steps[:2], fixed_step=True)).all()
+
+
+def test_a_sample_that_no_other_comes_near_is_not_met_again():
+    assert met_again([1.0, 1.05, 3.0, math.nan])
+    assert not met_again([1.0, 1.3, 1.3])
+    assert not met_again([1.0, math.nan])
+
+
+def test_batches_of_a_round_are_neighbours_in_time():
+    called = []
+    timings([lambda name=name: called.append(name) for name in "abc"], batches=4, batch=0.0)
+    rounds = ["".join(sorted(called[-12 + 3 * k : -9 + 3 * k or None])) for k in range(4)]
+    assert rounds == ["abc"] * 4
+
+
+def cell(samples, errors=None, implementations=None):
+    """One scene and one horizon of a dataset: a setting each, with the given samples."""
+    samples = np.asarray(samples, float)
+    count = len(samples)
+    errors = np.full(count, 1e-7) if errors is None else np.asarray(errors)
+    table = {
+        "seconds": np.nanmin(samples, axis=1), "axis": errors, "outcome": np.full(count, "ok"),
+        "implementation": np.array(implementations or ["compiled"] * count), "nutation_lag": np.zeros(count),
+        "seconds_forecast": np.full(count, np.nan), "control": np.full(count, "step_size"),
+    }  # fmt: skip
+    data = xr.Dataset({name: (("integrator", "setting"), values[:, None]) for name, values in table.items()})
+    data["seconds_samples"] = (("integrator", "setting", "batch"), samples[:, None, :])
+    data["control"] = data["control"].isel(setting=0)
+    data["nutation_width"] = ("integrator", np.ones(count))
+    return data.assign_coords(integrator=list("abcdefg"[:count]))
+
+
+def test_a_lead_is_sure_only_if_every_round_agrees_and_it_is_more_than_a_hair():
+    clear = ranking.win(cell([[1.0, 1.1, 1.0], [1.3, 1.4, 1.35]]), 1e-6)
+    assert clear.best.integrator == "a"
+    assert clear.level == ()
+    assert (clear.behind.integrator, clear.ratio) == ("b", pytest.approx(1.3, rel=0.03))
+    assert "1.3 times faster than b)" in work_words.lead(1e-6, cell([[1.0, 1.1, 1.0], [1.3, 1.4, 1.35]]))
+    mixed = ranking.win(cell([[1.0, 1.6, 1.0], [1.3, 1.4, 1.35]]), 1e-6)
+    assert mixed.level == ("b",)
+    hair = ranking.win(cell([[1.0, 1.0, 1.0], [1.05, 1.05, 1.05]]), 1e-6)
+    assert hair.level == ("b",)
+
+
+def test_the_cost_of_a_target_is_that_of_the_cheapest_timed_run_that_meets_it():
+    rows = {"seconds": [0.5, 2.0, math.nan, 7.0], "axis": [1e-2, 1e-4, 1e-5, 1e-12], "outcome": ["ok"] * 4}
+    data = xr.Dataset({name: (("integrator", "setting"), [values]) for name, values in rows.items()})
+    data = data.assign(
+        implementation=("integrator", ["compiled"]), seconds_samples=data["seconds"].expand_dims(batch=3),
+        control=("integrator", ["step_size"]), nutation_width=("integrator", [1.0]),
+        seconds_forecast=math.nan * data["seconds"],
+    )  # fmt: skip
+    data = data.assign_coords(integrator=["a"])
+    assert [ranking.cheapest(data, target)[0].cost for target in (1e-1, 1e-3, 3e-5, 1e-12)] == [0.5, 2.0, 7.0, 7.0]
+    assert ranking.cheapest(data, 1e-13) == []
+
+
+def test_the_closed_form_is_not_ranked_but_stands_beside_the_others():
+    data = cell([[0.1] * 3, [1.0] * 3, [2.0] * 3], errors=[1e-16, 1e-7, 1e-7])
+    assert ranking.win(data, 1e-6).best.integrator == "a"
+    data["control"][0] = ""
+    data = data.assign(
+        set_up_seconds=("integrator", [0.1, np.nan, np.nan]), sample_seconds=("integrator", [6e-7, np.nan, np.nan])
+    )
+    assert ranking.ranked(data) == ["b", "c"]
+    assert ranking.win(data, 1e-6).best.integrator == "b"
+    assert ranking.win(data, 1e-12) is None  # it alone would meet that
+    said = work_words.beside(data)
+    assert "a is not ranked" in said
+    assert "100 ms" in said
+    assert "600 us" not in said
+    assert work_words.beside(data.sel(integrator=["b", "c"])) == ""
+
+
+def test_a_target_wider_than_the_nutation_has_no_winner_and_does_not_count():
+    data = cell([[1.0] * 3, [2.0] * 3]).expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
+    assert list(ranking.winners(data)) == [("x", 0, target) for target in TARGETS]
+    narrow = data.assign(nutation_width=4e-4 * data["nutation_width"])
+    assert list(ranking.winners(narrow)) == [("x", 0, target) for target in TARGETS if target < 4e-4]
+    assert ranking.relative_costs(narrow, ["a", "b"]).sel(target=1e-3).isnull().all()
+    assert "1e-03 on x (0.0004 rad wide)" in work_words.not_asked(narrow)
+    assert work_words.not_asked(data) == ""
+
+
+def test_a_time_that_misses_its_forecast_leads_only_if_the_forecast_does():
+    data = cell([[1.0] * 3, [2.8] * 3])
+    assert ranking.win(data, 1e-6).level == ()
+    data["seconds_forecast"] = (("integrator", "setting"), [[1.0], [1.05]])  # the second was unlucky in every round
+    assert ranking.win(data, 1e-6).level == ("b",)
+    data["seconds_forecast"] = (("integrator", "setting"), [[1.0], [2.9]])
+    assert ranking.win(data, 1e-6).level == ()
+    data["seconds_forecast"] = (("integrator", "setting"), [[2.7], [2.9]])  # the first was timed too short
+    assert ranking.win(data, 1e-6).level == ("b",)
+
+
+def test_a_row_that_meets_an_error_on_more_scenes_comes_before_a_faster_one():
+    table = np.array([[1.0, 1.0, math.inf, math.inf], [9.0, 9.0, 1.0, 1.0], [10.0, 12.0, 8.0, 9.0]])
+    ratios = xr.DataArray(
+        table[None], {"target": [1e-12], "integrator": list("abc")}, ("target", "integrator", "problem")
+    )
+    assert ranking.leaders(ratios, 3) == ["b", "c", "a"]
+    assert ranking.leaders(ratios.isel(problem=[0, 1]), 3) == ["a", "b", "c"]
+
+
+def test_a_slow_spell_that_hits_a_whole_round_does_not_blur_a_lead():
+    won = ranking.win(cell([[1.0, 3.0, 1.0], [1.3, 4.0, 1.3]]), 1e-6)
+    assert won.level == ()
+    restless = ranking.win(cell([[1.0, 1.0, 1.0], [1.3, 5.0, 6.0]]), 1e-6)
+    assert restless.level == ("b",)
+
+
+def test_samples_are_pairs_only_within_a_round_and_the_last_common_rounds_count():
+    no = math.nan
+    apart = ranking.win(cell([[1.0, 1.0, 1.0, no, no, no], [no, no, no, 2.0, 2.0, 2.0]]), 1e-6)
+    assert apart.level == ("b",)
+    base, later = [1.0, 3.0, 1.0], [1.0] * 5
+    assert ranking.win(cell([[*base, *later], [2.0, 2.0, 2.0, *[1.3] * 5]]), 1e-6).ratio == pytest.approx(1.3)
+    assert ranking.win(cell([[*base, *later], [2.0, 4.0, 2.0, *[no] * 5]]), 1e-6).ratio == pytest.approx(2.0)
+
+
+def test_plain_python_is_ranked_apart_and_a_failure_does_not_win():
+    data = cell(
+        [[0.1] * 3, [1.0] * 3, [0.5] * 3], errors=[1e-7, 1e-7, 1e-4], implementations=["python", "compiled", "compiled"]
+    )
+    assert ranking.win(data, 1e-6).best.integrator == "b"
+    assert ranking.win(data, 1e-6, implementation="python").best.integrator == "a"
+    assert ranking.win(data, 1e-9) is None
+    data["outcome"][1, 0] = "left_chart"
+    assert ranking.win(data, 1e-6) is None
+
+
+def test_costs_relative_to_the_best_keep_failures_visible():
+    data = cell([[2.0] * 3, [1.0] * 3], errors=[1e-7, 1e-4]).expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
+    ratios = ranking.relative_costs(data, ["a", "b"])
+    assert ratios.sel(target=1e-3).values.ravel().tolist() == [2.0, 1.0]
+    assert ratios.sel(target=1e-6).values.ravel().tolist() == [1.0, math.inf]
+    assert np.isinf(ratios.sel(target=1e-12).values).all()
+    assert ranking.leaders(ratios, 2) == ["a", "b"]
