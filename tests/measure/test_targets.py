@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import symtop
+from symtop.measure.accuracy import error_row
 from symtop.measure.settings import compared, limits
 from symtop.measure.work import CAPPED, TARGETS, TOO_WIDE, Walk, nutation_width, spans, work_table
 from symtop.model import charts
@@ -39,6 +40,19 @@ def test_a_step_may_be_as_long_as_the_method_is_accurate():
     assert limits(scene, method, horizon, "energy")[1] <= 0.25 * scene.nutation_period  # it says nothing of the motion
     coarse = table["axis"].values[table["setting_value"].values > 1.05 * longest]
     assert (coarse > 1e-3).all() or str(table["reached"].sel(target=1e-3).values) == CAPPED
+
+
+@pytest.mark.parametrize(("name", "good"), [("sofroniou-spaletta-10[axis]", True), ("takahashi-imada[axis]", False)])
+def test_an_accurate_long_step_is_accurate_between_its_ends_too(name, good):
+    scene, method = symtop.scene("cusp"), symtop.integrator(name)
+    step = scene.nutation_period / 1.27
+    at_ends = float(error_row(scene, method, step, 12.0 * step, "axis")["axis"])
+    between = []
+    for k in range(20):  # runs that end anywhere within a step, with steps that are a little shorter
+        horizon = (11.0 + (k + 0.5) / 20.0) * step
+        between.append(float(error_row(scene, method, horizon / 12.0, horizon, "axis")["axis_end"]))
+    assert (at_ends < 1e-5) is good
+    assert max(between) < 1.5 * at_ends
 
 
 def test_a_target_that_is_wider_than_the_nutation_is_not_asked():
