@@ -5,6 +5,7 @@ import random
 
 import numpy as np
 import pytest
+import xarray as xr
 from click.testing import CliRunner
 
 import symtop
@@ -86,6 +87,27 @@ def few(monkeypatch, count):
     """Only the first of some cheap methods are candidates."""
     names = ("strang", "takahashi-imada", "srkn-6-4", "kahan-li-6", "gauss-6")[:count]
     monkeypatch.setattr(advise, "_candidates", lambda *_: (dict.fromkeys(names), "of a few"))
+
+
+def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_with_it():
+    axis, attitude = advise._usable("axis"), advise._usable("attitude")
+    assert {"rk4[axis]", "rk4[angles]", "strang[axis]", "stormer-verlet"} <= set(axis)
+    assert not {"strang[attitude]", "rk45", "exact", "strang"} & set(axis)
+    assert "strang[attitude]" in attitude
+    assert "strang[axis]" not in attitude
+    assert advise._same("strang[axis]", attitude) == "strang[attitude]"
+    assert advise._same("rk4[angles]", axis) == "rk4[angles]"
+    assert advise._same("stormer-verlet[angles]", axis) == "stormer-verlet"
+    assert advise._same("exact[attitude]", axis) is None
+    advice = symtop.recommend("spheroid", accuracy=1e-3, horizon=20.0)
+    run = symtop.simulate("spheroid", advice.integrator, step_size=advice.step_size, tolerance=advice.tolerance)
+    assert run.attrs["integrator"] == advice.integrator
+
+
+def test_an_older_study_is_refused_with_a_remedy(tmp_path):
+    xr.Dataset({"seconds": ("setting", [1.0])}).to_netcdf(tmp_path / "work_precision.nc")
+    with pytest.raises(symtop.SymtopError, match=r"older version, without control.*--fresh"):
+        symtop.recommend("spheroid", accuracy=1e-3, results=tmp_path)
 
 
 def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch):
