@@ -1,10 +1,12 @@
-"""Energy errors at equal run time of symplectic methods and classical ones, within one chart.
+"""Energy errors at equal run time of structure-preserving methods and classical ones, within one chart.
 
 The chart changes the energy error of a method as much as the method does, so that rows are compared only with rows of
 the same chart: the splittings and the Gauss methods with rk4 and taylor on (e, L), the discrete Lagrangians and the
-compositions of Verlet with rk4 and rk45-compiled in Euler angles.
+compositions of Verlet with rk4 and rk45-compiled in Euler angles. A method preserves structure if it claims to be
+symplectic or symmetric.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -16,6 +18,7 @@ from symtop.methods.registry import split_name
 
 CHARTS = {"axis": "the axis and the angular momentum (e, L)", "angles": "Euler angles"}
 CLASSIC = ("rk4", "rk45-compiled", "taylor")  # compared in each chart that they have
+KINDS = ("at all common run times", "at short ones only", "at long ones only", "back and forth", "at none")
 STEPS = 118.0  # a nutation, of the comparison at equal steps
 
 
@@ -32,17 +35,17 @@ class Crossing(NamedTuple):
 
 
 def in_chart(data: xr.Dataset, chart: str) -> tuple[list[str], list[str]]:
-    """The compiled rows of a chart that are compared: the classical ones, and those that claim to be symplectic."""
+    """The compiled rows of a chart that are compared: the classical ones, and those that preserve structure."""
     names = [str(name) for name in ranking.ranked(data)]
-    over = [dim for dim in data["symplectic"].dims if dim != "integrator"]
-    symplectic = data["symplectic"].max(over)
+    over = [dim for dim in data["structured"].dims if dim != "integrator"]
+    structured = data["structured"].max(over)
     kept = [
         name
         for name in names
         if chart in data["chart"].sel(integrator=name) and "compiled" in data["implementation"].sel(integrator=name)
     ]
     classic = [name for name in kept if split_name(name)[0] in CLASSIC]
-    return classic, [name for name in kept if name not in classic and float(symplectic.sel(integrator=name)) == 1.0]
+    return classic, [name for name in kept if name not in classic and float(structured.sel(integrator=name)) == 1.0]
 
 
 def in_comparison(data: xr.Dataset) -> list[str]:
@@ -78,12 +81,12 @@ def crossing(cell: xr.Dataset, first: str, second: str) -> Crossing | None:
 
 
 def crossings(data: xr.Dataset, chart: str) -> dict[str, dict[str, list[Crossing]]]:
-    """All comparisons of a chart over the long horizon, by the classical row and by the symplectic one."""
+    """All comparisons of a chart over the long horizon, by the classical row and by the other one."""
     last = data.isel(horizon=-1)
     cells = [last.sel(scene=name) for name in last["scene"].values]
-    classic, symplectic = in_chart(data, chart)
+    classic, structured = in_chart(data, chart)
     return {
-        second: {first: [one for cell in cells if (one := crossing(cell, first, second))] for first in symplectic}
+        second: {first: [one for cell in cells if (one := crossing(cell, first, second))] for first in structured}
         for second in classic
     }
 
@@ -116,7 +119,7 @@ def growth_at_equal_settings(runs: xr.Dataset, quantity: str) -> float:
 
 
 def sentence(data: xr.Dataset, chart: str) -> str:
-    """How often symplectic rows have less energy error than the classical ones of their chart at equal run time."""
+    """How often structure-preserving rows have less energy error than the classical ones of their chart."""
     said = []
     for classic, compared in crossings(data, chart).items():
         pairs = [one for listed in compared.values() for one in listed]
@@ -124,13 +127,17 @@ def sentence(data: xr.Dataset, chart: str) -> str:
             continue
         always = [name for name, listed in compared.items() if listed and all(one.share == 1.0 for one in listed)]
         never = [name for name, listed in compared.items() if listed and all(one.share == 0.0 for one in listed)]
+        counts = Counter(
+            "at all common run times" if one.share == 1.0
+            else "at none" if one.share == 0.0
+            else "at short ones only" if one.at_least and not one.at_most
+            else "at long ones only" if one.at_most and not one.at_least
+            else "back and forth"
+            for one in pairs
+        )  # fmt: skip
         text = (
-            f"With {classic} as the classical one, of {len(pairs)} pairs of a symplectic method and a scene the "
-            f"symplectic one has the smaller energy error at all common run times in "
-            f"{sum(one.share == 1.0 for one in pairs)}, at short ones only in "
-            f"{sum(one.at_least and not one.at_most for one in pairs)}, at long ones only in "
-            f"{sum(one.at_most and not one.at_least for one in pairs)}, and at none in "
-            f"{sum(one.share == 0.0 for one in pairs)}."
+            f"Of {len(pairs)} pairs of a structure-preserving method and a scene, its energy error is smaller than "
+            f"that of {classic} " + ", ".join(f"{kind} in {counts[kind]}" for kind in KINDS) + "."
         )
         text += f" On every scene and at all run times: {', '.join(always)}." if always else ""
         text += f" On no scene: {', '.join(never)}." if never else ""

@@ -94,10 +94,10 @@ def _fronts(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
 
 
 def _curve(runs: xr.Dataset, quantity: str, cost: str, floor: float) -> tuple[Any, Any]:
+    """The runs of one row from its coarsest setting to its finest."""
     x, y = runs[cost].values, runs[quantity].values
-    order = np.argsort(x)
-    order = order[np.isfinite(x[order]) & np.isfinite(y[order])]
-    return x[order], np.maximum(y[order], floor)
+    there = np.isfinite(x) & np.isfinite(y)
+    return x[there], np.maximum(y[there], floor)
 
 
 def _front(axis: Any, cell: xr.Dataset, cost: str, floor: float) -> list[str]:
@@ -129,17 +129,17 @@ def _energy(data: xr.Dataset, chart: str) -> Picture:
     scenes = [str(name) for name in data["scene"].values]
     labels = (COSTS["seconds"], f"largest {QUANTITIES['energy']}")
     figure, axes = grid(len(scenes), min(3, len(scenes)), labels, height=3.0, **SHARED)
-    classic, symplectic = energy.in_chart(data, chart)
+    classic, structured = energy.in_chart(data, chart)
     for axis, scene in zip(axes, scenes, strict=True):
         cell = data.sel(scene=scene).isel(horizon=-1)
         floor = 0.5 * error_band(axis, cell["energy_bound"].values)
-        for row in symplectic:
+        for row in structured:
             if row not in ENERGY[chart]:
                 axis.plot(*_curve(cell.sel(integrator=row), "energy", "seconds", floor), color=GREY, lw=0.6, alpha=0.5)
-        _draw(axis, cell, [row for row in ENERGY[chart] if row in classic + symplectic], "energy", "seconds", floor)
+        _draw(axis, cell, [row for row in ENERGY[chart] if row in classic + structured], "energy", "seconds", floor)
         axis.set_title(scene)
     axes[0].set_ylim(1e-16, 30.0)
-    axes[0].plot([], [], color=GREY, lw=0.8, label="all other symplectic rows")
+    axes[0].plot([], [], color=GREY, lw=0.8, label="all other structure-preserving rows")
     legend_below(figure, axes)
     return Picture(
         f"energy-{chart}",

@@ -12,7 +12,7 @@ its own), target (rad), batch.
     seconds, seconds_samples(batch), spread         time of one run, NaN if it was not timed, see `timing_rounds`
     seconds_forecast                                what the row's other times foretell for it; drawn nowhere
     first_call, implementation, chart, control,     of a row: seconds of its first run, "compiled" or "python", its
-    symplectic                                      chart, "step_size", "tolerance" or "", 1 if it claims to be so
+    structured                                      chart, "step_size", "tolerance" or "", 1 if symplectic or symmetric
     set_up_seconds, sample_seconds                  seconds of a row without steps, NaN of the others
     stopped(horizon)                                why it tried nothing finer
     reached(horizon, target)                        "met", or why not: one of `work.STOPS`, `TOO_WIDE` or `CAPPED`
@@ -33,7 +33,8 @@ def errors_and_work(case: Case) -> xr.Dataset:
     """Errors and counted work of one row on a scene, over all horizons."""
     scene, periods, row = scenes.scene(case.scene), case.settings["periods"], integrator(case.integrator)
     table = work_table(scene, row, spans(scene, periods), case.settings["budget"])
-    traits = {"chart": ((), row.chart_for("axis")), "symplectic": ((), float(bool(row.symplectic)))}
+    structured = bool(row.symplectic) or bool(row.symmetric)
+    traits = {"chart": ((), row.chart_for("axis")), "structured": ((), float(structured))}
     return table.assign(traits).assign_coords(horizon=periods)
 
 

@@ -152,7 +152,7 @@ def test_energies_are_compared_within_a_chart():
             "outcome": (("integrator", "setting"), np.full((6, 9), "ok")),
             "control": ("integrator", ["step_size"] * 4 + ["tolerance"] * 2),
             "chart": ("integrator", ["angles", "angles", "axis", "axis", "axis", "angles"]),
-            "symplectic": ("integrator", [0.0, 1, 0, 1, 0, 0]),
+            "structured": ("integrator", [0.0, 1, 0, 1, 0, 0]),
             "implementation": ("integrator", ["compiled"] * 5 + ["python"]),
         },
         coords={"integrator": names},
@@ -183,6 +183,8 @@ def called(seconds, table):
 
 TIMED_AGAIN = """
 import pickle, sys
+from symtop.runner import scripts
+scripts.install()
 from symtop_studies.work_precision.timing_rounds import Effort, TimedRun, timing_rounds
 scene, far, runs = pickle.load(open(sys.argv[1], "rb"))
 timing_rounds(scene, far, [TimedRun(*run) for run in runs], Effort(3, 0.004), Effort(8, 0.01)).to_netcdf(sys.argv[2])
