@@ -76,10 +76,11 @@ def _fronts(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     axes[0].plot([], [], color=GREY, lw=0.8, label="all other rows")
     legend_below(figure, axes)
     timed = (
-        " A run is shown if it was timed, as its row's cheapest for some target; all times are measured. Dotted: the "
-        "closed form, `exact`, which is not ranked. A call alone takes some ten microseconds, where all curves bend."
+        " A run is shown if it was timed, as its row's cheapest for some target or for the comparison of energies; all "
+        "times are measured. Held fixed: the scene, the horizon, and the call, of the compiled loop alone. Dotted: the "
+        "closed form, `exact`, which is not ranked. A call takes some ten microseconds by itself, where curves bend."
         if cost == "seconds"
-        else " A force evaluation of a high derivative, a kick or a stage do not take the same time."
+        else " Held fixed: the scene and the horizon. A high derivative, a kick and a stage take different times."
     )
     most = ", ".join(row for row, _ in owners.most_common(4))
     return Picture(
@@ -138,6 +139,9 @@ def _energy(data: xr.Dataset, chart: str) -> Picture:
                 axis.plot(*_curve(cell.sel(integrator=row), "energy", "seconds", floor), color=GREY, lw=0.6, alpha=0.5)
         _draw(axis, cell, [row for row in ENERGY[chart] if row in classic + structured], "energy", "seconds", floor)
         axis.set_title(scene)
+        axis.text(
+            0.03, 0.16, _ended_badly(cell.sel(integrator=classic + structured)), fontsize=8, transform=axis.transAxes
+        )
     axes[0].set_ylim(1e-16, 30.0)
     axes[0].plot([], [], color=GREY, lw=0.8, label="all other structure-preserving rows")
     legend_below(figure, axes)
@@ -149,6 +153,15 @@ def _energy(data: xr.Dataset, chart: str) -> Picture:
         f"method alone. {energy.sentence(data, chart)}",
         f"Log-log plots of energy error against time at the long horizon, rows of the chart {chart}, a panel a scene.",
     )
+
+
+def _ended_badly(cell: xr.Dataset) -> str:
+    """How many rows have no run that ended well on a scene, and how their runs ended; empty if all have one."""
+    bad = ~(cell["outcome"] == "ok").any("setting").values
+    how = Counter(map(str, cell["outcome"].values[bad].ravel()))
+    del how["not_run"], how[""]
+    ended = f"\nmost runs: {how.most_common(1)[0][0].replace('_', ' ')}" if how else ""
+    return f"{bad.sum()} of {bad.size} rows have no run\nthat ends well{ended}" if bad.any() else ""
 
 
 def _parts(data: xr.Dataset) -> Picture:

@@ -15,7 +15,8 @@ its own), target (rad), batch.
     structured                                      chart, "step_size", "tolerance" or "", 1 if symplectic or symmetric
     set_up_seconds, sample_seconds                  seconds of a row without steps, NaN of the others
     stopped(horizon)                                why it tried nothing finer
-    reached(horizon, target)                        "met", or why not: one of `work.STOPS`, `TOO_WIDE` or `CAPPED`
+    reached(horizon, target)                        "met", or why not: one of `work.STOPS`, `TOO_WIDE`, `CAPPED`, or
+                                                    the outcome of a row's runs if none ended well
     nutation_width                                  of a scene: angle between the turning points, rad
 """
 

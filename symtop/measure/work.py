@@ -131,8 +131,10 @@ class Walk:
             self.run(setting)
 
     def reached(self, target: float) -> str:
-        """Is a target met, and if not, why?"""
+        """Is a target met, and if not, why? If no run ended well, it is the outcome of the finest."""
         met = [setting for setting in self.rows if self.error(setting) <= target]
+        if self.rows and all(row["outcome"] != "ok" for row in self.rows.values()):
+            return str(self.rows[min(self.rows)]["outcome"]).replace("_", " ")
         capped = self.method.control is not None and bool(met) and max(met) > self.coarsest / NEARBY
         return CAPPED if capped else "met" if met else self.stopped
 

@@ -77,6 +77,9 @@ def test_what_is_not_reached_has_a_reason():
     ):
         table = work_table(scene, symtop.integrator(name), [horizon], budget).isel(horizon=0)
         assert str(table["reached"].sel(target=target).values) == why
+    pole = symtop.scene("bruls-cardona-arnold")
+    table = work_table(pole, symtop.integrator("midpoint[angles]"), [100.0 * pole.nutation_period], 1e4)
+    assert set(map(str, table["reached"].values.ravel())) == {"left chart"}
 
 
 def test_the_rows_are_every_method_in_every_chart_that_costs_what_the_axis_costs():
