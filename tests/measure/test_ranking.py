@@ -118,6 +118,18 @@ def test_a_time_that_misses_its_forecast_leads_only_if_the_forecast_does():
     assert ranking.win(data, 1e-6).level == ("b",)
 
 
+def test_the_margin_of_a_lead_grows_with_the_noise_of_the_times():
+    data = cell([[1.0] * 3, [1.3] * 3, [2.0] * 3, [3.0] * 3])
+    data["seconds_forecast"] = data["seconds"] * xr.DataArray(
+        [[1.01], [0.99], [1.02], [1.0]], dims=data["seconds"].dims
+    )
+    assert ranking.margin(data) == ranking.MARGIN
+    assert ranking.win(data, 1e-6).level == ()
+    data["seconds_forecast"] = data["seconds"] * xr.DataArray([[1.01], [0.8], [1.2], [0.8]], dims=data["seconds"].dims)
+    assert ranking.margin(data) == pytest.approx(1.5)
+    assert ranking.win(data, 1e-6).level == ("b",)
+
+
 def test_a_row_that_meets_an_error_on_more_scenes_comes_before_a_faster_one():
     table = np.array([[1.0, 1.0, math.inf, math.inf], [9.0, 9.0, 1.0, 1.0], [10.0, 12.0, 8.0, 9.0]])
     ratios = xr.DataArray(
