@@ -159,8 +159,8 @@ def times(data: xr.Dataset) -> str:
         f"and {int((miss > MISSED).sum())} still do, whose leads must hold for the forecast too. "
         f"{alone} of the times are noisy: no other sample comes to within {AGAIN:.0%} of the smallest, and no lead of "
         "theirs, or over them, is called more than noise. Any other lead is, from a ratio of times of "
-        f"{min(margins):.2f} to {max(margins):.2f} on: by scene and horizon, 1 and twice the distance from the forecast "
-        f"within which nine of ten times lie, and at least {ranking.MARGIN:g}."
+        f"{min(margins):.2f} to {max(margins):.2f} on, by scene and horizon: 1 and twice the distance from the "
+        f"forecast within which nine of ten times lie, and at least {ranking.MARGIN:g}."
     )
 
 
