@@ -29,7 +29,7 @@ LEFT_OUT = {
 
 
 def cases(quick: bool) -> list[Case]:
-    """Every compiled method with several charts (first scene; `factors` has the others), with an unreduced form, and with a reduced-first step."""
+    """Compiled methods with several charts (first scene), with an unreduced form, with a reduced-first step."""
     grid = []
     for name in grid_scenes(LEFT_OUT, lambda one: math.isfinite(one.nutation_period)):
         if quick and name == "goldstein":
