@@ -16,13 +16,15 @@ top and gravity), with the same coefficients. The implicit midpoint rule is `mid
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from symtop.methods import taylor
 from symtop.methods.formulations import FORMULATIONS
+from symtop.methods.plan import Array
 from symtop.methods.registry import Integrator, integrators
 from symtop.methods.scipy_ivp import RightHandSide, scipy_method
 from symtop.model.scenes import Scene
+from symtop.model.top import SymmetricTop
 from symtop.run.simulation import make_plan, simulate
 
 from . import plain_numpy
@@ -82,7 +84,7 @@ def cells(schemes: Sequence[str] | None = None) -> list[Cell]:
         for name in methods:
             grid += [Cell(scheme, chart, COMPILED, known[name].row(chart)) for chart in known[name].charts()]
     if "axis" in known["taylor"].solvers:  # heyoka is there
-        grid.append(Cell("Taylor", "angles", COMPILED, taylor.in_angles().row("angles")))
+        grid.append(Cell("Taylor", "angles", COMPILED, taylor_in_angles()))
     for scheme, name in SCIPYS.items():
         for chart in FORMULATIONS:
             grid.append(Cell(scheme, chart, SCIPY_NUMBA, scipy_method(name, compiled=True).row(chart)))
@@ -90,6 +92,17 @@ def cells(schemes: Sequence[str] | None = None) -> list[Cell]:
     for scheme, method in (("rk4", plain_numpy.RK4), ("Strang", plain_numpy.STRANG)):
         grid += [Cell(scheme, chart, NUMPY, method.row(chart)) for chart in method.charts()]
     return [cell for cell in grid if schemes is None or cell.scheme in schemes]
+
+
+def taylor_in_angles() -> Integrator:
+    """The row ``taylor[angles]``: heyoka on the Euler-Lagrange equations, from the same formulas as the others."""
+
+    def read(top: SymmetricTop, times: Array, states: Array) -> tuple[Array, Array, Array]:
+        form = FORMULATIONS["angles"]
+        return form.present(top, times, states), *form.momenta(top, states)
+
+    method, solvers = integrators()["taylor"], {"angles": taylor.solver("angles", "double", read)}
+    return replace(method, name="taylor[angles]", solvers=solvers)
 
 
 def caller(scene: Scene, cell: Cell, call: str, setting: float, horizon: float) -> Callable[[], object] | None:

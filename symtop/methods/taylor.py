@@ -11,20 +11,19 @@ hundredth of the rounding unit removes the truncation bias that makes energy dri
 `taylor` works in double, `taylor-longdouble` and `taylor-quad` with mantissas of 64 and 113 bits: they show what the
 method does without rounding, and `symtop.reference` is made by the same function. A Taylor step of order n computes n
 derivatives of the state; `force_evaluations` counts them.
-The registry has the two charts without poles; `in_angles` is the same method on the equations in angles, with the same
-formulas as the Runge-Kutta methods, for studies that vary the chart alone.
+The registry has the two charts without poles. In angles the method would be the first choice for whoever observes the
+nutation or the attitude, and it is neither the fastest there nor safe: the study of charts makes a record for itself.
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
 """
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.base.multiprecision import context
 from symtop.base.validate import SymtopError
-from symtop.methods.formulations import FORMULATIONS
 from symtop.methods.plan import Plan, Run
 from symtop.methods.registry import Array, Integrator, Solver
 from symtop.model import charts
@@ -64,6 +63,9 @@ def equations(chart: str) -> list[Any]:
             0.5 * (inverse * (Lz * q0 + Lx * q2 - Ly * q1) + twist * q0),
         ]
     return [*zip(axis, motion, strict=True), *zip(momentum, [-mgl * y, mgl * x, 0.0 * x], strict=True)]
+
+
+Read = Callable[[SymmetricTop, Array, Array], tuple[Array, Array, Array]]  # (top, times, states)
 
 
 class Arithmetic(NamedTuple):
@@ -156,20 +158,21 @@ def propagate(
     return Flight(states[grid.size - times.size :], int(steps), order, outcome.name)
 
 
-def solver(chart: str, precision: str) -> Solver:
-    """A solver of the registry in one chart and one arithmetic; samples are rounded to double."""
+def solver(chart: str, precision: str, read: Read | None = None) -> Solver:
+    """A solver of the registry in one chart and one arithmetic; samples are rounded to double.
+
+    In angles, `read` makes states of the chart and both momenta of the states that were integrated.
+    """
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         most = max(1, int(plan.most(MOST_STEPS[precision])))
         flight = propagate(chart, precision, plan.tolerance, top, start, plan.times, most)
         count, size = len(flight.states), plan.times.size
         states = _padded(flight.states, size)
-        if chart == "angles":
-            form = FORMULATIONS[chart]
-            par, _ = form.prepare(top, start)
-            (p_phi, p_psi), states = form.momenta(par, states), form.present(par, plan.times, states)
-        else:
+        if read is None:
             p_phi, p_psi = (_padded(values, size) for values in space_momenta(chart, flight.states))
+        else:
+            states, p_phi, p_psi = read(top, plan.times, states)
         good: Any = np.isfinite(states).all(axis=1)
         word = "ok" if good.all() and "time_limit" in flight.outcome else "not_finite"
         if "step_limit" in flight.outcome and good[:count].all():
@@ -207,15 +210,6 @@ def built_in() -> list[Integrator]:
         _entry(precision, {chart: solver(chart, precision) for chart in ("axis", "attitude")})
         for precision in ("double", *wide, *quad)
     ]
-
-
-def in_angles() -> Integrator:
-    """`taylor` in double on the equations in angles, for the study of charts; it is not in the registry.
-
-    There it would be the first choice for whoever observes the nutation or the attitude, and it is neither the fastest
-    nor without poles. Raises SymtopError when it runs without heyoka.
-    """
-    return _entry("double", {"angles": solver("angles", "double")})
 
 
 def _absent() -> Integrator:

@@ -408,21 +408,6 @@ def test_extended_precision_is_not_lost_on_the_way():
         assert abs(float(constant[1] - constant[0])) < 1e-30
 
 
-def test_taylor_in_angles_solves_the_same_equations():
-    hy = pytest.importorskip("heyoka")
-    from symtop.methods.taylor import equations, in_angles
-
-    scene = symtop.scene("goldstein")
-    par, state = FORMULATIONS["angles"].prepare(scene.top, scene.start)
-    names, sides = zip(*equations("angles"), strict=True)
-    slopes = hy.cfunc(list(sides), list(names))(np.array(state), pars=np.array([1.0 / par.I1, par.mgl, par.I3]))
-    np.testing.assert_allclose(slopes, field_angles(par, state), rtol=1e-14, atol=1e-14)
-    run = symtop.simulate(scene, in_angles().row("angles"), horizon=10.0)
-    assert run.attrs["chart"] == "angles"
-    assert float(symtop.errors(run)["attitude"].max()) < 1e-11
-    assert 0.0 < float(np.ptp(run["p_phi"].values)) < 1e-12  # free to drift, by rounding
-
-
 def test_tolerances_stop_at_the_arithmetic():
     pytest.importorskip("heyoka")
     integrator("taylor-quad").check_tolerance(1e-36)

@@ -19,6 +19,7 @@ from symtop_studies.factors.cells import (
     SIMULATE,
     SOLVE_IVP,
     cells,
+    taylor_in_angles,
 )  # fmt: skip
 from symtop_studies.factors.figures import NAMES, pictures
 from symtop_studies.factors.tables import (
@@ -40,6 +41,7 @@ from symtop_studies.factors.tables import (
 
 import symtop
 from symtop.measure import settings
+from symtop.methods.formulations import FORMULATIONS
 from symtop.runner.store import combine
 from symtop.runner.study import Case
 
@@ -73,6 +75,21 @@ def test_the_loops_in_numpy_return_the_trajectory_of_the_compiled_ones(plain, na
         another = symtop.simulate("goldstein", f"{name}[{chart}]", **plan | {"step_size": 0.02})
         gap = np.abs(mine["axis"].values[-1] - another["axis"].values[-1]).max()
         assert gap > 1e-9  # the control: another step is another trajectory
+
+
+def test_taylor_in_angles_solves_the_same_equations():
+    hy = pytest.importorskip("heyoka")
+    from symtop.methods.taylor import equations
+
+    scene = symtop.scene("goldstein")
+    par, state = FORMULATIONS["angles"].prepare(scene.top, scene.start)
+    names, sides = zip(*equations("angles"), strict=True)
+    slopes = hy.cfunc(list(sides), list(names))(np.array(state), pars=np.array([1.0 / par.I1, par.mgl, par.I3]))
+    np.testing.assert_allclose(slopes, FORMULATIONS["angles"].field(par, state), rtol=1e-14, atol=1e-14)
+    run = symtop.simulate(scene, taylor_in_angles(), horizon=10.0)
+    assert run.attrs["chart"] == "angles"
+    assert float(symtop.errors(run)["attitude"].max()) < 1e-11
+    assert 0.0 < float(np.ptp(run["p_phi"].values)) < 1e-12  # free to drift, by rounding
 
 
 def test_a_cell_is_named_once_and_is_one_method_in_one_chart():
