@@ -87,7 +87,8 @@ def cells(schemes: Sequence[str] | None = None) -> list[Cell]:
         grid.append(Cell("Taylor", "angles", COMPILED, taylor_in_angles()))
     for scheme, name in SCIPYS.items():
         for chart in FORMULATIONS:
-            grid.append(Cell(scheme, chart, SCIPY_NUMBA, scipy_method(name, compiled=True).row(chart)))
+            if scheme == DORMAND_PRINCE:
+                grid.append(Cell(scheme, chart, SCIPY_NUMBA, scipy_method(name, compiled=True).row(chart)))
             grid.append(Cell(scheme, chart, SCIPY_PYTHON, known[name.lower()].row(chart)))
     for scheme, method in (("rk4", plain_numpy.RK4), ("Strang", plain_numpy.STRANG)):
         grid += [Cell(scheme, chart, NUMPY, method.row(chart)) for chart in method.charts()]

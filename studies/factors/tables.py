@@ -36,7 +36,7 @@ LEAST = 0.7  # of the target: the search ends with an error from here to the tar
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
 FINER = 1e-3  # of the target: the tolerance that a second search begins with
 SHORT = 0.005  # seconds of a call
-FURTHER = 3
+FURTHER = 4
 TIE = 0.1  # times that differ by less are level
 FACTORS = ("method", "chart", "language", "call")
 
@@ -93,8 +93,8 @@ def timed(
 ) -> dict[tuple[Cell, str], Timing]:
     """Times of every cell in every call, in interleaved rounds.
 
-    Short calls and noisy ones take part in `FURTHER` times as many rounds again: a busy moment of the machine can spoil
-    all samples of a short call, and hardly any of one that lasts longer than such a moment.
+    Short calls take part in `FURTHER` times as many rounds again, because a busy moment of the machine can spoil all
+    their samples; of the long ones those that are noisy take part in as many rounds again.
     """
     functions = {
         (cell, call): function
@@ -103,10 +103,12 @@ def timed(
         if (function := caller(scene, cell, call, met.setting, met.horizon)) is not None
     }
     taken = dict(zip(functions, timings(list(functions.values()), rounds, batch), strict=True))
-    further = [key for key, timing in taken.items() if timing.spread > NOISY or timing.best < SHORT]
-    again = timings([functions[key] for key in further], FURTHER * rounds, batch, seed=1)
-    for key, timing in zip(further, again, strict=True):
-        taken[key] = Timing(taken[key].samples + timing.samples, taken[key].first_call)
+    short = [key for key, timing in taken.items() if timing.best < SHORT]
+    noisy = [key for key, timing in taken.items() if timing.best >= SHORT and timing.spread > NOISY]
+    for again, times_more in ((short, FURTHER), (noisy, 1)):
+        more = timings([functions[key] for key in again], times_more * rounds, batch, seed=times_more)
+        for key, timing in zip(again, more, strict=True):
+            taken[key] = Timing(taken[key].samples + timing.samples, taken[key].first_call)
     return taken
 
 

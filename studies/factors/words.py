@@ -92,7 +92,9 @@ def product(scene: str, nutations: float, target: float, bars: Sequence[Bar]) ->
 
 def public_and_inner(scene: str, nutations: float, target: float, rows: Sequence[Timed]) -> str:
     """The comparison that a user makes beside the one that an author makes, against each of SciPy's methods."""
-    parts = []
+    parts: list[str] = []
+    if not any(one.call == SIMULATE for one in rows):
+        return ""
     for scheme in SCIPYS:
         theirs = {
             call: min((one for one in rows if (one.method, one.language, one.call) == (scheme, SCIPY_PYTHON, call)),

@@ -162,7 +162,11 @@ def test_every_time_is_the_least_of_samples_that_were_taken(measured, rows):
     assert {one.call for one in rows} == set(CALLS)
     assert {one.language for one in rows if one.call == SOLVE_IVP} == {SCIPY_PYTHON}
     counts = np.isfinite(samples).sum("batch").values
-    assert set(counts[counts > 0]) <= {2, 8}  # the rounds, and three times as many more for short or noisy calls
+    assert set(counts[counts > 0]) <= {
+        2,
+        4,
+        10,
+    }  # the rounds; as many again for noisy calls, four times as many for short ones
 
 
 def test_loud_times_are_said_to_be_loud(measured):
