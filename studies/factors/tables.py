@@ -36,7 +36,7 @@ LEAST = 0.7  # of the target: the search ends with an error from here to the tar
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
 FINER = 1e-3  # of the target: the tolerance that a second search begins with
 SHORT = 0.005  # seconds of a call
-FURTHER = 4
+FURTHER = 10
 TIE = 0.1  # times that differ by less are level
 FACTORS = ("method", "chart", "language", "call")
 
@@ -220,17 +220,18 @@ class Bar(NamedTuple):
     time: Timed
 
 
-def waterfall(rows: Sequence[Timed]) -> list[Bar]:
+def waterfall(rows: Sequence[Timed], *, call_first: bool = False) -> list[Bar]:
     """From SciPy's RK45 in angles, called by `solve_ivp`, to the fastest kernel; each bar changes one factor.
 
-    Empty if the way there was not timed.
+    The call is changed to `simulate` first and to the bare kernel last, or to the bare kernel at once. Empty if the way
+    was not timed.
     """
     known = {one.levels: one for one in rows}
     if START not in known:
         return []
     end = fastest(rows)
     path = [
-        ("call", SIMULATE),
+        ("call", KERNEL if call_first else SIMULATE),
         ("chart", end.chart),
         ("language", SCIPY_NUMBA),
         ("language", COMPILED),

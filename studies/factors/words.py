@@ -64,9 +64,12 @@ def joined(words: Sequence[str]) -> str:
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + f" and {words[-1]}" if words else "none"
 
 
-def waterfalls(data: xr.Dataset) -> list[tuple[str, float, float, list[Bar]]]:
+def waterfalls(data: xr.Dataset, *, call_first: bool = False) -> list[tuple[str, float, float, list[Bar]]]:
     """Scene, nutations, target and bars of every goal that has a waterfall."""
-    every = [(scene, span, target, waterfall(times(part))) for scene, span, target, part in goals_of(data)]
+    every = [
+        (scene, span, target, waterfall(times(part), call_first=call_first))
+        for scene, span, target, part in goals_of(data)
+    ]
     return [one for one in every if one[3]]
 
 
@@ -168,11 +171,11 @@ def noise_sentence(data: xr.Dataset) -> str:
 
 def verdict(data: xr.Dataset) -> list[str]:
     """The waterfalls, the factors, the public call, and a sentence a family."""
-    falls = [product(*one) for one in waterfalls(data)]
+    falls = [product(*one) for one in waterfalls(data)[:2]]
     calls = [public_and_inner(scene, span, target, times(part)) for scene, span, target, part in goals_of(data)]
     families = " ".join(family_sentences(data))
     return [
-        *falls[:2],
+        *falls,
         factors_sentence(data),
         *[call for call in calls if call],
         f"Model no more than a scene needs, at equal error of the axis. {families}",
@@ -184,7 +187,7 @@ def verdict(data: xr.Dataset) -> list[str]:
 def tables(data: xr.Dataset) -> list[Table]:
     """The waterfall, the effects, the charts side by side and the whole factorial."""
     falls, charts, rows = [], [], []
-    for scene, span, target, bars in waterfalls(data):
+    for scene, span, target, bars in [*waterfalls(data), *waterfalls(data, call_first=True)]:
         goal = [scene, f"{span:g}", f"{target:.0e}"]
         for bar in bars:
             run = bar.time
@@ -213,7 +216,7 @@ def tables(data: xr.Dataset) -> list[Table]:
                 charts.append([*goal, scheme, *shown, *(f"{r:.2f}" if math.isfinite(r) else "" for r in ratios)])
         rows += [[*goal, *row] for row in _factorial(part, taken)]
     return [
-        Table("The waterfall: one factor at a time", WATERFALL, falls),
+        Table("The waterfall: one factor at a time, the call last and the call first", WATERFALL, falls),
         Table("What one factor does, everything else held", EFFECTS, effects),
         Table("Compiled kernels by chart, at equal error of the axis", CHARTS, charts),
         Table("The factorial", FACTORIAL, rows),

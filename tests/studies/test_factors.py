@@ -181,8 +181,9 @@ def test_loud_times_are_said_to_be_loud(measured):
 # ---- one factor at a time --------------------------------------------------------------------------------------------
 
 
-def test_neighbours_in_the_waterfall_differ_in_exactly_the_factor_they_name(rows):
-    bars = waterfall(rows)
+@pytest.mark.parametrize("call_first", [False, True])
+def test_neighbours_in_the_waterfall_differ_in_exactly_the_factor_they_name(rows, call_first):
+    bars = waterfall(rows, call_first=call_first)
     assert bars[0].time.levels == (DORMAND_PRINCE, "angles", SCIPY_PYTHON, SOLVE_IVP)
     assert bars[-1].time == fastest(rows)
     assert len(bars) >= 5
@@ -197,7 +198,8 @@ def test_neighbours_in_the_waterfall_differ_in_exactly_the_factor_they_name(rows
 def test_the_product_of_the_ratios_is_the_total(rows):
     bars = waterfall(rows)
     total = bars[0].time.seconds / bars[-1].time.seconds
-    assert math.prod(bar.ratio for bar in bars[1:]) == pytest.approx(total, rel=1e-12)
+    for order in (bars, waterfall(rows, call_first=True)):
+        assert math.prod(bar.ratio for bar in order[1:]) == pytest.approx(total, rel=1e-12)
     assert f"{words.times_faster(total)} times less" in words.product("spheroid", 10.0, 1e-6, bars)
 
 
@@ -259,7 +261,8 @@ def test_figures_tables_and_sentences_come_from_the_dataset(measured):
     for phrase in ("rk45[angles] called through solve_ivp", "in the inner loop", "Dormand-Prince: a compiled run"):
         assert phrase in text
     falls, effects, charts, everything = words.tables(measured)
-    assert len(falls.rows) == len(waterfall(times(next(goals_of(measured))[3])))
+    taken = times(next(goals_of(measured))[3])
+    assert len(falls.rows) == len(waterfall(taken)) + len(waterfall(taken, call_first=True))
     assert {row[0] for row in effects.rows} == {"chart", "language", "call", "method"}
     assert len(charts.rows) == 2
     assert len(everything.rows) == measured.sizes["integrator"]
