@@ -47,7 +47,7 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
     figure, axes = style.panels(len(shown), 1, height=height)
     for axis, (scene, span, target, bars) in zip(axes[:, 0], shown, strict=True):
         seconds = [bar.time.seconds for bar in bars]
-        ends = 0.3 * min(seconds), 60.0 * max(seconds)
+        ends = 0.3 * min(seconds), 400.0 * max(seconds)
         for k, bar in enumerate([*bars, bars[-1]]):
             total = k in (0, len(bars))
             low, high = sorted((ends[0] if total else seconds[k - 1], seconds[min(k, len(bars) - 1)]))
@@ -62,7 +62,8 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
         axis.set(xscale="log", xlim=ends, ylim=(len(bars) + 0.6, -0.6), yticks=range(len(bars) + 1))
         axis.set_yticklabels([*map(_label, bars), f"{last.name}, {last.call}"], fontsize=9)
         whole = words.times_faster(seconds[0] / seconds[-1])
-        axis.set_title(f"{scene}, {span:g} nutations, axis error {target:.0e}: {whole} times faster in all")
+        order = "the call last" if bars[-1].factor == "call" else "the call first"
+        axis.set_title(f"{scene}, {span:g} nutations, axis error {target:.0e}: {whole} times faster, {order}")
         axis.grid(visible=False, axis="y")
         axis.xaxis.set_minor_formatter("")
     for factor in filter(None, COLORS):

@@ -35,7 +35,7 @@ from .cells import (
 LEAST = 0.7  # of the target: the search ends with an error from here to the target, if nine runs suffice
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
 FINER = 1e-3  # of the target: the tolerance that a second search begins with
-SHORT = 0.005  # seconds of a call
+SHORT = 0.01  # seconds of a call
 FURTHER = 10
 TIE = 0.1  # times that differ by less are level
 FACTORS = ("method", "chart", "language", "call")

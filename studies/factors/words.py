@@ -172,7 +172,9 @@ def noise_sentence(data: xr.Dataset) -> str:
 def verdict(data: xr.Dataset) -> list[str]:
     """The waterfalls, the factors, the public call, and a sentence a family."""
     falls = [product(*one) for one in waterfalls(data)[:2]]
-    calls = [public_and_inner(scene, span, target, times(part)) for scene, span, target, part in goals_of(data)]
+    first = str(data["scene"].values[0])  # the tables have the others
+    every = [(scene, span, target, times(part)) for scene, span, target, part in goals_of(data)]
+    calls = [public_and_inner(*one) for one in every if one[0] == first]
     families = " ".join(family_sentences(data))
     return [
         *falls,
