@@ -1,3 +1,4 @@
 """The studies that ship with symtop: one folder a question."""
 
-ORDER = ("truth", "convergence", "work_precision", "drift", "stability", "reduction")  # of the report; others follow
+# of the report; others follow
+ORDER = ("truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction")

@@ -29,13 +29,17 @@ LEFT_OUT = {
 
 
 def cases(quick: bool) -> list[Case]:
-    """Every method with several charts (first scene), with an unreduced form, and with a reduced-first step."""
+    """Compiled methods with several charts (first scene), with an unreduced form, with a reduced-first step."""
     grid = []
     for name in grid_scenes(LEFT_OUT, lambda one: math.isfinite(one.nutation_period)):
         if quick and name == "goldstein":
             continue
         start, period = scene(name), scene(name).nutation_period
-        several = [method for method in integrators().values() if len(method.charts()) > 1 and name == FIRST]
+        several = [
+            method
+            for method in integrators().values()
+            if method.implementation == "compiled" and len(method.charts()) > 1 and name == FIRST
+        ]
         for method in several[:6] if quick else several:
             settings = ladder(method, start, tables.CHART_PERIODS * period, 8, 1e5)[1 :: 3 if quick else 2]
             plan = {"settings": settings, "horizon": tables.CHART_PERIODS * period, "batches": 2 if quick else 3}

@@ -196,12 +196,13 @@ def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
 
 def search(
     scene: Scene, method: Integrator, accuracy: float, quantity: str, horizon: float, guess: float | None = None,
-    patience: float = math.inf,
+    patience: float = math.inf, least: float = LEAST,
 ) -> Met | str:  # fmt: skip
     """The coarsest setting found that meets the accuracy over the horizon, or the reason why there is none.
 
-    It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess. No run is begun that is
-    foreseen to take more than `patience` force evaluations.
+    It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess. It ends with an error
+    between `least` of the accuracy and the accuracy, if that takes few runs. No run is begun that is foreseen to take
+    more than `patience` force evaluations.
     """
     ends, patience = limits(scene, method, horizon, quantity), min(patience, MOST_EVALUATIONS[method.implementation])
     power = float(method.order or 2) if method.fixed_step else 1.0
@@ -215,7 +216,7 @@ def search(
         met = tried[setting] = attempt(scene, method, setting, horizon, quantity)
         return met.error, met.evaluations
 
-    found = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience)
+    found = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience, least=least)
     return found if isinstance(found, str) else tried[found]
 
 

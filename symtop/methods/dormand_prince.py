@@ -6,8 +6,8 @@
     h <- h min(10, .9 |err|^(-1/5)) after a step (min(1, ..) after a rejection),  h max(.2, .9 |err|^(-1/5)) rejected
     y(t + x h) = y + h sum_i k_i (p_i1 x + p_i2 x^2 + p_i3 x^3 + p_i4 x^4)     samples between steps, order 4
 
-`rk45-compiled` is the same method as `rk45` on the same six equations (see `euler_lagrange`): it accepts and rejects
-the same steps, so that their times differ only by what Python costs and their errors not at all. It exists to keep
+`rk45-compiled` is the same method as `rk45` on the same equations (see `formulations`): it accepts and rejects the same
+steps in each chart, so that their times differ only by what Python costs and their errors not at all. It exists to keep
 the language out of a comparison of methods. Order 5, explicit, six evaluations a step; nothing is conserved.
 Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19; the interpolant: Shampine, Math. Comp. 46 (1986) 135;
 the initial step: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.4.
@@ -18,13 +18,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.methods.angles import chart_outcome
 from symtop.methods.compiled import compile_kernel, register_jitable, set_item
-from symtop.methods.euler_lagrange import LEAST_TOLERANCE, as_run, field_angles, with_rates
-from symtop.methods.outcomes import NOT_FINITE, OK, OUT_OF_BUDGET, OUTCOMES, STEP_TOO_SMALL
+from symtop.methods.euler_lagrange import LEAST_TOLERANCE
+from symtop.methods.formulations import FORMULATIONS, as_run
+from symtop.methods.outcomes import OK, OUT_OF_BUDGET, STEP_TOO_SMALL
 from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator
-from symtop.methods.runge_kutta import later_stages, store, weighted
+from symtop.methods.registry import Integrator, Solver
+from symtop.methods.runge_kutta import later_stages, plus, store, weighted
 from symtop.model.top import Angles, SymmetricTop
 
 BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
@@ -65,14 +65,6 @@ DORMAND_PRINCE = Embedded(
 
 
 @register_jitable
-def _plus(state: Any, step: Any) -> Any:
-    total = state
-    for m in range(len(state)):
-        total = set_item(total, m, state[m] + step[m])
-    return total
-
-
-@register_jitable
 def _rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
     """Root mean square of a vector in units of what is allowed, tolerance (1 + |y|)."""
     total = 0.0
@@ -89,12 +81,12 @@ def _interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any
     for i in range(len(dense)):
         row = dense[i]
         weights = set_item(weights, i, x * (row[0] + x * (row[1] + x * (row[2] + x * row[3]))))
-    return _plus(state, weighted(weights, state, slopes, h))
+    return plus(state, weighted(weights, state, slopes, h))
 
 
 @register_jitable
 def _try_steps(
-    par: Any, pair: Any, state: Any, slopes: Any, tolerance: float, t: float, step: float, end: float
+    field: Any, par: Any, pair: Any, state: Any, slopes: Any, tolerance: float, t: float, step: float, end: float
 ) -> Any:
     """Shrink the step until its error passes: new state, new time, next step, evaluations, outcome."""
     least = 10.0 * (np.nextafter(t, np.inf) - t)
@@ -104,9 +96,9 @@ def _try_steps(
     while step >= least:
         after = min(t + step, end)
         h = after - t
-        later_stages(field_angles, par, pair.a, len(pair.b), state, slopes, h)
-        new = _plus(state, weighted(pair.b, state, slopes, h))
-        store(slopes, len(pair.b), field_angles(par, new))
+        later_stages(field, par, pair.a, len(pair.b), state, slopes, h)
+        new = plus(state, weighted(pair.b, state, slopes, h))
+        store(slopes, len(pair.b), field(par, new))
         evaluations += len(pair.b)
         error = _rms(weighted(pair.error, state, slopes, h), state, new, tolerance)
         change = GROW if error == 0.0 else SAFETY * error**-0.2
@@ -117,63 +109,70 @@ def _try_steps(
     return state, t, step, evaluations, STEP_TOO_SMALL
 
 
-def march(  # type: ignore[no-untyped-def]
-    par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, states
-):
-    """Steps until the end, a failure or `budget` evaluations; fills `states` with samples."""
-    evaluations = 0
-    outcome = OK
-    while t < end and outcome == OK and evaluations < budget:
-        before, start = state, t
-        state, t, step, effort, outcome = _try_steps(par, pair, before, slopes, tolerance, start, step, end)
-        evaluations += effort
-        if outcome != OK:
-            break
-        steps += 1
-        while seen < len(times) and times[seen] <= t:
-            store(
-                states, seen, _interpolate(pair.dense, before, slopes, t - start, (times[seen] - start) / (t - start))
-            )
-            seen += 1
-        outcome = chart_outcome(state[0])
-        for m in range(len(state)):
-            slopes[0, m] = slopes[len(pair.b), m]
-            if not np.isfinite(state[m]):
-                outcome = NOT_FINITE
-    return state, t, step, steps, seen, evaluations, outcome
+def _march(field: Any, ended: Any) -> Any:
+    """The loop on states that move by `field`, compiled when it is first used."""
+
+    def march(  # type: ignore[no-untyped-def]
+        par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, states
+    ):
+        """Steps until the end, a failure or `budget` evaluations; fills `states` with samples."""
+        evaluations = 0
+        outcome = OK
+        while t < end and outcome == OK and evaluations < budget:
+            before, start = state, t
+            state, t, step, effort, outcome = _try_steps(field, par, pair, before, slopes, tolerance, start, step, end)
+            evaluations += effort
+            if outcome != OK:
+                break
+            steps += 1
+            h = t - start
+            while seen < len(times) and times[seen] <= t:
+                store(states, seen, _interpolate(pair.dense, before, slopes, h, (times[seen] - start) / h))
+                seen += 1
+            outcome = ended(state)
+            for m in range(len(state)):
+                slopes[0, m] = slopes[len(pair.b), m]
+        return state, t, step, steps, seen, evaluations, outcome
+
+    return compile_kernel(march)
 
 
-march = compile_kernel(march)
+MARCHES = {chart: _march(form.field, form.ended) for chart, form in FORMULATIONS.items()}
 
 
-def first_step(par: Any, state: tuple[float, ...], end: float, tolerance: float) -> float:
+def first_step(field: Any, par: Any, state: tuple[float, ...], end: float, tolerance: float) -> float:
     """SciPy's initial step: 1 % of |y|/|f|, then from the size of the second derivative; two evaluations of f."""
-    slope = field_angles(par, state)
+    slope = field(par, state)
     d0, d1 = _rms(state, state, state, tolerance), _rms(slope, state, state, tolerance)
     trial = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, end)
-    moved = field_angles(par, tuple(y + trial * f for y, f in zip(state, slope, strict=True)))
+    moved = field(par, tuple(y + trial * f for y, f in zip(state, slope, strict=True)))
     d2 = _rms(tuple(x - y for x, y in zip(moved, slope, strict=True)), state, state, tolerance) / trial
     guess = max(1e-6, 1e-3 * trial) if max(d1, d2) <= 1e-15 else (0.01 / max(d1, d2)) ** 0.2
     return float(min(100.0 * trial, guess, end))
 
 
-def solve(top: SymmetricTop, start: Angles, plan: Plan, pair: Embedded = DORMAND_PRINCE) -> Run:
-    """A solver of the registry."""
-    par, state = with_rates(top, start)
-    states, slopes = np.full((plan.times.size, len(state)), np.nan), np.empty((len(pair.error), len(state)))
-    slopes[0] = field_angles(par, state)
-    t, step = 0.0, first_step(par, state, plan.horizon, plan.tolerance)
-    steps, seen, evaluations, outcome = 0, 0, 2, OK
-    budget = plan.most(EVALUATIONS)
-    block = int(min(BLOCK, budget))
-    given = par, pair, plan.tolerance, plan.horizon, plan.times, block
-    while t < plan.horizon and outcome == OK:
-        state, t, step, steps, seen, effort, outcome = march(*given, state, slopes, t, step, steps, seen, states)
-        evaluations += effort
-        if outcome == OK and t < plan.horizon and evaluations > budget:
-            outcome = OUT_OF_BUDGET
-    reached = plan.horizon if outcome == OK else t
-    return as_run(top, plan.times, states, steps, evaluations, OUTCOMES[outcome], reached)
+def solver(chart: str, pair: Embedded = DORMAND_PRINCE) -> Solver:
+    """A solver of the registry in one chart."""
+    form, march = FORMULATIONS[chart], MARCHES[chart]
+
+    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        par, state = form.prepare(top, start)
+        states, slopes = np.full((plan.times.size, len(state)), np.nan), np.empty((len(pair.error), len(state)))
+        slopes[0] = form.field(par, state)
+        t, step = 0.0, first_step(form.field, par, state, plan.horizon, plan.tolerance)
+        steps, seen, evaluations, outcome = 0, 0, 2, OK
+        budget = plan.most(EVALUATIONS)
+        block = int(min(BLOCK, budget))
+        given = par, pair, plan.tolerance, plan.horizon, plan.times, block
+        while t < plan.horizon and outcome == OK:
+            state, t, step, steps, seen, effort, outcome = march(*given, state, slopes, t, step, steps, seen, states)
+            evaluations += effort
+            if outcome == OK and t < plan.horizon and evaluations > budget:
+                outcome = OUT_OF_BUDGET
+        reached = plan.horizon if outcome == OK else t
+        return as_run(form, par, plan.times, states, steps, evaluations, outcome, reached)
+
+    return solve
 
 
 def built_in() -> list[Integrator]:
@@ -182,13 +181,15 @@ def built_in() -> list[Integrator]:
         Integrator(
             name="rk45-compiled",
             family="runge-kutta",
-            summary="Dormand-Prince with SciPy's step control on the unreduced equations, compiled",
-            solvers={"angles": solve},
-            control="tolerance", order=5,
-            explicit=True, symplectic=False,
+            summary="Dormand-Prince with SciPy's step control, compiled",
+            solvers={chart: solver(chart) for chart in FORMULATIONS},
+            control="tolerance",
+            order=5,
+            explicit=True,
+            symplectic=False,
             symmetric=False,
             conserves=frozenset(),
             least_tolerance=LEAST_TOLERANCE,
             reference="dormand-prince-1980",
         )
-    ]  # fmt: skip
+    ]

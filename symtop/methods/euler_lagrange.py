@@ -1,4 +1,4 @@
-"""The unreduced chart for kernels and libraries: state (theta, phi, psi, theta', phi', psi'), nothing eliminated.
+"""The unreduced angles for kernels and libraries: state (theta, phi, psi, theta', phi', psi'), nothing eliminated.
 
 The Euler-Lagrange equations, solved for the accelerations:
 
@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from symtop.methods.angles import BareTop, require_chart
+from symtop.methods.angles import BareTop, chart_outcome, require_chart
 from symtop.methods.compiled import register_jitable
-from symtop.methods.plan import Run
-from symtop.methods.registry import Array
+from symtop.methods.plan import Array
 from symtop.model.top import Angles, SymmetricTop
 
 LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws the line
@@ -64,14 +63,21 @@ def observe_angles(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> A
     return momenta(par, before[0] + dstate[0], before[4] + dstate[4], before[5] + dstate[5])
 
 
+@register_jitable
+def ended_angles(y: Any) -> int:
+    """Is the state finite and theta a point of the chart?"""
+    # zero, or NaN where any of them is not finite: one question about theta then answers for all six, without a branch
+    nothing = 0.0 * (y[1] + y[2] + y[3] + y[4] + y[5])
+    outcome: int = chart_outcome(y[0] + nothing)
+    return outcome
+
+
+def sampled_momenta(par: Any, states: Array) -> tuple[Array, Array]:
+    """p_phi and p_psi of states, shape (samples, 6)."""
+    p_phi, p_psi = momenta(par, states[:, 0], states[:, 4], states[:, 5])
+    return p_phi, p_psi
+
+
 def to_angles(par: Any, times: Array, states: Array) -> Array:
     """Unreduced states, shape (samples, 6), as (theta, p_theta, phi, psi), the angles chart of `simulate`."""
     return np.stack([states[:, 0], par.I1 * states[:, 3], states[:, 1], states[:, 2]], axis=-1)
-
-
-def as_run(
-    top: SymmetricTop, times: Array, states: Array, steps: int, evaluations: int, outcome: str, reached: float
-) -> Run:
-    """Samples of the unreduced state, shape (samples, 6), with p_theta and both momenta recomputed from the rates."""
-    p_phi, p_psi = momenta(top, states[:, 0], states[:, 4], states[:, 5])
-    return Run(to_angles(top, times, states), p_phi, p_psi, steps, evaluations, 0, outcome, reached)

@@ -2,14 +2,15 @@
 
     k_i = f(y + h sum_{j<i} a_ij k_j),    i = 1 .. s,        y+ = y + h sum_i b_i k_i
 
-One kernel, two charts: the unreduced angles (theta, phi, psi, theta', phi', psi'), where energy and both momenta are
-free to drift, and the space frame (e, L), where f is quadratic and has no pole. The top's equations are autonomous, so
-that c = sum_j a_ij serves only to check what a user gives.
+One kernel, three charts (`formulations`): the unreduced angles (theta, phi, psi, theta', phi', psi'), and the space
+frame, (e, L), where f is quadratic, or (q, L), which shows the spin angle as well; it has no pole. Energy and both
+momenta are free to drift in each. The top's equations are autonomous, so that c = sum_j a_ij serves only to check what
+a user gives.
 
 `rk4` is Kutta's classical method: order 4, four evaluations of f a step. No explicit Runge-Kutta method is symplectic
-or symmetric: the errors of energy and of every constant that is not linear in the state grow linearly with time.
-L_z = p_phi is linear in (e, L) and stays; in angles nothing does. Not to be confused with `rk45`, which chooses its
-steps, nor with Gauss methods, which are implicit and keep what rk4 loses.
+or symmetric: the errors of energy and of every constant that is not linear in the state grow linearly with time. L_z =
+p_phi is linear in (e, L) and in (q, L) and stays; in angles nothing does. Not to be confused with `rk45`, which chooses
+its steps, nor with Gauss methods, which are implicit and keep what rk4 loses.
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.1.
 """
 
@@ -20,13 +21,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.base.validate import SymtopError, row
-from symtop.methods.angles import chart_outcome
 from symtop.methods.compiled import register_jitable, set_item
-from symtop.methods.euler_lagrange import field_angles, observe_angles, to_angles, with_rates
 from symtop.methods.fixed_step import FixedStep
-from symtop.methods.loop import driver
+from symtop.methods.formulations import FORMULATIONS
+from symtop.methods.loop import Loop, driver
 from symtop.methods.registry import Integrator
-from symtop.methods.space import field_axis, finite_outcome, observe_axis, on_axis
 
 TABLE_ROUNDING = 1e-12  # sums of a tableau may be off by this: coefficients come with 15 digits or more
 
@@ -51,6 +50,15 @@ def _add(place: Any, slopes: Any, i: int, weight: float) -> Any:
     for m in range(len(place)):
         place = set_item(place, m, place[m] + weight * slopes[i, m])
     return place
+
+
+@register_jitable
+def plus(state: Any, step: Any) -> Any:
+    """state + step, component by component."""
+    total = state
+    for m in range(len(state)):
+        total = set_item(total, m, state[m] + step[m])
+    return total
 
 
 @register_jitable
@@ -89,22 +97,17 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return np.empty((len(rule.b), len(state)))
 
 
-def increment_angles(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (theta, phi, psi, theta', phi', psi'); the work counted is the number of force evaluations."""
-    step = explicit_step(field_angles, par, rule, state, carry, h)
-    # zero, or NaN where any of them is not finite: one question about theta then answers for all six, without a branch
-    nothing = 0.0 * (step[1] + step[2] + step[3] + step[4] + step[5])
-    return step, carry, len(rule.b), chart_outcome(state[0] + step[0] + nothing)
+def _loop(field: Any, ended: Any, observe: Any) -> Loop:
+    """The loop on states that move by `field`; the work counted is the number of force evaluations."""
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        step = explicit_step(field, par, rule, state, carry, h)
+        return step, carry, len(rule.b), ended(plus(state, step))
+
+    return driver(begin, increment, observe)
 
 
-def increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (e, L); the work counted is the number of force evaluations."""
-    step = explicit_step(field_axis, par, rule, state, carry, h)
-    return step, carry, len(rule.b), finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5])
-
-
-march_angles = driver(begin, increment_angles, observe_angles)
-march_axis = driver(begin, increment_axis, observe_axis)
+LOOPS = {chart: _loop(form.field, form.ended, form.observe) for chart, form in FORMULATIONS.items()}
 
 
 def _explicit(a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[list[list[float]], list[float]]:
@@ -150,8 +153,8 @@ def runge_kutta(
         family="runge-kutta",
         summary=summary or f"explicit Runge-Kutta method with {len(weights)} stages",
         solvers={
-            "angles": FixedStep(march_angles, rule, with_rates, 1, implicit=False, present=to_angles),
-            "axis": FixedStep(march_axis, rule, on_axis, 1, implicit=False),
+            chart: FixedStep(LOOPS[chart], rule, form.prepare, 1, implicit=False, present=form.present)
+            for chart, form in FORMULATIONS.items()
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
         reference=reference,

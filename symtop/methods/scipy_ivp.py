@@ -1,7 +1,8 @@
-"""SciPy's solvers on the full Euler-Lagrange equations, as a user of SciPy would call them.
+"""SciPy's solvers on the top's equations in any chart, as a user of SciPy would call them.
 
-Six variables, nothing reduced (see `euler_lagrange`), so that every conserved quantity is free to drift; the tolerance
-is used for both rtol and atol; no Jacobian is given. None of the four is symplectic or symmetric, nothing is conserved.
+Nothing is reduced (see `formulations`), so that every conserved quantity is free to drift; the tolerance is used for
+both rtol and atol; no Jacobian is given. None of the four is symplectic or symmetric, and nothing is conserved but
+p_phi in the space frame, where it is a component of the state.
 
     rk45     Dormand-Prince 5(4), explicit, order 5               Dormand and Prince, JCAM 6 (1980) 19
     dop853   Dormand-Prince 8(5,3), explicit, order 8             Hairer, Norsett, Wanner, Solving ODEs I, II.5
@@ -10,66 +11,104 @@ is used for both rtol and atol; no Jacobian is given. None of the four is symple
 
 Radau and LSODA are made for stiff equations, which the top's are not: they are here because people use them. Every
 call of the right-hand side is counted, also those of difference quotients for a Jacobian, which SciPy's own `nfev` of
-Radau leaves out. The right-hand side is plain Python on floats, three times faster than the same on NumPy scalars.
+Radau leaves out.
+
+The language of the right-hand side is a factor of its own. In the registry it is plain Python on floats, three times
+faster than the same on NumPy scalars; `scipy_method(name, compiled=True)` is the same solver around a right-hand side
+that numba has compiled, from the same source. The loop around it is SciPy's and is Python in both (LSODA's is Fortran).
 """
 
-import math
+import functools
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from symtop.base.validate import SymtopError
-from symtop.methods.euler_lagrange import LEAST_TOLERANCE, accelerations, as_run, with_rates
-from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Array, Integrator, Solver
+from symtop.base.validate import SymtopError, one_of
+from symtop.methods.angles import BareTop
+from symtop.methods.compiled import compile_kernel
+from symtop.methods.euler_lagrange import LEAST_TOLERANCE
+from symtop.methods.formulations import FORMULATIONS, as_run
+from symtop.methods.outcomes import NOT_FINITE, OK, OUT_OF_BUDGET, STEP_TOO_SMALL
+from symtop.methods.plan import Array, Plan, Run
+from symtop.methods.registry import Integrator, Solver
+from symtop.methods.space import SpaceTop
 from symtop.model.top import Angles, SymmetricTop
 
 EVALUATIONS = 20_000_000  # a run's limit: about two minutes
 
 
-class EulerLagrange:
-    """Right-hand side of y' = f(t, y) with y = (theta, phi, psi, theta', phi', psi'), and how often it was called."""
+class RightHandSide:
+    """y' = f(t, y) of a chart in plain Python on floats, and how often it was called."""
 
-    __slots__ = ("calls", "numbers")
+    __slots__ = ("calls", "field", "par")
 
-    def __init__(self, top: SymmetricTop) -> None:
-        self.numbers = (top.I1, top.I3, top.mgl)
+    def __init__(self, field: Callable[[Any, Any], Any], par: Any) -> None:
+        self.field, self.par = field, par
         self.calls = 0
 
-    def __call__(self, _: float, y: Any) -> tuple[float, ...]:
+    def __call__(self, _: float, y: Any) -> Any:
         """y' at any time."""
         self.calls += 1
-        theta, _, _, theta_dot, phi_dot, psi_dot = y.tolist()
-        return (theta_dot, phi_dot, psi_dot, *accelerations(*self.numbers, theta, theta_dot, phi_dot, psi_dot))
+        return self.field(self.par, y.tolist())
 
 
-def solver(method: str) -> Solver:
-    """A solver of the registry around one method of ``scipy.integrate``.
+class CompiledRightHandSide(RightHandSide):
+    """The same with the `compiled_field` of a chart, which returns an array."""
+
+    __slots__ = ("compiled",)
+
+    def __init__(self, chart: str, par: Any) -> None:
+        super().__init__(FORMULATIONS[chart].field, par)
+        self.compiled = compiled_field(chart)
+
+    def __call__(self, _: float, y: Any) -> Any:
+        """y' at any time."""
+        self.calls += 1
+        return self.compiled(*self.par, y)
+
+
+@functools.cache
+def compiled_field(chart: str) -> Any:
+    """f(a, b, c, y) -> y' of a chart, compiled; a, b, c are the three parameters of its equations."""
+    field, parameters = FORMULATIONS[chart].field, PARAMETERS[chart]
+
+    def compiled(a, b, c, y):  # type: ignore[no-untyped-def]
+        return np.array(field(parameters(a, b, c), y))
+
+    return compile_kernel(compiled)
+
+
+PARAMETERS: dict[str, type] = {"angles": BareTop, "axis": SpaceTop, "attitude": SpaceTop}
+
+
+def solver(method: str, chart: str, *, compiled: bool = False) -> Solver:
+    """A solver of the registry around one method of ``scipy.integrate``; `compiled` is the right-hand side.
 
     This is the loop of ``solve_ivp`` with ``t_eval``, to the same bits, kept open so that a run that fails
     returns what it had and a run that would never end is stopped.
     """
+    form = FORMULATIONS[chart]
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         from scipy import integrate  # 0.6 s to import
 
-        _, y0 = with_rates(top, start)
-        rhs = EulerLagrange(top)
+        par, y0 = form.prepare(top, start)
+        rhs = CompiledRightHandSide(chart, par) if compiled else RightHandSide(form.field, par)
         states = np.full((plan.times.size, len(y0)), np.nan)
         steps = seen = 0
-        outcome = "ok"
+        outcome = OK
         with np.errstate(all="ignore"), warnings.catch_warnings():
             # LSODA's failures, which are in its status as well. Nothing else is silenced: filters belong to all threads
             warnings.filterwarnings("ignore", "lsoda: ", UserWarning)
             make: Callable[..., Any] = getattr(integrate, method)
             stepper = make(rhs, 0.0, y0, plan.horizon, rtol=plan.tolerance, atol=plan.tolerance)
-            while stepper.status == "running" and outcome == "ok":
+            while stepper.status == "running" and outcome == OK:
                 try:
                     stepper.step()
                     if stepper.status == "failed":
-                        outcome = "step_too_small" if np.isfinite(stepper.y).all() else "not_finite"
+                        outcome = STEP_TOO_SMALL if np.isfinite(stepper.y).all() else NOT_FINITE
                         break
                     steps += 1
                     now = int(np.searchsorted(plan.times, stepper.t, side="right"))
@@ -77,11 +116,13 @@ def solver(method: str) -> Solver:
                         states[seen:now] = stepper.dense_output()(plan.times[seen:now]).T  # DOP853 evaluates f here too
                         seen = now
                 except (OverflowError, ZeroDivisionError, ValueError):  # sin of infinity, or no finite Jacobian
-                    outcome = "not_finite"
+                    outcome = NOT_FINITE
                     break
-                outcome = _judge(stepper, rhs.calls, plan.most(EVALUATIONS))
-        reached = plan.horizon if outcome == "ok" else float(stepper.t)
-        return as_run(top, plan.times, states, steps, rhs.calls, outcome, reached)
+                outcome = form.ended(stepper.y.tolist())
+                if outcome == OK and rhs.calls > plan.most(EVALUATIONS) and stepper.status == "running":
+                    outcome = OUT_OF_BUDGET
+        reached = plan.horizon if outcome == OK else float(stepper.t)
+        return as_run(form, par, plan.times, states, steps, rhs.calls, outcome, reached)
 
     return solve
 
@@ -101,33 +142,38 @@ def integrated(rates: Callable[..., Any], start: Sequence[float], times: Array, 
     return states
 
 
-def _judge(stepper: Any, calls: int, budget: float) -> str:
-    if not np.isfinite(stepper.y).all():
-        return "not_finite"
-    if not 0.0 < stepper.y[0] < math.pi:
-        return "left_chart"
-    return "out_of_budget" if calls > budget and stepper.status == "running" else "ok"
+_METHODS = {  # summary, order, reference, explicit
+    "RK45": ("Dormand-Prince 5(4)", 5, "dormand-prince-1980", True),
+    "DOP853": ("Dormand-Prince 8(5,3)", 8, "prince-dormand-1981 hairer-norsett-wanner-1993", True),
+    "LSODA": ("Adams or BDF of variable order", None, "petzold-1983 hindmarsh-1983", False),
+    "Radau": ("implicit Radau IIA", 5, "hairer-wanner-1996", False),
+}
 
 
-def _entry(method: str, summary: str, order: int | None, reference: str, *, explicit: bool) -> Integrator:
+def scipy_method(name: str, *, compiled: bool = False) -> Integrator:
+    """One of SciPy's methods, "RK45", "DOP853", "LSODA" or "Radau", in every chart; `compiled` is the right-hand side.
+
+    With a compiled one the name ends in "-numba", and it is not in the registry. Raises SymtopError for another name.
+    """
+    summary, order, reference, explicit = _METHODS[one_of("name", name, _METHODS)]
     return Integrator(
-        name=method.lower(),
+        name=f"{name.lower()}-numba" if compiled else name.lower(),
         family="library",
-        summary=f"SciPy's {method} ({summary}) on the unreduced Euler-Lagrange equations",
-        solvers={"angles": solver(method)},
-        control="tolerance", implementation="python", order=order, explicit=explicit, symplectic=False,
-        symmetric=False, conserves=frozenset(),
+        summary=f"SciPy's {name} ({summary}), the right-hand side in {'numba' if compiled else 'Python'}",
+        solvers={chart: solver(name, chart, compiled=compiled) for chart in FORMULATIONS},
+        control="tolerance",
+        implementation="python",
+        order=order,
+        explicit=explicit,
+        symplectic=False,
+        symmetric=False,
+        conserves=frozenset(),
         least_tolerance=LEAST_TOLERANCE,
         reference=reference,
-        same_steps_as="rk45-compiled" if method == "RK45" else None,
-    )  # fmt: skip
+        same_steps_as="rk45-compiled" if name == "RK45" else None,
+    )
 
 
 def built_in() -> list[Integrator]:
     """SciPy's methods under the names of this registry."""
-    return [
-        _entry("RK45", "Dormand-Prince 5(4)", 5, "dormand-prince-1980", explicit=True),
-        _entry("DOP853", "Dormand-Prince 8(5,3)", 8, "prince-dormand-1981 hairer-norsett-wanner-1993", explicit=True),
-        _entry("LSODA", "Adams or BDF of variable order", None, "petzold-1983 hindmarsh-1983", explicit=False),
-        _entry("Radau", "implicit Radau IIA", 5, "hairer-wanner-1996", explicit=False),
-    ]
+    return [scipy_method(name) for name in _METHODS]

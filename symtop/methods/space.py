@@ -73,6 +73,34 @@ def field_frame(par: Any, y: Any) -> Any:
 
 
 @register_jitable
+def field_attitude(par: Any, y: Any) -> Any:
+    """Time derivative of (q, L); |q| stays one only as far as a method keeps it."""
+    half, turn = 0.5 / par.I1, 0.5 * par.twist
+    w, x, y1, z = y[0], y[1], y[2], y[3]
+    px, py, pz = half * y[4], half * y[5], half * y[6]
+    right, back = 2.0 * (x * z + w * y1), 2.0 * (y1 * z - w * x)  # the axis, e_x and e_y
+    return (
+        -(px * x + py * y1 + pz * z) - turn * z,
+        px * w + py * z - pz * y1 + turn * y1,
+        py * w + pz * x - px * z - turn * x,
+        pz * w + px * y1 - py * x + turn * w,
+        -par.mgl * back,
+        par.mgl * right,
+        0.0,
+    )
+
+
+@register_jitable
+def ended_space(y: Any) -> int:
+    """Is the state finite? There is no pole to leave the chart at."""
+    total = 0.0
+    for value in y:
+        total += value
+    outcome: int = finite_outcome(total)
+    return outcome
+
+
+@register_jitable
 def finite_outcome(value: float) -> int:
     """Is a number that every component feeds into still finite?"""
     return OK if np.isfinite(value) else NOT_FINITE

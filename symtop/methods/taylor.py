@@ -2,6 +2,7 @@
 
     axis:      e' = L x e / I1,  L' = mgl k x e                      six variables, every term quadratic
     attitude:  q' = (L q / I1 + (1/I3 - 1/I1) p_psi q k)/2,  L' as above with e = q k q*    seven variables
+    angles:    the Euler-Lagrange equations, with poles (see `euler_lagrange`)               six variables
 
 All constants, |e| = 1, L.e = p_psi, L_z = p_phi and the energy, are linear or quadratic in (e, L). The axis chart is
 three times cheaper than the attitude chart and is used whenever nobody asks for the spin angle. The order follows
@@ -10,10 +11,13 @@ hundredth of the rounding unit removes the truncation bias that makes energy dri
 `taylor` works in double, `taylor-longdouble` and `taylor-quad` with mantissas of 64 and 113 bits: they show what the
 method does without rounding, and `symtop.reference` is made by the same function. A Taylor step of order n computes n
 derivatives of the state; `force_evaluations` counts them.
+The registry has the two charts without poles. In angles the method would be the first choice for whoever observes the
+nutation or the attitude, and it is neither the fastest there nor safe: the study of charts makes a record for itself.
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
 """
 
 import functools
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,9 +36,18 @@ MOST_STEPS = {"double": 30_000_000, "longdouble": 5_000_000, "quad": 100_000}  #
 
 
 def equations(chart: str) -> list[Any]:
-    """heyoka's system of a chart; par[0] = 1/I1, par[1] = mgl, par[2] = p_psi (1/I3 - 1/I1)."""
+    """heyoka's system of a chart; par[0] = 1/I1, par[1] = mgl, par[2] = p_psi (1/I3 - 1/I1), or I3 in angles."""
     import heyoka as hy  # Linux only
 
+    if chart == "angles":
+        theta, phi, psi, *rates = hy.make_vars("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
+        theta_dot, phi_dot, psi_dot = rates
+        s, c, ratio = hy.sin(theta), hy.cos(theta), hy.par[0] * hy.par[2]
+        spin = ratio * (psi_dot + phi_dot * c)
+        theta_ddot = s * (phi_dot * (phi_dot * c - spin) + hy.par[0] * hy.par[1])
+        phi_ddot = theta_dot * (spin - 2.0 * phi_dot * c) / s
+        turns = [theta_ddot, phi_ddot, theta_dot * phi_dot * s - phi_ddot * c]
+        return [*zip((theta, phi, psi), rates, strict=True), *zip(rates, turns, strict=True)]
     Lx, Ly, Lz = momentum = hy.make_vars("Lx", "Ly", "Lz")
     inverse, mgl, twist = hy.par[0], hy.par[1], hy.par[2]
     if chart == "axis":
@@ -50,6 +63,9 @@ def equations(chart: str) -> list[Any]:
             0.5 * (inverse * (Lz * q0 + Lx * q2 - Ly * q1) + twist * q0),
         ]
     return [*zip(axis, motion, strict=True), *zip(momentum, [-mgl * y, mgl * x, 0.0 * x], strict=True)]
+
+
+Read = Callable[[SymmetricTop, Array, Array], tuple[Array, Array, Array]]  # (top, times, states)
 
 
 class Arithmetic(NamedTuple):
@@ -95,13 +111,18 @@ def start_numbers(chart: str, precision: str, top: SymmetricTop, at: Angles) -> 
     """
     kind, mp = arithmetic(precision).kind, context(START_DIGITS)
     theta, phi, psi, *rates = (mp.mpf(getattr(at, name)) for name in at.__slots__)
+    if chart == "angles":
+        numbers = 1 / mp.mpf(top.I1), mp.mpf(top.mgl), mp.mpf(top.I3)
+        return _rounded(kind, mp, (theta, phi, psi, *rates)), _rounded(kind, mp, numbers)
     place = charts.axis_parts(mp, theta, phi) if chart == "axis" else charts.quaternion_parts(mp, theta, phi, psi)
     state = [*place, *charts.momentum_parts(mp, top, theta, phi, *rates)]
     spin = top.I3 * (rates[2] + rates[1] * mp.cos(theta))
     twist = spin * (1 / mp.mpf(top.I3) - 1 / mp.mpf(top.I1))
-    parameters = [1 / mp.mpf(top.I1), mp.mpf(top.mgl), twist]
-    state_numbers, numbers = (tuple(kind(mp.nstr(value, 50)) for value in row) for row in (state, parameters))
-    return state_numbers, numbers
+    return _rounded(kind, mp, state), _rounded(kind, mp, (1 / mp.mpf(top.I1), mp.mpf(top.mgl), twist))
+
+
+def _rounded(kind: Any, mp: Any, values: Iterable[Any]) -> tuple[Any, ...]:
+    return tuple(kind(mp.nstr(value, 50)) for value in values)
 
 
 class Flight(NamedTuple):
@@ -137,15 +158,21 @@ def propagate(
     return Flight(states[grid.size - times.size :], int(steps), order, outcome.name)
 
 
-def solver(chart: str, precision: str) -> Solver:
-    """A solver of the registry in one chart and one arithmetic; samples are rounded to double."""
+def solver(chart: str, precision: str, read: Read | None = None) -> Solver:
+    """A solver of the registry in one chart and one arithmetic; samples are rounded to double.
+
+    In angles, `read` makes states of the chart and both momenta of the states that were integrated.
+    """
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         most = max(1, int(plan.most(MOST_STEPS[precision])))
         flight = propagate(chart, precision, plan.tolerance, top, start, plan.times, most)
         count, size = len(flight.states), plan.times.size
         states = _padded(flight.states, size)
-        p_phi, p_psi = (_padded(values, size) for values in space_momenta(chart, flight.states))
+        if read is None:
+            p_phi, p_psi = (_padded(values, size) for values in space_momenta(chart, flight.states))
+        else:
+            states, p_phi, p_psi = read(top, plan.times, states)
         good: Any = np.isfinite(states).all(axis=1)
         word = "ok" if good.all() and "time_limit" in flight.outcome else "not_finite"
         if "step_limit" in flight.outcome and good[:count].all():

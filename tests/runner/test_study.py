@@ -146,6 +146,7 @@ STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "
         ("methods/scipy_ivp.py", SCIPY),
         ("methods/dormand_prince.py", {"rk45-compiled"}),
         ("methods/runge_kutta.py", {"rk4", "rk45-compiled"}),
+        ("methods/formulations.py", {"rk4", "rk45-compiled"} | SCIPY),
         ("methods/euler_lagrange.py", {"rk4", "rk45-compiled"} | SCIPY),
         ("methods/exact.py", {"exact"}),
         ("methods/splitting_loop.py", SPLITTING),

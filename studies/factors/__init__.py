@@ -1,0 +1,1 @@
+"""What makes the difference: method, formulation, language or call?"""

@@ -1,0 +1,136 @@
+"""The cells of the factorial: a method, the chart of its equations, the language that runs it, the call around it.
+
+    method        a scheme: the same coefficients in every chart and language
+    chart         angles, axis, attitude                                        see `symtop.methods.formulations`
+    language      compiled        the whole loop, by numba or heyoka
+                  scipy-numba     SciPy's loop in Python, the right-hand side compiled
+                  scipy-python    SciPy's loop, the right-hand side in Python on floats
+                  numpy           a loop in Python over NumPy arrays            see `plain_numpy`
+    call          kernel          the bare solver, two samples
+                  simulate        `symtop.simulate` as it stands: 501 samples, its guard, a dataset
+                  solve_ivp       `scipy.integrate.solve_ivp` with the same 501 samples
+
+A splitting has another split in angles (kinetic energy of theta and effective potential) than in the space frame (free
+top and gravity), with the same coefficients. The implicit midpoint rule is `midpoint` in angles and `gauss-2` on
+(e, L). Everything else solves the same equations of its chart.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from symtop.methods import taylor
+from symtop.methods.formulations import FORMULATIONS
+from symtop.methods.plan import Array
+from symtop.methods.registry import Integrator, integrators
+from symtop.methods.scipy_ivp import RightHandSide, scipy_method
+from symtop.model.scenes import Scene
+from symtop.model.top import SymmetricTop
+from symtop.run.simulation import make_plan, simulate
+
+from . import plain_numpy
+
+COMPILED, SCIPY_NUMBA, SCIPY_PYTHON, NUMPY = LANGUAGES = ("compiled", "scipy-numba", "scipy-python", "numpy")
+KERNEL, SIMULATE, SOLVE_IVP = CALLS = ("kernel", "simulate", "solve_ivp")
+SAMPLES = 501  # of a public call, the default of `simulate`
+
+DORMAND_PRINCE = "Dormand-Prince 5(4)"
+SCIPYS = {DORMAND_PRINCE: "RK45", "DOP853": "DOP853"}  # SciPy's names
+# methods by scheme, the charts they are taken in; a method without charts is taken in all it has
+COMPILED_SCHEMES: dict[str, dict[str, tuple[str, ...]]] = {
+    DORMAND_PRINCE: {"rk45-compiled": ()},
+    "rk4": {"rk4": ()},
+    "Strang": {"stormer-verlet": (), "strang": ()},
+    "Takahashi-Imada": {"takahashi-imada": ()},
+    "Blanes-Moan 11-6": {"stormer-verlet-blanes-moan-6": (), "srkn-11-6": ()},
+    "Blanes-Moan 14-6": {"srkn-14-6": ()},
+    "implicit midpoint": {"midpoint": (), "gauss-2": ()},
+    "Gauss 6": {"gauss-6": ()},
+    "Taylor": {"taylor": ()},
+}
+FAMILIES = {
+    "splitting": ("Strang", "Takahashi-Imada", "Blanes-Moan 11-6", "Blanes-Moan 14-6"),
+    "Gauss": ("implicit midpoint", "Gauss 6"),
+    "rk4": ("rk4",),
+    "Dormand-Prince": (DORMAND_PRINCE,),
+    "Taylor": ("Taylor",),
+}
+QUICK = (DORMAND_PRINCE, "rk4", "Takahashi-Imada", "Taylor")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A method in one chart and one language."""
+
+    scheme: str
+    chart: str
+    language: str
+    method: Integrator = field(compare=False)  # a row: it has this chart alone
+
+    @property
+    def name(self) -> str:
+        """The name of the row."""
+        return self.method.name
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """The three factors."""
+        return self.scheme, self.chart, self.language
+
+
+def cells(schemes: Sequence[str] | None = None) -> list[Cell]:
+    """The cells of some schemes, or of all; those of one scheme and chart begin with the cheapest language."""
+    known, grid = integrators(), list[Cell]()
+    for scheme, methods in COMPILED_SCHEMES.items():
+        for name in methods:
+            grid += [Cell(scheme, chart, COMPILED, known[name].row(chart)) for chart in known[name].charts()]
+    if "axis" in known["taylor"].solvers:  # heyoka is there
+        grid.append(Cell("Taylor", "angles", COMPILED, taylor_in_angles()))
+    for scheme, name in SCIPYS.items():
+        for chart in FORMULATIONS:
+            if scheme == DORMAND_PRINCE:
+                grid.append(Cell(scheme, chart, SCIPY_NUMBA, scipy_method(name, compiled=True).row(chart)))
+            grid.append(Cell(scheme, chart, SCIPY_PYTHON, known[name.lower()].row(chart)))
+    for scheme, method in (("rk4", plain_numpy.RK4), ("Strang", plain_numpy.STRANG)):
+        grid += [Cell(scheme, chart, NUMPY, method.row(chart)) for chart in method.charts()]
+    return [cell for cell in grid if schemes is None or cell.scheme in schemes]
+
+
+def taylor_in_angles() -> Integrator:
+    """The row ``taylor[angles]``: heyoka on the Euler-Lagrange equations, from the same formulas as the others."""
+
+    def read(top: SymmetricTop, times: Array, states: Array) -> tuple[Array, Array, Array]:
+        form = FORMULATIONS["angles"]
+        return form.present(top, times, states), *form.momenta(top, states)
+
+    method, solvers = integrators()["taylor"], {"angles": taylor.solver("angles", "double", read)}
+    return replace(method, name="taylor[angles]", solvers=solvers)
+
+
+def caller(scene: Scene, cell: Cell, call: str, setting: float, horizon: float) -> Callable[[], object] | None:
+    """A function of no arguments that makes one run; None for a call that the method does not have."""
+    method, control = cell.method, cell.method.setting(setting).kwargs()
+    if call == SIMULATE:
+        return lambda: simulate(scene, method, horizon=horizon, samples=SAMPLES, **control)
+    if call == KERNEL:
+        plan, _ = make_plan(scene, method, **control, horizon=horizon, samples=2)
+        solve = method.solvers[cell.chart]
+        return lambda: solve(scene.top, scene.start, plan)
+    if cell.language != SCIPY_PYTHON:
+        return None
+    return _solve_ivp(scene, cell, setting, horizon)
+
+
+def _solve_ivp(scene: Scene, cell: Cell, tolerance: float, horizon: float) -> Callable[[], object]:
+    """What a user of SciPy writes: parameters and start at hand, one call."""
+    import numpy as np
+    from scipy.integrate import solve_ivp
+
+    form = FORMULATIONS[cell.chart]
+    par, start = form.prepare(scene.top, scene.start)
+    times = np.linspace(0.0, horizon, SAMPLES)
+
+    def run() -> object:
+        rhs = RightHandSide(form.field, par)
+        return solve_ivp(rhs, (0.0, horizon), start, SCIPYS[cell.scheme], t_eval=times, rtol=tolerance, atol=tolerance)
+
+    return run

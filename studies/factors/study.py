@@ -1,0 +1,68 @@
+"""What makes the difference: method, formulation, language or call?
+
+A factorial of the four at equal accuracy: the same error of the axis, over the same horizon, on the same scenes. Every
+time is measured, in interleaved rounds. A factor's effect is the ratio of two times that differ in it alone.
+"""
+
+import math
+
+import xarray as xr
+
+from symtop.methods.registry import integrators
+from symtop.model.scenes import scene
+from symtop.runner.grid import grid_scenes
+from symtop.runner.study import Case, Study
+
+from . import figures, words
+from .cells import CALLS, COMPILED, KERNEL, LANGUAGES, QUICK
+from .tables import Goal, factorial
+
+LEFT_OUT = {
+    "two ordinary tops show what the others would repeat": (
+        "goldstein-falling", "goldstein-rising", "cusp", "loop", "wave", "fast", "steady", "hairer-lubich-wanner",
+        "simo-wong", "kinon-betsch", "sleeping", "sleeping-unstable", "steady-fast", "separatrix",
+    ),
+    "it passes too close to a pole for the angles chart": ("bruls-cardona-arnold", "grazing"),
+}  # fmt: skip
+NOT_QUICK = {"left to the ordinary grid": ("goldstein",)}
+GOALS = (
+    (10.0, 1e-6, LANGUAGES, CALLS),
+    (10.0, 1e-9, LANGUAGES, CALLS),
+    (1000.0, 1e-6, (COMPILED,), (KERNEL,)),  # long enough that a call's own time does not count
+)
+ROUNDS = 2  # of all; short calls take part in more
+BATCH = (0.0015, 0.001)  # seconds, in full and quick
+
+
+def cases(quick: bool) -> list[Case]:
+    """One case a scene: what is compared is timed together."""
+    names = grid_scenes(LEFT_OUT | (NOT_QUICK if quick else {}), lambda one: math.isfinite(one.nutation_period))
+    settings = {
+        "schemes": list(QUICK) if quick else None,
+        "goals": [list(goal) for goal in (GOALS[:1] if quick else GOALS)],
+        "rounds": ROUNDS,
+        "batch": BATCH[quick],
+    }
+    return [Case(name, "together", settings) for name in names]
+
+
+def measure(case: Case) -> xr.Dataset:
+    """The factorial of one scene."""
+    plan = case.settings
+    goals = [Goal(float(span), float(target), tuple(rows), tuple(calls)) for span, target, rows, calls in plan["goals"]]
+    return factorial(scene(case.scene), plan["schemes"], goals, plan["rounds"], plan["batch"])
+
+
+STUDY = Study(
+    name="factors",
+    title="Factors",
+    question="What makes the difference: method, formulation, language or call?",
+    how_to_read=words.HOW_TO_READ,
+    cases=cases,
+    measure=measure,
+    pictures=figures.pictures,
+    tables=words.tables,
+    verdict=words.verdict,
+    timed=True,
+    uses=lambda _: list(integrators()),
+)

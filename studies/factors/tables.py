@@ -1,0 +1,300 @@
+"""Settings of equal accuracy, their times, and the comparisons that change one factor.
+
+Dimensions: integrator (rows such as ``rk45-numba[axis]``, see `cells`), horizon (nutation periods), target (of the axis
+error, rad), call, batch.
+"""
+
+import functools
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure import settings
+from symtop.measure.timing import NOISY, Timing, timings
+from symtop.methods.registry import SMALLEST_FIRST
+from symtop.model.scenes import Scene
+
+from .cells import (
+    CALLS,
+    COMPILED,
+    DORMAND_PRINCE,
+    KERNEL,
+    NUMPY,
+    SCIPY_NUMBA,
+    SCIPY_PYTHON,
+    SIMULATE,
+    SOLVE_IVP,
+    Cell,
+    caller,
+    cells,
+)  # fmt: skip
+
+LEAST = 0.7  # of the target: the search ends with an error from here to the target, if nine runs suffice
+PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
+FINER = 1e-3  # of the target: the tolerance that a second search begins with
+SHORT = 0.01  # seconds of a call
+FURTHER = 10
+TIE = 0.1  # times that differ by less are level
+FACTORS = ("method", "chart", "language", "call")
+
+
+class Column:
+    """Variables of the dataset."""
+
+    SETTING, AXIS, AXIS_BOUND, FORCES = "setting", "axis", "axis_bound", "force_evaluations"  # of one run
+    REASON = "reason"  # why a row has no setting; empty if it has
+    SECONDS, SPREAD, SAMPLES = "seconds", "spread", "seconds_samples"  # the least sample, (median - least)/least, all
+
+
+class Goal(NamedTuple):
+    """An accuracy over a horizon, and what takes part."""
+
+    nutations: float
+    target: float
+    languages: tuple[str, ...]
+    calls: tuple[str, ...]
+
+
+# ---- measuring -------------------------------------------------------------------------------------------------------
+
+
+def settle(scene: Scene, grid: Sequence[Cell], goal: Goal) -> dict[Cell, settings.Met | str]:
+    """A setting of every cell that meets the goal, or the reason why there is none.
+
+    One search for each scheme and chart, in its first language; the others take the same setting, and their error is
+    measured again.
+    """
+    horizon = goal.nutations * scene.nutation_period
+    leaders: dict[tuple[str, str], settings.Met | str] = {}
+    settled: dict[Cell, settings.Met | str] = {}
+    for cell in grid:
+        pair, patience = (cell.scheme, cell.chart), PATIENCE[cell.language]
+        leader = leaders.get(pair)
+        if leader is None:
+            plan = {"patience": patience, "least": LEAST}
+            met = settings.search(scene, cell.method, goal.target, "axis", horizon, **plan)
+            if met == settings.STOPPED:  # the error of an adaptive method need not fall with every finer tolerance
+                met = settings.search(scene, cell.method, goal.target, "axis", horizon, FINER * goal.target, **plan)
+            settled[cell] = leaders[pair] = met
+        elif isinstance(leader, str):
+            settled[cell] = leader
+        elif leader.evaluations > patience:
+            settled[cell] = settings.BUDGET
+        else:
+            settled[cell] = settings.attempt(scene, cell.method, leader.setting, horizon, "axis")
+    return settled
+
+
+def timed(
+    scene: Scene, chosen: dict[Cell, settings.Met], calls: Sequence[str], rounds: int, batch: float
+) -> dict[tuple[Cell, str], Timing]:
+    """Times of every cell in every call, in interleaved rounds.
+
+    Short calls take part in `FURTHER` times as many rounds again, because a busy moment of the machine can spoil all
+    their samples; of the long ones those that are noisy take part in as many rounds again.
+    """
+    functions = {
+        (cell, call): function
+        for cell, met in chosen.items()
+        for call in calls
+        if (function := caller(scene, cell, call, met.setting, met.horizon)) is not None
+    }
+    taken = dict(zip(functions, timings(list(functions.values()), rounds, batch), strict=True))
+    short = [key for key, timing in taken.items() if timing.best < SHORT]
+    noisy = [key for key, timing in taken.items() if timing.best >= SHORT and timing.spread > NOISY]
+    for again, times_more in ((short, FURTHER), (noisy, 1)):
+        more = timings([functions[key] for key in again], times_more * rounds, batch, seed=times_more)
+        for key, timing in zip(again, more, strict=True):
+            taken[key] = Timing(taken[key].samples + timing.samples, taken[key].first_call)
+    return taken
+
+
+def factorial(scene: Scene, schemes: Sequence[str] | None, goals: Sequence[Goal], rounds: int, batch: float) -> Any:
+    """The factorial of one scene: settings, errors and times of all cells for all goals."""
+    grid = cells(schemes)
+    horizons, targets = sorted({goal.nutations for goal in goals}), sorted({goal.target for goal in goals})[::-1]
+    shape = len(grid), len(horizons), len(targets)
+    names = Column.SETTING, Column.AXIS, Column.AXIS_BOUND, Column.FORCES
+    numbers = {name: np.full(shape, math.nan) for name in names}
+    reasons = np.full(shape, "", dtype=object)
+    samples = np.full((*shape, len(CALLS), (1 + FURTHER) * rounds), math.nan)
+    for goal in goals:
+        part = [cell for cell in grid if cell.language in goal.languages]
+        settled = settle(scene, part, goal)
+        good = {cell: met for cell, met in settled.items() if not isinstance(met, str)}
+        at = horizons.index(goal.nutations), targets.index(goal.target)
+        for cell, met in settled.items():
+            if isinstance(met, str):
+                reasons[(grid.index(cell), *at)] = met
+                continue
+            for name, value in zip(names, (met.setting, met.error, met.bound, met.evaluations), strict=True):
+                numbers[name][(grid.index(cell), *at)] = value
+        for (cell, call), timing in timed(scene, good, goal.calls, rounds, batch).items():
+            place = (grid.index(cell), *at, CALLS.index(call))
+            samples[place][: len(timing.samples)] = timing.samples
+    dims = ("integrator", "horizon", "target")
+    table = xr.Dataset(
+        {name: (dims, values) for name, values in numbers.items()}
+        | {Column.REASON: (dims, reasons.astype(str)), Column.SAMPLES: ((*dims, "call", "batch"), samples)},
+        coords={
+            "integrator": [cell.name for cell in grid], "horizon": horizons, "target": targets, "call": list(CALLS),
+        },
+    )  # fmt: skip
+    best = table[Column.SAMPLES].min("batch")
+    return table.assign({Column.SECONDS: best, Column.SPREAD: table[Column.SAMPLES].median("batch") / best - 1.0})
+
+
+# ---- reading ---------------------------------------------------------------------------------------------------------
+
+
+class Timed(NamedTuple):
+    """One measured time and the levels of its four factors."""
+
+    method: str
+    chart: str
+    language: str
+    call: str
+    name: str
+    seconds: float
+    spread: float
+    error: float
+    forces: float
+
+    @property
+    def levels(self) -> tuple[str, str, str, str]:
+        """Method, chart, language and call."""
+        return self[:4]
+
+
+@functools.cache
+def _by_name() -> dict[str, Cell]:
+    return {cell.name: cell for cell in cells()}
+
+
+def times(data: xr.Dataset) -> list[Timed]:
+    """Every time of one scene, horizon and target (a dataset over integrator and call)."""
+    rows, known = [], _by_name()
+    for name in map(str, data["integrator"].values):
+        row, cell = data.sel(integrator=name), known[name]
+        error, forces = float(row[Column.AXIS]), float(row[Column.FORCES])
+        for call in CALLS:
+            one = row.sel(call=call)
+            if np.isfinite(seconds := float(one[Column.SECONDS])):
+                rows.append(Timed(*cell.key, call, name, seconds, float(one[Column.SPREAD]), error, forces))
+    return rows
+
+
+def goals_of(data: xr.Dataset) -> Iterator[tuple[str, float, float, xr.Dataset]]:
+    """Scene, horizon, target and data of every goal that was timed."""
+    for scene in map(str, data["scene"].values):
+        for horizon in map(float, data["horizon"].values):
+            for target in map(float, data["target"].values):
+                part = data.sel(scene=scene, horizon=horizon, target=target)
+                if np.isfinite(part[Column.SECONDS]).any():
+                    yield scene, horizon, target, part
+
+
+def fastest(rows: Sequence[Timed], call: str = KERNEL, language: str | None = None) -> Timed:
+    """The least time of a call, in any language or in one; of those that are level with it, one in the smallest chart.
+
+    So that a tie does not decide which charts the waterfall shows: the axis is all that the targets ask for.
+    """
+    taken = [one for one in rows if one.call == call and language in (None, one.language)]
+    least = min(one.seconds for one in taken)
+    level = [one for one in taken if one.seconds <= (1.0 + TIE) * least]
+    return min(level, key=lambda one: (SMALLEST_FIRST["axis"].index(one.chart), one.seconds))
+
+
+START = (DORMAND_PRINCE, "angles", SCIPY_PYTHON, SOLVE_IVP)
+
+
+class Bar(NamedTuple):
+    """A step of the waterfall: what was changed, and how many times faster it made the run."""
+
+    factor: str  # empty for the first bar
+    change: str
+    ratio: float
+    time: Timed
+
+
+def waterfall(rows: Sequence[Timed], *, call_first: bool = False) -> list[Bar]:
+    """From SciPy's RK45 in angles, called by `solve_ivp`, to the fastest kernel; each bar changes one factor.
+
+    The call is changed to `simulate` first and to the bare kernel last, or to the bare kernel at once. Empty if the way
+    was not timed.
+    """
+    known = {one.levels: one for one in rows}
+    if START not in known:
+        return []
+    end = fastest(rows)
+    path = [
+        ("call", KERNEL if call_first else SIMULATE),
+        ("chart", end.chart),
+        ("language", SCIPY_NUMBA),
+        ("language", COMPILED),
+        ("method", end.method),
+        ("call", KERNEL),
+    ]
+    bars, levels = [Bar("", "", math.nan, known[START])], list(START)
+    for factor, level in path:
+        place = FACTORS.index(factor)
+        before, levels[place] = levels[place], level
+        if before == level:
+            continue
+        if tuple(levels) not in known:
+            return []
+        now = known[tuple(levels)]
+        bars.append(Bar(factor, f"{before} to {level}", bars[-1].time.seconds / now.seconds, now))
+    return bars
+
+
+class Change(NamedTuple):
+    """All pairs of measured times that differ in one factor, from one level of it to another."""
+
+    factor: str
+    before: str
+    after: str
+    ratios: tuple[float, ...]  # seconds before / seconds after
+
+
+def changes(rows: Sequence[Timed]) -> list[Change]:
+    """What changing one factor does, wherever the other three can be held: every pair that the factorial has."""
+    pairs: dict[tuple[str, str, str], list[float]] = {}
+    known = {one.levels: one for one in rows}
+    for levels, one in known.items():
+        for factor, before, after in STEPS:
+            place = FACTORS.index(factor)
+            other = known.get((*levels[:place], after, *levels[place + 1 :])) if levels[place] == before else None
+            if other is not None:
+                pairs.setdefault((factor, before, after), []).append(one.seconds / other.seconds)
+    return [Change(*step, tuple(pairs[step])) for step in STEPS if step in pairs]
+
+
+STEPS = (
+    ("chart", "angles", "axis"),
+    ("chart", "axis", "attitude"),
+    ("language", SCIPY_PYTHON, SCIPY_NUMBA),
+    ("language", SCIPY_NUMBA, COMPILED),
+    ("language", NUMPY, COMPILED),
+    ("call", SOLVE_IVP, SIMULATE),
+    ("call", SIMULATE, KERNEL),
+    ("method", DORMAND_PRINCE, "DOP853"),
+    ("method", DORMAND_PRINCE, "rk4"),
+    ("method", DORMAND_PRINCE, "Takahashi-Imada"),
+    ("method", DORMAND_PRINCE, "Taylor"),
+)
+
+
+def chart_ratio(rows: Sequence[Timed], scheme: str, chart: str) -> float:
+    """Kernel time of a compiled scheme in a chart over that on the axis; NaN if one of them was not timed."""
+    kernels = [one for one in rows if (one.method, one.language, one.call) == (scheme, COMPILED, KERNEL)]
+    seconds = {one.chart: one.seconds for one in kernels}
+    return seconds.get(chart, math.nan) / seconds.get("axis", math.nan)
+
+
+def least_share(data: xr.Dataset) -> float:
+    """The least error of a timed run as a share of its target."""
+    return float((data[Column.AXIS] / data["target"]).where(np.isfinite(data[Column.SECONDS]).any("call")).min())
