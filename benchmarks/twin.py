@@ -69,8 +69,7 @@ FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
     splitting_angles.march: ("splitting_angles", ""),
     splitting_space.march_axis: ("splitting_space", ""),
     splitting_space.march_attitude: ("splitting_space", "ATTITUDE"),
-    runge_kutta.march_angles: ("runge_kutta", "ANGLES"),
-    runge_kutta.march_axis: ("runge_kutta", "AXIS"),
+    **{loop: ("runge_kutta", chart.upper()) for chart, loop in runge_kutta.LOOPS.items()},
     gauss.march_axis: ("gauss", "AXIS"),
     gauss.march_frame: ("gauss", "FRAME"),
 }

@@ -77,7 +77,7 @@ def accuracy(scene: Scene, method: Integrator, setting: float) -> Point:
     error = float(np.max(charts.axis_distance(axis, truth["axis"].values)))
     failed = not math.isfinite(error) or (run is not None and run.outcome != "ok")
     steps, work = (run.steps, run.force_evaluations) if run is not None else (len(times) - 1, 0)
-    return Point(setting, math.nan if failed else error, judge_limit(scene, truth, "axis"), steps, work, elapsed)
+    return Point(setting, math.nan if failed else error, judge_limit(scene, truth, truth, "axis"), steps, work, elapsed)
 
 
 def ladder(scene: Scene, method: Integrator) -> list[float]:

@@ -1,5 +1,5 @@
-/* Right-hand sides: twins of field_axis and field_frame (symtop/integrators/space.py) and of field_angles
-   (symtop/integrators/euler_lagrange.py). -DAXIS, -DFRAME or -DANGLES chooses one, and with it Par and DIM. */
+/* Right-hand sides: twins of field_axis, field_frame and field_attitude (symtop/methods/space.py) and of field_angles
+   (symtop/methods/euler_lagrange.py). -DAXIS, -DFRAME, -DATTITUDE or -DANGLES chooses one, and with it Par and DIM. */
 
 #ifdef ANGLES
 #define DIM 6
@@ -26,14 +26,27 @@ static inline int judge(const double *state, const double *step) {
     return chart_outcome(state[0] + step[0] + 0.0 * reach);
 }
 #else
-#ifdef FRAME
+#if defined(FRAME)
 #define DIM 9
+#elif defined(ATTITUDE)
+#define DIM 7
 #else
 #define DIM 6
 #endif
 typedef struct { double I1, mgl, twist; } Par;
 
 static inline void field(const Par *par, const double *y, double *f) {
+#ifdef ATTITUDE
+    double half = 0.5 / par->I1, turn = 0.5 * par->twist, px = half * y[4], py = half * y[5], pz = half * y[6];
+    double right = 2.0 * (y[1] * y[3] + y[0] * y[2]), back = 2.0 * (y[2] * y[3] - y[0] * y[1]);
+    f[0] = -(px * y[1] + py * y[2] + pz * y[3]) - turn * y[3];
+    f[1] = px * y[0] + py * y[3] - pz * y[2] + turn * y[2];
+    f[2] = py * y[0] + pz * y[1] - px * y[3] - turn * y[1];
+    f[3] = pz * y[0] + px * y[2] - py * y[1] + turn * y[0];
+    f[4] = -par->mgl * back;
+    f[5] = par->mgl * right;
+    f[6] = 0.0;
+#else
     double inverse = 1.0 / par->I1, wx = inverse * y[3], wy = inverse * y[4], wz = inverse * y[5];
     f[0] = wy * y[2] - wz * y[1];
     f[1] = wz * y[0] - wx * y[2];
@@ -45,6 +58,7 @@ static inline void field(const Par *par, const double *y, double *f) {
     f[6] = wy * y[8] - wz * y[7];
     f[7] = wz * y[6] - wx * y[8];
     f[8] = wx * y[7] - wy * y[6];
+#endif
 #endif
 }
 

@@ -1,4 +1,4 @@
-/* Twin of symtop/integrators/galerkin.py. */
+/* Twin of symtop/methods/galerkin.py. */
 
 #include "march.h"
 
