@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.base.compiled import register_jitable
 from symtop.methods import unreduced
-from symtop.methods.compiled import register_jitable
 from symtop.methods.euler_lagrange import accelerations, with_rates
 from symtop.methods.loop import March, Marks, driver
 from symtop.methods.quadrature import RULES, quadrature

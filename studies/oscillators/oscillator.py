@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symtop.methods.compiled import register_jitable
+from symtop.base.compiled import register_jitable
 from symtop.methods.loop import driver
 from symtop.methods.quadrature import RULES, quadrature
 from symtop.model.charts import Array

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symtop.base.compiled import register_jitable
 from symtop.base.validate import SymtopError
-from symtop.methods.compiled import register_jitable
 from symtop.methods.outcomes import LEFT_CHART, NOT_FINITE, OK
 from symtop.model.top import Angles, SymmetricTop
 

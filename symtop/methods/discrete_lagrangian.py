@@ -30,10 +30,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.base.compiled import register_jitable
+from symtop.base.fused import fused
 from symtop.methods.angles import chart_outcome, reduced
-from symtop.methods.compiled import register_jitable
 from symtop.methods.fixed_step import FixedStep, inside
-from symtop.methods.fused import fused
 from symtop.methods.loop import driver
 from symtop.methods.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton
 from symtop.methods.outcomes import NOT_CONVERGED

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.methods.compiled import compile_kernel, register_jitable, set_item
+from symtop.base.compiled import compile_kernel, register_jitable, set_item
 from symtop.methods.euler_lagrange import LEAST_TOLERANCE
 from symtop.methods.formulations import FORMULATIONS, as_run
 from symtop.methods.outcomes import OK, OUT_OF_BUDGET, STEP_TOO_SMALL

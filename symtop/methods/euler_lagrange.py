@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from symtop.base.compiled import register_jitable
 from symtop.methods.angles import BareTop, chart_outcome, require_chart
-from symtop.methods.compiled import register_jitable
 from symtop.methods.plan import Array
 from symtop.model.top import Angles, SymmetricTop
 

@@ -3,8 +3,6 @@
 Source: Klein and Sommerfeld, Theory of the Top, chapter 6; see `symtop.model.closed_form`.
 """
 
-import numpy as np
-
 from symtop.methods.plan import Plan, Run
 from symtop.methods.registry import Integrator
 from symtop.model.closed_form import ClosedForm
@@ -14,8 +12,7 @@ from symtop.model.view import space_momenta
 
 def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
     """Attitude and angular momentum at the sample times."""
-    form = ClosedForm(top, start)
-    states = np.concatenate([form.quaternion(plan.times), form.momentum(plan.times)], axis=1)
+    states = ClosedForm(top, start).state(plan.times)
     p_phi, p_psi = space_momenta("attitude", states)
     return Run(states, p_phi, p_psi, 0, plan.times.size, 0, "ok", plan.horizon)
 

@@ -34,8 +34,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.base.compiled import register_jitable
 from symtop.methods.angles import chart_outcome, reduced
-from symtop.methods.compiled import register_jitable
 from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.loop import driver
 from symtop.methods.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton

@@ -33,8 +33,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.base.compiled import register_jitable, set_item
 from symtop.base.multiprecision import context
-from symtop.methods.compiled import register_jitable, set_item
 from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import Loop, driver
 from symtop.methods.outcomes import NOT_CONVERGED, OK

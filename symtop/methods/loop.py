@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.methods.compiled import compile_kernel, register_jitable, set_item
+from symtop.base.compiled import compile_kernel, register_jitable, set_item
 from symtop.methods.outcomes import OK
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.methods.compiled import register_jitable
+from symtop.base.compiled import register_jitable
 
 NEGLIGIBLE_ANGLE = 1e-18  # radians: no correction below this can matter to an angle
 ANGLE_GRAIN = 1e-12  # radians: a smaller correction that does not halve is rounding (a steady precession has no other)

@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.base.compiled import register_jitable, set_item
 from symtop.base.validate import SymtopError, row
-from symtop.methods.compiled import register_jitable, set_item
 from symtop.methods.fixed_step import FixedStep
 from symtop.methods.formulations import FORMULATIONS
 from symtop.methods.loop import Loop, driver

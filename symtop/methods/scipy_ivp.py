@@ -25,9 +25,9 @@ from typing import Any
 
 import numpy as np
 
+from symtop.base.compiled import compile_kernel
 from symtop.base.validate import SymtopError, one_of
 from symtop.methods.angles import BareTop
-from symtop.methods.compiled import compile_kernel
 from symtop.methods.euler_lagrange import LEAST_TOLERANCE
 from symtop.methods.formulations import FORMULATIONS, as_run
 from symtop.methods.outcomes import NOT_FINITE, OK, OUT_OF_BUDGET, STEP_TOO_SMALL

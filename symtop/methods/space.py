@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.methods.compiled import register_jitable
+from symtop.base.compiled import register_jitable
 from symtop.methods.outcomes import NOT_FINITE, OK
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from symtop.base.compiled import register_jitable
 from symtop.methods.angles import chart_outcome
-from symtop.methods.compiled import register_jitable
 from symtop.methods.loop import driver
 from symtop.methods.registry import Array
 from symtop.methods.splitting_loop import Composition, Stages, compose

@@ -15,8 +15,8 @@ stands for. A sum that is wrong by one rounding is a clock that runs fast by 1e-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from symtop.base.compiled import register_jitable, set_item
 from symtop.methods.coefficients import exact_sum
-from symtop.methods.compiled import register_jitable, set_item
 
 
 class Composition(NamedTuple):

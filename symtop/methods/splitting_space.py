@@ -40,8 +40,8 @@ from typing import Any
 
 import numpy as np
 
+from symtop.base.compiled import register_jitable
 from symtop.base.numbers import sign_changes
-from symtop.methods.compiled import register_jitable
 from symtop.methods.loop import driver
 from symtop.methods.registry import Array
 from symtop.methods.space import axis_of, finite_outcome, observe_attitude, observe_axis

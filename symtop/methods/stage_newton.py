@@ -26,7 +26,7 @@ Continuation Methods, chapter 2.
 
 from typing import Any
 
-from symtop.methods.compiled import register_jitable, set_item
+from symtop.base.compiled import register_jitable, set_item
 
 ENOUGH = 1e-9  # a correction in units of |e| = 1, whose square is below rounding
 NEAR = 0.1  # a correction after which the solution is followed to a longer step

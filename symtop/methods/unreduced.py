@@ -23,9 +23,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.base.compiled import register_jitable
 from symtop.base.validate import SymtopError
 from symtop.methods.angles import BareTop, chart_outcome, require_chart
-from symtop.methods.compiled import register_jitable
 from symtop.methods.discrete_lagrangian import built_in as reduced_methods, rule_of
 from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver

@@ -23,11 +23,11 @@ from tqdm import tqdm
 
 from symtop.base import datasets
 from symtop.base.cache import cache_root
+from symtop.base.compiled import code_of
 from symtop.base.fingerprint import digest, file_reasons, hashed
 from symtop.base.numbers import GOLDEN
 from symtop.base.signals import ending_on_sigterm
 from symtop.base.validate import SymtopError, positive, whole
-from symtop.methods.compiled import code_of
 from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.loop import Loop, Position
 from symtop.methods.outcomes import OK, OUTCOMES, sentence

@@ -13,10 +13,9 @@ from pathlib import Path
 import pytest
 
 import symtop
-from symtop.base import cache, fingerprint, imports, signals
+from symtop.base import cache, compiled, fingerprint, imports, signals
 from symtop.base.fingerprint import changes, digest, file_reasons, merged
 from symtop.base.walk import Walk
-from symtop.methods import compiled
 from symtop.runner import depends
 
 
@@ -204,7 +203,7 @@ def test_an_edited_callee_makes_a_new_kernel_and_a_comment_makes_none(tmp_path):
     before = kernels_of(tmp_path, tmp_path / "cache")
     assert before["files"]
     for name in ("measure/errors.py", "run/modified_energy.py", "explore/answers.py", "methods/gauss.py",
-                 "methods/loop.py", "methods/compiled.py", "base/walk.py"):  # fmt: skip
+                 "methods/loop.py", "base/compiled.py", "base/walk.py"):  # fmt: skip
         file = tmp_path / "symtop" / name
         text = file.read_text()
         assert "\nfrom " in text
@@ -249,7 +248,7 @@ def test_a_kernel_is_told_by_what_it_calls():
 
 
 def test_what_numba_compiles_in_place_of_a_function_counts():
-    from symtop.methods import fused
+    from symtop.base import fused
 
     names = {part.__qualname__ for part in compiled.code_of(lambda a: fused.fused(a, a, a)).functions}
     assert names  # the control: the walk went somewhere

@@ -17,10 +17,10 @@ from numba import njit
 from symtop_studies.drift.long_runs import members, rounding
 
 import symtop
+from symtop.base.fused import fused
 from symtop.base.validate import SymtopError
 from symtop.cli.main import main
 from symtop.methods import loop as drive
-from symtop.methods.fused import fused
 from symtop.run import long_run as longrun
 from symtop.run.long_run import chart_of, leaves, long_run, regrown, scattered, windows
 

@@ -16,10 +16,9 @@ import xarray as xr
 from click.testing import CliRunner
 from numba.core.caching import IndexDataCacheFile
 
-from symtop.base import datasets
+from symtop.base import compiled, datasets
 from symtop.base.validate import SymtopError
 from symtop.cli.main import main
-from symtop.methods import compiled
 from symtop.runner import run as runner, store, work
 from tests.commands import PROBE, contents, ended, leftovers, stop, symtop
 from tests.kills import survive

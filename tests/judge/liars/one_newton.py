@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 
 import symtop
+from symtop.base.compiled import register_jitable
 from symtop.methods import discrete_lagrangian as family
 from symtop.methods.angles import chart_outcome, reduced
-from symtop.methods.compiled import register_jitable
 from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver
 

@@ -26,9 +26,11 @@ from numba.extending import register_jitable as _register
 
 from symtop.base.cache import cache_root, prune, touch
 from symtop.base.fingerprint import digest
+from symtop.base.fused import fused
+from symtop.base.parts import inlined_parts, shared_parts
 from symtop.base.walk import Walk, by_name
 
-__all__ = ["code_of", "compile_kernel", "register_jitable", "set_item"]
+__all__ = ["code_of", "compile_kernel", "fused", "is_kept", "register_jitable", "set_item"]
 
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
 
@@ -54,6 +56,16 @@ def register_jitable(function: Callable[..., Any]) -> Any:
         _registered.add(function)
         _register(**INLINED)(function)
     return function
+
+
+def _register_parts() -> None:
+    """Register what modules without numba have marked so far, each function once."""
+    for function in inlined_parts:
+        register_jitable(function)
+    for function in shared_parts:
+        if function not in _registered:
+            _registered.add(function)
+            _register(**OPTIONS)(function)
 
 
 def _overloads(function: FunctionType) -> Iterator[object]:
@@ -128,6 +140,7 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     A kernel with functions typed at a prompt, which have no source file, compiles without the cache. The constructor of
     a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
     """
+    _register_parts()
     kernel = njit(**OPTIONS)(function)
     walk = code_of(function)
     written = [part for part in walk.functions if not part.__module__.startswith("namedtuple_")]
@@ -136,3 +149,12 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
         touch(folder)
         kernel._cache = _Cache(function, folder)
     return kernel
+
+
+def is_kept(kernel: Any, signature: Any) -> bool:
+    """Is a kernel compiled for this signature, in memory or in the cache?"""
+    if signature in kernel.overloads:
+        return True
+    folder = getattr(kernel._cache, "_cache_file", None)
+    index = folder._load_index() if folder is not None else {}
+    return kernel._cache._index_key(signature, kernel.targetctx.codegen()) in index

@@ -8,6 +8,8 @@ product of two doubles has random digits below that grid; added before the one r
 from numba import types
 from numba.extending import intrinsic, overload
 
+from symtop.base.parts import two_product
+
 
 def fused(a: float, b: float, c: float) -> float:
     """a b + c, rounded once in compiled code; outside of it, in whatever arithmetic the arguments bring, twice."""
@@ -33,3 +35,12 @@ def _fused(a, b, c):  # type: ignore[no-untyped-def]
         return _fma(a, b, c)
 
     return once
+
+
+@overload(two_product, inline="always")
+def _two_product(a, b):  # type: ignore[no-untyped-def]
+    def exactly(a, b):  # type: ignore[no-untyped-def]
+        product = a * b
+        return product, _fma(a, b, -product)
+
+    return exactly

@@ -1,0 +1,59 @@
+"""Functions that are interpreted at first and compiled once that is worth its while.
+
+A process that needs a handful of numbers should neither import numba (0.3 s) nor compile (seconds). `LazyKernel` runs a
+plain function as it stands, adds up what that costs, and goes over to the compiled one
+
+    at once                                     if numba is loaded anyway and the kernel is in the cache,
+    after `LOADING` seconds of interpreting     if the kernel is in the cache,
+    after `patience` seconds of interpreting    if it has to be compiled: what compiling costs.
+
+No process spends more than twice what the better of both ways would have cost it. Results do not depend on the way: the
+function keeps the rules of `symtop.base.parts`.
+"""
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+LOADING = 0.3  # seconds: import numba, load a kernel
+
+
+class LazyKernel:
+    """A plain function with the signature that it has as a kernel, in numba's words, for example ``"int64(float64)"``."""
+
+    def __init__(self, function: Callable[..., Any], arguments: str, patience: float) -> None:
+        self.function, self.arguments, self.patience = function, arguments, patience
+        self.compiled: Any = None
+        self._kernel: Any = None
+        self._spent = 0.0
+
+    def ready(self, seconds: float) -> bool:
+        """Is the compiled function the one to call, for work that takes `seconds` interpreted?"""
+        if self.compiled is not None:
+            return True
+        self._spent += seconds
+        if self._spent < LOADING and "numba" not in sys.modules:
+            return False
+        if self._spent < self.patience and not self._kept():
+            return False
+        self.compile()
+        return True
+
+    def compile(self) -> None:
+        """Compile now, or load from the cache."""
+        if self.compiled is None:
+            self._kept()
+            self._kernel.compile(self._signature)
+            self.compiled = self._kernel
+
+    def _kept(self) -> bool:
+        """Is the compiled function in the cache?"""
+        if self._kernel is None:
+            from numba.core import sigutils  # 0.3 s
+
+            from symtop.base.compiled import compile_kernel, is_kept
+
+            self._kernel = compile_kernel(self.function)
+            self._signature, _ = sigutils.normalize_signature(self.arguments)
+            self._in_cache = is_kept(self._kernel, self._signature)
+        return self._in_cache
