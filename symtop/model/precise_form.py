@@ -18,8 +18,9 @@ near a pole. A hanging top (mgl < 0) is the standing one seen upside down: theta
 Degenerate tops. The coefficients of u'^2 about the starting point are sums of a rational number, kept as an exact
 fraction, and a multiple of cos theta. One that vanishes is therefore known to vanish (an axis that passes through a
 pole, a start on a turning point, a steady precession); every other gap between roots is a nonzero number that enough
-digits resolve, and the precision is doubled until they do. Data next to a separatrix have a large, finite period; a
-moving axis with m = 1 exactly cannot come from rational data.
+digits resolve, and the precision is doubled until they do. Data next to a separatrix have a large, finite period. The
+only separatrix (m = 1) that rational data can name starts at theta = 0 in a hanging top without twist, where cos theta is
+rational, too: theta'^2 I1 = 4 abs(mgl), and theta = 4 atan tanh(g t/2) from then on, g = Omega = sqrt(abs(mgl)/I1).
 
 Conventions where angles are singular. If the axis passes exactly through a pole, the twist there is 0, its term is
 dropped, and phi and psi jump by pi there and back in turn. If the axis stands on a pole only phi + psi (phi - psi
@@ -136,6 +137,9 @@ class PreciseForm:
             x1 = -down
         if twist_up == 0 and not rests:
             x2, x3 = (up, x3) if abs(x2 - up) <= abs(x3 - up) else (x2, up)
+        self.climbs = theta == 0 and phi_dot + psi_dot == 0 and theta_dot**2 * I1 == -4 * mgl != 0
+        if self.climbs:
+            x1, x2, x3 = ctx.zero, up, up
         rigid = rests or not lead  # no elliptic function needed
         self.curve = Curve(
             floor=Pole(twist_down, down + x1, down + x2),
@@ -145,7 +149,7 @@ class PreciseForm:
             stiffness=-curvature if rigid else lead * (x3 - x1),
             m=ctx.zero if rigid else (x2 - x1) / (x3 - x1),
             m1=ctx.one if rigid else (x3 - x2) / (x3 - x1),
-            beyond=ctx.one if rigid else (x3 - up) / (x3 - x2),
+            beyond=ctx.one if rigid or self.climbs else (x3 - up) / (x3 - x2),
             start_sn2=ctx.zero if rests else -x1 / (x2 - x1),
             start_cn2=ctx.one if rests else x2 / (x2 - x1),
         )
@@ -167,7 +171,7 @@ class PreciseForm:
         self.p_phi, self.p_psi = self.I1 * self.b, self.I1 * self.a
         self.drift = self.facing * self.a * (self.I1 / self.I3 - 1)
         self.m, self.m1 = +curve.m, +curve.m1
-        self.K = ctx.elliprf(0, self.m1, 1)
+        self.K = ctx.elliprf(0, self.m1, 1) if self.m1 else ctx.inf
         self.K1 = ctx.elliprf(0, self.m, 1) if self.m else ctx.inf
         self.Omega = ctx.sqrt(curve.stiffness) / 2 if curve.stiffness > 0 else ctx.zero
         self.nutation_period = 2 * self.K / self.Omega if self.Omega else ctx.inf
@@ -175,7 +179,7 @@ class PreciseForm:
         rising = -1 if self.facing * theta_dot > 0 else 1  # the sign of u'
         sn, cn = rising * ctx.sqrt(curve.start_sn2), ctx.sqrt(curve.start_cn2)
         self.tau0 = self._integral(None, sn, cn)
-        self._complete = [self._integral(pole, ctx.one, ctx.zero) for pole in curve[:2]]
+        self._complete = [self._integral(pole, ctx.one, ctx.zero) for pole in curve[:2]]  # 0 on the separatrix
         self._begun = [self._integral(pole, sn, cn) for pole in curve[:2]]
         # Through a pole the half-angle sine is continued with its sign, positive at the start; cn >= 0 there.
         self.floor_sign = 1 if sn > 0 or (sn == 0 and theta_dot >= 0) else -1
@@ -239,6 +243,9 @@ class PreciseForm:
             angles = [angle + rate * elapsed for angle, rate in zip(self.angles0, self.mean_rates, strict=True)]
             return ctx.sqrt(curve.floor.low / 2), ctx.sqrt(curve.crown.low / 2), angles[0], angles[1], ctx.zero
         tau = self.tau0 + self.Omega * elapsed
+        if self.climbs:
+            half, sech = self.floor_sign * ctx.tanh(tau), ctx.sech(tau)
+            return half, sech, *self.angles0, -2 * self.Omega * self.floor_sign * sech
         turns = ctx.nint(tau / (2 * self.K))
         sn, cn, dn = self._jacobi(tau - 2 * turns * self.K)
         side = -1 if turns % 2 else 1

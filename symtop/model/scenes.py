@@ -116,7 +116,7 @@ def _closed_form(top: SymmetricTop, start: Angles) -> "ClosedForm":
 
 
 def closed_form(scene: Scene) -> "ClosedForm":
-    """The exact motion of a scene; made once (20 ms) and kept."""
+    """The exact motion of a scene; made once and kept."""
     return _closed_form(scene.top, scene.start)
 
 
