@@ -3,8 +3,7 @@
 A process that needs a handful of numbers should neither import numba (0.3 s) nor compile (seconds). `LazyKernel` runs a
 plain function as it stands, adds up what that costs, and goes over to the compiled one
 
-    at once                                     if numba is loaded anyway and the kernel is in the cache,
-    after `LOADING` seconds of interpreting     if the kernel is in the cache,
+    after `LOADING` seconds of interpreting     if the kernel is in the cache (`IMPORTING` more without numba),
     after `patience` seconds of interpreting    if it has to be compiled: what compiling costs.
 
 No process spends more than twice what the better of both ways would have cost it. Results do not depend on the way: the
@@ -15,11 +14,11 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-LOADING = 0.3  # seconds: import numba, load a kernel
+LOADING, IMPORTING = 0.05, 0.3  # seconds: a kernel from the cache, numba
 
 
 class LazyKernel:
-    """A plain function with the signature that it has as a kernel, in numba's words, for example ``"int64(float64)"``."""
+    """A plain function and the types of its arguments as a kernel, in numba's words: ``"(float64, float64[::1])"``."""
 
     def __init__(self, function: Callable[..., Any], arguments: str, patience: float) -> None:
         self.function, self.arguments, self.patience = function, arguments, patience
@@ -32,7 +31,7 @@ class LazyKernel:
         if self.compiled is not None:
             return True
         self._spent += seconds
-        if self._spent < LOADING and "numba" not in sys.modules:
+        if self._spent < (LOADING if "numba" in sys.modules else LOADING + IMPORTING):
             return False
         if self._spent < self.patience and not self._kept():
             return False

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symtop.methods.plan import Run
 from symtop.methods.registry import Integrator
+from symtop.model import closed_form
 from symtop.model.scenes import Scene
 from symtop.run.simulation import make_plan
 
@@ -91,8 +92,10 @@ def timings(
     """Time several functions against each other.
 
     Those that are `warm`, called before, have no first call (NaN), and a call that turns out to be longer than a batch
-    is the first sample of its function: a long run costs no more calls than it has samples.
+    is the first sample of its function: a long run costs no more calls than it has samples. The closed form is compiled
+    before anything is timed, whoever calls it.
     """
+    closed_form.compile_now()
     firsts, calls = [], []
     samples: list[list[float]] = []
     for function in functions:

@@ -4,9 +4,9 @@ The attitude is written in the two complex half-angle functions of Klein and Som
 
     A = cos(theta/2) exp(i (phi + psi)/2),        B = sin(theta/2) exp(i (phi - psi)/2),
 
-which are quotients theta_k(z - i y)/theta_4(z), z = pi tau/2K, times an exponential. theta_4 is common to both and cancels
-in every angle. About each turning point, at x quarter periods from it, one function belongs to the pole that the axis is
-near and one to the pole that it is far from; up to a common real factor, with polynomials P of degree 3 in C,
+which are quotients theta_k(z - i y)/theta_4(z), z = pi tau/2K, times an exponential. theta_4 is common to both and
+cancels in every angle. About each turning point, at x quarter periods from it, one function belongs to the pole that
+the axis is near and one to the pole that it is far from; up to a common real factor, with cubics P in C,
 
     m <= 1/2    near, far = cos z P + i sin z P,                       z = pi x/2,      C = cos 2z,   nome exp(-pi K'/K)
     m >  1/2    near = cosh s P + i sinh s P, far = P + i sinh 2s P,   s = pi K x/2K',  C = cosh 2s,  nome exp(-pi K/K')
@@ -20,9 +20,9 @@ accurate at both turning points, however closely the axis grazes a pole there. T
 
 The phase and the secular angles are products of t with rates of two doubles, so that the error of theta does not grow
 with time, and that of phi and psi only as their last digit does. No special functions, and nothing is expanded in the
-amplitude: not to be confused with the small-nutation approximation. Constants: `symtop.model.motion_constants`, and in 40
-digits `symtop.model.precise_constants`; evaluation: `symtop.model.motion_samples`. Sources: Klein and Sommerfeld, Theory
-of the Top, chapter 6; Whittaker and Watson, A Course of Modern Analysis, chapter 21.
+amplitude: not to be confused with the small-nutation approximation. Constants: `symtop.model.motion_constants`, and in
+40 digits `symtop.model.precise_constants`; evaluation: `symtop.model.motion_samples`. Sources: Klein and Sommerfeld,
+Theory of the Top, chapter 6; Whittaker and Watson, A Course of Modern Analysis, chapter 21.
 """
 
 from typing import NamedTuple
@@ -80,8 +80,8 @@ class ClosedForm:
     (5 microseconds), and where that is too little, too, from 40 digits (15 ms): `provenance` says which it was.
 
     `nutation_period` is that of small nutations for a steady precession, and infinite where the axis stands on an
-    unstable pole or climbs to it for ever; `phi_per_period`, `psi_per_period` are the mean growth over it (0 if the mean
-    rate is 0) and `theta_range` the two turning points, radians.
+    unstable pole or climbs to it for ever; `phi_per_period`, `psi_per_period` are the mean growth over it (0 if the
+    mean rate is 0) and `theta_range` the two turning points, radians.
 
     Where the axis passes exactly through a pole, theta' changes sign, and phi and psi jump by pi there and back in
     turn; `axis`, `quaternion` and `momentum` are smooth. On a pole only phi + psi (phi - psi at pi) has a meaning.

@@ -3,7 +3,7 @@
 A number is a pair (high, low) with abs(low) <= ulp(high)/2 that stands for the exact sum. Everything rests on two exact
 transformations, the sum (Knuth) and the product (Dekker) of two doubles as a rounded result and its error:
 
-    a + b = s + e,    s = fl(a + b),    e = (a - (s - v)) + (b - v),    v = s - a;        a b = p + e,    e = fma(a, b, -p).
+    a + b = s + e,    s = fl(a + b),    e = (a - (s - v)) + (b - v),    v = s - a;    a b = p + e,    e = fma(a, b, -p).
 
 Relative errors, measured over 1e6 random pairs: sum 1.9e-32 (also if the terms cancel), product 3e-32, quotient 4e-32,
 square root 3e-32; the unit is 2^-106 = 1.2e-32. Cost, compiled: 5 to 11 ns. The functions are compiled by whoever

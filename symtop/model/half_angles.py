@@ -1,6 +1,6 @@
 """The half-angle functions about the turning points: polynomials, and how fast their arguments grow.
 
-A pole at the height y (a zero of 1 + u or 1 - u at an imaginary time) belongs to a function with, up to a common factor,
+A pole at the height y (a zero of 1 + u or 1 - u at an imaginary time) belongs to a function that is, up to a factor,
 
     m <= 1/2    near it     cos z P + i sin z P,      far from it   cos z P + i sin z P,           P in cos 2z
     m >  1/2    near it     cosh s P + i sinh s P,    far from it   P + i sinh s cosh s P,         P in cosh 2s

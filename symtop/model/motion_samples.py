@@ -6,8 +6,8 @@ growth)). With x = the quarter periods from the nearest turning point, abs(x) <=
     near, far = moduli and unit vectors of the two half-angle functions (cubics in cos 2z or cosh 2s),
     theta' = steepness theta_1(2z)/theta_4(z)^4 / (near far),     phi' = sign (twist/near)^2 + sign (twist/far)^2,
 
-the last as (b - a u)/sin^2 theta where the two fractions cancel more than b and a u do. The phase is start + rate t with
-numbers of two doubles, so that its error does not grow with time. On the separatrix the halves are tanh(g t), sech(g t).
+the last as (b - a u)/sin^2 theta where the two fractions cancel more than b and a u do. The phase is start + rate t
+with numbers of two doubles: its error does not grow with time. On the separatrix the halves are tanh(g t), sech(g t).
 """
 
 import math
@@ -37,7 +37,8 @@ def line(c: Constants, place: int, t: float) -> tuple[float, float]:
 
 @inlined
 def _cubic(c: Constants, place: int, x: float) -> float:
-    return c[place] + x * (c[place + 1] + x * (c[place + 2] + x * c[place + 3]))
+    value: float = c[place] + x * (c[place + 1] + x * (c[place + 2] + x * c[place + 3]))
+    return value
 
 
 @inlined
@@ -62,6 +63,35 @@ def _climbing(c: Constants, t: float) -> Wave:
     return sign * math.tanh(x), 1.0, 0.0, 0.0, sech, 1.0, 0.0, 0.0, -2.0 * c[at.SCALE] * sign * sech, 0.0
 
 
+@inlined
+def _phase(c: Constants, t: float) -> tuple[float, float]:
+    """The nearest turning point, 0 to 3 in turn, and the quarter periods from it."""
+    high, low = line(c, at.QUARTERS, t)
+    nearest = whole_part(high)
+    offset = (high - nearest) + low
+    if abs(high) > 1e15:  # the low half may hold whole quarters, too
+        more = whole_part(offset)
+        offset, nearest = offset - more, nearest % 4.0 + more % 4.0
+    return nearest - 4.0 * whole_part(0.25 * nearest - 0.375), offset
+
+
+@inlined
+def _precession(c: Constants, down: float, up: float, lean: float, size: float) -> float:
+    """phi' as the sum of its two fractions, or as lean/sin^2 theta where these cancel more than lean did."""
+    rate = fractions = 0.0
+    if c[at.SIGN_DOWN] != 0.0:
+        fraction = (c[at.TWIST_DOWN] / down) * (c[at.TWIST_DOWN] / down)
+        rate, fractions = rate + c[at.SIGN_DOWN] * fraction, fractions + fraction
+    if c[at.SIGN_UP] != 0.0:
+        fraction = (c[at.TWIST_UP] / up) * (c[at.TWIST_UP] / up)
+        rate, fractions = rate + c[at.SIGN_UP] * fraction, fractions + fraction
+    if c[at.MAY_STOP] > 0.0:
+        sine2 = (2.0 * down * up) * (2.0 * down * up)
+        if size < fractions * sine2:
+            return lean / sine2
+    return rate
+
+
 @shared
 def wave(c: Constants, t: float) -> Wave:
     """The bounded part of the motion, upright.
@@ -73,14 +103,8 @@ def wave(c: Constants, t: float) -> Wave:
         return c[at.REST_DOWN], 1.0, 0.0, 0.0, c[at.REST_UP], 1.0, 0.0, 0.0, 0.0, c[at.REST_RATE]
     if c[at.KIND] == at.CLIMBS:
         return _climbing(c, t)
-    high, low = line(c, at.QUARTERS, t)
-    nearest = whole_part(high)
-    offset = (high - nearest) + low
-    if abs(high) > 1e15:  # the low half may hold whole quarters, too
-        more = whole_part(offset)
-        offset, nearest = offset - more, nearest % 4.0 + more % 4.0
-    quarter = nearest - 4.0 * whole_part(0.25 * nearest - 0.375)  # 0, 1, 2 or 3
-    late = quarter == 1.0 or quarter == 3.0
+    quarter, offset = _phase(c, t)
+    late = quarter % 2.0 == 1.0
     frame = at.CROWN if late else at.FLOOR
     angle = c[at.SCALE] * offset
     if c[at.HYPERBOLIC] > 0.0:
@@ -116,22 +140,12 @@ def wave(c: Constants, t: float) -> Wave:
     near, far = near_size / norm, far_size / norm
     down, up = (far, near) if late else (near, far)
 
-    rate = fractions = 0.0
-    if c[at.SIGN_DOWN] != 0.0:
-        fraction = (c[at.TWIST_DOWN] / down) * (c[at.TWIST_DOWN] / down)
-        rate, fractions = rate + c[at.SIGN_DOWN] * fraction, fractions + fraction
-    if c[at.SIGN_UP] != 0.0:
-        fraction = (c[at.TWIST_UP] / up) * (c[at.TWIST_UP] / up)
-        rate, fractions = rate + c[at.SIGN_UP] * fraction, fractions + fraction
-    if c[at.MAY_STOP] > 0.0:
-        sine2 = (2.0 * down * up) * (2.0 * down * up)
-        if size < fractions * sine2:
-            rate = lean / sine2
+    rate = _precession(c, down, up, lean, size)
     if c[at.FLOOR + at.THROUGH] > 0.0:  # the sign of sn
         sign = c[at.FLOOR_SIGN] if quarter < 2.0 else -c[at.FLOOR_SIGN]
         down, nod = down * sign, nod * sign
     if c[at.CROWN + at.THROUGH] > 0.0:  # the sign of cn
-        sign = 1.0 if quarter == 0.0 or quarter == 3.0 else -1.0
+        sign = 1.0 if abs(quarter - 1.5) > 1.0 else -1.0  # 0 or 3
         up, nod = up * sign, nod * sign
     if late:
         return down, far_x, far_y, far_lag, up, near_x, near_y, near_lag, nod, rate

@@ -1,18 +1,18 @@
 """The sums of the data that the closed form hangs on, in double-double or in quad-double.
 
-Upright picture: a hanging top (mgl < 0) is the standing one with its poles exchanged and a -> -a. With `up` and `down` =
-1 -+ u at the start, l = (I1 - I3) phi' (an exact difference), kinetic = theta'^2 + phi'^2 up down, lead = 2 abs(mgl)/I1,
+Upright picture: a hanging top (mgl < 0) is the standing one with its poles exchanged and a -> -a. With `up` and `down`
+= 1 -+ u at the start, l = (I1 - I3) phi', kinetic = theta'^2 + phi'^2 up down, lead = 2 abs(mgl)/I1,
 
-    theta < 1.5:  S = I3 (psi' + phi') + l up           N = I1 phi' - I3 psi' + l cos    p_psi = I3 (psi' + phi') - I3 phi' up
-    else:         N = l down - I3 (psi' - phi')         S = I1 phi' + I3 psi' - l cos    p_psi = I3 (psi' - phi') + I3 phi' down
+    theta<1.5:  S = I3 (psi' + phi') + l up    N = I1 phi' - I3 psi' + l cos  p_psi = I3 (psi' + phi') - I3 phi' up
+    otherwise:  N = l down - I3 (psi' - phi')  S = I1 phi' + I3 psi' - l cos  p_psi = I3 (psi' - phi') + I3 phi' down
     twist_up = b - a = up N/I1,     twist_down = b + a = down S/I1        (of a standing top)
     k1 = 2 (a twist_up - D),        k2 = 2 lead - D - a^2,      D = kinetic - lead up,
     u'^2 = -twist_up^2 + k1 t + k2 t^2 + lead t^3,     t = u - 1,
     d(u'^2)/du at the start = 2 [up down (I3 phi' psi' - mgl - l phi' cos)/I1 - cos theta'^2].
 
-Only N, S, p_psi, D, k1, k2 and the slope can cancel. Each is formed without a division before its sum, times I1 or I1^2,
-and carries the bound `grain` times the sum of its terms' sizes, plus one rounding to double-double. Products of two of
-the data are exact, as are psi' +- phi'. Near a pole the first form of S (or N) is the one that does not cancel there.
+Only N, S, p_psi, D, k1, k2 and the slope can cancel. Each is formed without a division before its sum, times I1 or
+I1^2, and carries the bound `grain` times the sum of its terms' sizes, plus one rounding to double-double. Products of
+two of the data are exact, as are I1 - I3 and psi' +- phi'. Near a pole the first form of S (or N) does not cancel.
 """
 
 from typing import NamedTuple
@@ -153,11 +153,11 @@ def long_sums(data: Data) -> Sums:
     return _sums(data, sine, cosine, GRAIN4)
 
 
-# ------------------------------------------------------------------------------------- what vanishes exactly, and is known to
+# --------------------------------------------------------------------------------------------- what vanishes exactly
 
 
 class Exact(NamedTuple):
-    """Does the axis pass through the upper and the lower pole (upright), stand still, climb for ever to the upper one?"""
+    """Does the axis pass through the upper and the lower pole (upright), stand still, climb to the upper one?"""
 
     through_up: bool
     through_down: bool
@@ -182,7 +182,7 @@ def _is_zero(a: float, b: float, c: float, d: float) -> bool:
 
 @shared
 def exact_zeros(data: Data) -> Exact:
-    """cos theta is irrational unless theta = 0: a polynomial in it with rational coefficients vanishes only with all of them.
+    """What is known to vanish: cos theta is transcendental unless theta = 0, a root of no rational polynomial.
 
     For the same reason the only separatrix that doubles can name exactly starts at theta = 0 in a hanging top without
     twist: theta'^2 I1 = 4 abs(mgl), and theta = 4 atan tanh(g t/2) from then on, g = sqrt(abs(mgl)/I1).

@@ -1,8 +1,8 @@
 """Constants of a moving axis: the elliptic functions of its nutation and the lags of its angles.
 
 From the turning points: nome, heights of the poles and phase of the start (`theta_functions`), half-angle functions
-(`half_angles`), mean rates, and the frames of both turning points, rounded once to doubles. With growth = d(phi +- psi)/dt
-less its drift,
+(`half_angles`), mean rates, and the frames of both turning points, rounded once to doubles. With growth =
+d(phi +- psi)/dt less its drift,
 
     growth of a pole = twist/(distance at the far turning point) + what the passage at the near one adds,
     (phi + psi)' = drift + growth of the lower pole,      (phi - psi)' = -drift + growth of the upper pole,
@@ -10,9 +10,9 @@ less its drift,
 both terms of a growth having the same sign. Lags are what the angles are ahead of their means at the start.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
-from symtop.base.parts import inlined, shared
+from symtop.base.parts import shared
 from symtop.model import motion_layout as at
 from symtop.model.double_double import (
     HALF_PI,
@@ -49,8 +49,19 @@ def _put(out: Any, place: int, poly: Cubic, unit: DoubleDouble) -> None:
         out[place + i] = rounded(mul(poly[i], unit))
 
 
+class Mean(NamedTuple):
+    """What the angles do on average: the nutation period, growth at both poles, lags of both halves at the start."""
+
+    period: DoubleDouble
+    growth_down: DoubleDouble
+    growth_up: DoubleDouble
+    lag_down: DoubleDouble
+    lag_up: DoubleDouble
+
+
 @shared
 def put_line(out: Any, place: int, rate: DoubleDouble, start: DoubleDouble) -> None:
+    """A rate and a start."""
     out[place], out[place + 1], out[place + 2], out[place + 3] = rate[0], rate[1], start[0], start[1]
 
 
@@ -128,11 +139,8 @@ def _sign(x: DoubleDouble, vanishes: bool) -> float:
 
 
 @shared
-def move(
-    data: Data, sums: Sums, exact: Exact, points: TurningPoints, out: Any
-) -> tuple[int, DoubleDouble, DoubleDouble, DoubleDouble, DoubleDouble, DoubleDouble]:
-    """Constants of a moving axis: a status, period, growth at both poles, lags of both halves at the start."""
-    unknown = OUT_OF_RANGE, ZERO, ZERO, ZERO, ZERO, ZERO
+def move(data: Data, sums: Sums, exact: Exact, points: TurningPoints, out: Any) -> tuple[int, Mean]:
+    """Constants of a moving axis."""
     swing, stiffness, upright = points.swing, points.stiffness, data.mgl >= 0.0
     clear = (
         (exact.through_down or points.d1[0] > LEAST_GAP)
@@ -140,7 +148,7 @@ def move(
         and points.gap[0] > LEAST_GAP * stiffness[0]
     )
     if not (clear and swing[0] > LEAST_SWING and swing[0] > LEAST_SWING * max(points.d2[0], points.e1[0])):
-        return unknown
+        return OUT_OF_RANGE, Mean(ZERO, ZERO, ZERO, ZERO, ZERO)
     omega = scaled(root(stiffness), 0.5)
     m, m1 = div(mul(sums.lead, swing), stiffness), div(points.gap, stiffness)
     hyperbolic = m[0] > 0.5
@@ -209,4 +217,4 @@ def move(
     if data.theta_dot == 0.0:  # the start is a turning point
         low, high = (low, data.theta) if points.x1[0] == 0.0 else (data.theta, high)
     out[at.THETA_LOW], out[at.THETA_HIGH] = (low, high) if upright else (high, low)
-    return DONE, div(scaled(quarter, 2.0), omega), growth_down, growth_up, lag_down, lag_up
+    return DONE, Mean(div(scaled(quarter, 2.0), omega), growth_down, growth_up, lag_down, lag_up)

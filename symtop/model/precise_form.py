@@ -19,8 +19,8 @@ Degenerate tops. The coefficients of u'^2 about the starting point are sums of a
 fraction, and a multiple of cos theta. One that vanishes is therefore known to vanish (an axis that passes through a
 pole, a start on a turning point, a steady precession); every other gap between roots is a nonzero number that enough
 digits resolve, and the precision is doubled until they do. Data next to a separatrix have a large, finite period. The
-only separatrix (m = 1) that rational data can name starts at theta = 0 in a hanging top without twist, where cos theta is
-rational, too: theta'^2 I1 = 4 abs(mgl), and theta = 4 atan tanh(g t/2) from then on, g = Omega = sqrt(abs(mgl)/I1).
+only separatrix (m = 1) that rational data can name starts at theta = 0 in a hanging top without twist, where cos theta
+is rational, too: theta'^2 I1 = 4 abs(mgl), and theta = 4 atan tanh(g t/2) from then on, g = Omega = sqrt(abs(mgl)/I1).
 
 Conventions where angles are singular. If the axis passes exactly through a pole, the twist there is 0, its term is
 dropped, and phi and psi jump by pi there and back in turn. If the axis stands on a pole only phi + psi (phi - psi

@@ -5,13 +5,13 @@ For m <= 1/2, with k' = sqrt(1 - m), s = sqrt(k') and eps = m/(2 (1 + k')(1 + s)
     q = eps + 2 eps^5 + 15 eps^9 + 150 eps^13 + ...,      theta_3 = 1 + 2 q + 2 q^4 + ...,      K = (pi/2) theta_3^2.
 
 For m > 1/2 everything is done with 1 - m in place of m, and the roles of the real and the imaginary argument are
-exchanged (Jacobi); the nome is at most exp(-pi) either way. A number given as sn : cn, up to a common factor, is found as
+exchanged (Jacobi); the nome is at most exp(-pi) either way. A number given as sn : cn, up to a common factor, is found
+by Newton in double and one step whose residual is in double-double, from
 
-    real argument        sn s theta_2(z) = cn theta_1(z)                     z = pi tau/2K, by `real_argument`
-    imaginary argument   sn theta_4(i y) = cn kappa (sinh y - q^2 sinh 3y + ...)     sn, cn of the complementary modulus, by
-                                                                           `imaginary_argument`, unknown h = sinh y
+    sn s theta_2(z) = cn theta_1(z)                                   z = pi tau/2K,     `real_argument`
+    sn theta_4(i y) = cn kappa (sinh y - q^2 sinh 3y + ...)           unknown sinh y,    `imaginary_argument`
 
-with kappa = theta_3/(1 + q^2 + q^6 + ...), by Newton in double and one step whose residual is in double-double. The
+with sn, cn in the second line those of the complementary modulus and kappa = theta_3/(1 + q^2 + q^6 + ...). The
 residual is sn cn' - cn sn', the sine of a difference of amplitudes: the root keeps all its digits for y -> 0, for
 y -> pi K'/2K (cn -> 0) and for m -> 0. No arithmetic-geometric mean, no integrals of Carlson. Cost, compiled: 0.15 to
 0.3 us an inversion. Source: Whittaker and Watson, A Course of Modern Analysis, sections 21.1 to 21.8 and 22.

@@ -1,0 +1,320 @@
+"""Which arithmetic makes the constants of the closed form, what it is worth, and that compiling changes no bit."""
+
+import math
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from symtop.base.validate import SymtopError
+from symtop.model import (
+    closed_form,
+    half_angles,
+    motion_constants,
+    motion_layout as at,
+    motion_sums,
+    moving_axis,
+    quad_double,
+    theta_functions,
+    turning_points,
+)
+from symtop.model.closed_form import ClosedForm
+from symtop.model.precise_constants import precise_constants
+from symtop.model.precise_form import PreciseForm
+from symtop.model.scenes import grazing, scene, sleeping
+from symtop.model.top import Angles, SymmetricTop
+from tests.model.test_exact import MAKE, REGIMES, Draw
+
+EPS = float(np.finfo(float).eps)
+LINES = (at.PHI_LINE, at.PSI_LINE, at.PHI_TURNS, at.DOWN_TURNS, at.UP_TURNS)
+MARKS = (at.ARITHMETIC, at.RATE_ERROR, at.VALUE_ERROR)
+SEPARATRIX = SymmetricTop(1.0, 0.5, -1.0), Angles(0.0, theta_dot=2.0)
+
+
+def _tops(count, seed, kinds=REGIMES):
+    """`count` tops of each regime."""
+    for kind in kinds:
+        random = np.random.default_rng([seed, REGIMES.index(kind)])
+        for _ in range(count):
+            yield MAKE[kind](Draw(random))
+
+
+def _numbers(top, start):
+    rates = start.theta_dot, start.phi_dot, start.psi_dot
+    return top.I1, top.I3, top.mgl, start.theta, start.phi, start.psi, *rates
+
+
+def _short(top, start):
+    """The constants without the last resort, interpreted, and their status."""
+    out = [0.0] * at.SIZE
+    status = motion_constants.motion_constants(*_numbers(top, start), out)
+    return np.array(out), status
+
+
+def _deviation(ours, true):
+    """Errors of the rate of the phase (relative), its start, mean rates (over the largest), starts, doubles (ulp)."""
+
+    def apart(place):
+        return abs((ours[place] - true[place]) + (ours[place + 1] - true[place + 1]))
+
+    largest = max(abs(true[place]) for place in LINES) or 1.0
+    rate = apart(at.QUARTERS) / (abs(true[at.QUARTERS]) or 1.0)
+    means = max(apart(place) for place in LINES) / largest
+    starts = max(apart(place + 2) / max(1.0, abs(true[place + 2])) for place in LINES)
+    pairs = {place + k for place in (*LINES, at.QUARTERS) for k in range(4)} | set(MARKS)
+    units = 0.0
+    for place in set(range(at.SIZE)) - pairs:
+        x, y = ours[place], true[place]
+        if x != y and not (math.isnan(x) and math.isnan(y)):
+            noise = 1e-29 * max(1.0, largest)  # of numbers that vanish for a reason, such as b - a u at a cusp
+            units = max(units, max(abs(x - y) - noise, 0.0) / math.ulp(y))
+    return np.array([rate, apart(at.QUARTERS + 2), means, starts, units])
+
+
+def _limits(true):
+    """What is allowed: digits enough for 1e12 radians, starts better than a double by a hundred."""
+    return np.array([motion_constants.RATE, 2e-18, 1e-28, 1e-18, 1.0])
+
+
+def test_constants_are_those_of_forty_digits_in_every_regime():
+    for top, start in _tops(2, seed=21):
+        ours, status = _short(top, start)
+        assert status == moving_axis.DONE
+        deviation = _deviation(ours, precise_constants(top, start))
+        assert (deviation <= _limits(ours)).all(), (top, start, deviation)
+        assert deviation[0] <= ours[at.RATE_ERROR]
+
+
+def _double(monkeypatch):
+    """Double arithmetic in place of double-double."""
+    short = {
+        "add": lambda a, b: (a[0] + b[0], 0.0),
+        "sub": lambda a, b: (a[0] - b[0], 0.0),
+        "mul": lambda a, b: (a[0] * b[0], 0.0),
+        "div": lambda a, b: (a[0] / b[0], 0.0),
+        "square": lambda a: (a[0] * a[0], 0.0),
+        "root": lambda a: (math.sqrt(max(a[0], 0.0)), 0.0),
+    }
+    for module in (turning_points, theta_functions, half_angles, moving_axis, motion_constants, quad_double.dd):
+        for name, function in short.items():
+            if hasattr(module, name):
+                monkeypatch.setattr(module, name, function)
+
+
+def test_double_arithmetic_in_place_of_double_double_is_seen(monkeypatch):
+    tops = [("generic", *next(_tops(1, 22, ["generic"]))), ("grazes", *next(_tops(1, 22, ["grazes the top"])))]
+    for _, top, start in tops:
+        precise = precise_constants(top, start)
+        assert (_deviation(_short(top, start)[0], precise) <= _limits(precise)).all()
+        with monkeypatch.context() as patch:
+            _double(patch)
+            patch.setattr(motion_constants, "RATE", math.inf)
+            patch.setattr(motion_constants, "VALUE", math.inf)
+            ours, status = _short(top, start)
+        assert status == moving_axis.UNMET or _deviation(ours, precise)[0] > 1e-18
+
+
+def test_the_bound_sends_tops_to_quad_double_that_need_it(monkeypatch):
+    """With double-double sums alone the rates of some of them are wrong; the bound says so of every one."""
+    wrong, longer = 0, 0
+    for top, start in _tops(
+        4, 23, ["nearly steady", "near the separatrix", "threshold of sleep", "pendulum to the top"]
+    ):
+        ours, _ = _short(top, start)
+        if ours[at.ARITHMETIC] != at.QUAD_DOUBLE:
+            continue
+        longer += 1
+        true = precise_constants(top, start)
+        assert (_deviation(ours, true) <= _limits(ours)).all()
+        with monkeypatch.context() as patch:
+            patch.setattr(motion_constants, "long_sums", motion_sums.short_sums)
+            patch.setattr(motion_constants, "RATE", math.inf)
+            patch.setattr(motion_constants, "VALUE", math.inf)
+            short, status = _short(top, start)
+        assert status != moving_axis.DONE or max(short[at.RATE_ERROR], short[at.VALUE_ERROR]) > motion_constants.RATE
+        wrong += status != moving_axis.DONE or (_deviation(short, true) > _limits(true)).any()
+    assert longer >= 4
+    assert wrong >= 1
+
+
+def test_the_arithmetic_is_recorded():
+    assert ClosedForm(scene("spheroid").top, scene("spheroid").start).provenance.arithmetic == "double-double"
+    steady = scene("steady")
+    long = ClosedForm(steady.top, steady.start).provenance
+    assert long.arithmetic == "quad-double"
+    assert 0.0 <= long.rate_error < motion_constants.RATE
+    top = SymmetricTop(1.0, 0.5, 1.0)
+    far = ClosedForm(top, Angles(1.0, 3e12, 0.2, 0.3, 0.4, 0.5))
+    assert far.provenance.arithmetic == "40 digits"
+    assert far.provenance.rate_error == closed_form.DIGITS_ERROR
+    assert "range" in far.provenance.reason
+    asleep = ClosedForm(SymmetricTop(1.0, 1.0, 1.0), Angles(0.0, psi_dot=2.0))  # I3 w3 = 2 sqrt(I1 mgl)
+    assert asleep.provenance.arithmetic == "40 digits"
+    assert "tell the turning points apart" in asleep.provenance.reason
+    assert ClosedForm(*SEPARATRIX).provenance == ("double", 0.0, "")
+
+
+@pytest.mark.parametrize(
+    "named", [scene("spheroid"), scene("steady"), sleeping(2.05), sleeping(1.9), grazing(1e-4), grazing(-1e-12)]
+)
+def test_the_last_resort_gives_the_same_motion(named, monkeypatch):
+    times = np.linspace(-20.0, 1e3, 301)
+    ours = ClosedForm(named.top, named.start)
+    monkeypatch.setattr(closed_form, "motion_constants", lambda *_: moving_axis.UNMET)
+    monkeypatch.setattr(closed_form._build, "ready", lambda _: False)
+    digits = ClosedForm(named.top, named.start)
+    assert ours.provenance.arithmetic != digits.provenance.arithmetic == "40 digits"
+    for name in ("nutation_period", "phi_per_period", "psi_per_period", "theta_range"):
+        assert getattr(ours, name) == getattr(digits, name)
+    for one, other in zip(ours(times), digits(times), strict=True):
+        np.testing.assert_allclose(one, other, rtol=EPS, atol=4 * EPS)
+    np.testing.assert_allclose(ours.axis(times), digits.axis(times), rtol=0, atol=2 * EPS)
+
+
+# --------------------------------------------------------------------------------------------------- compiled
+
+
+def test_compiled_and_interpreted_functions_give_the_same_bits():
+    closed_form.compile_now()
+    times = np.array([0.0, 0.3, -17.1, 1e3, 1e6, 1e17])
+    for top, start in [*_tops(4, seed=24), SEPARATRIX]:
+        plain, status = _short(top, start)
+        out = np.empty(at.SIZE)
+        assert closed_form._build.compiled(*_numbers(top, start), out) == status
+        assert out.tobytes() == plain.tobytes()
+        if status != moving_axis.DONE:
+            continue
+        for view, width in enumerate(closed_form.WIDTHS):
+            shape = (width, times.size) if view == closed_form.MOTION else (times.size, width)
+            ours, theirs = np.empty(shape), np.empty(shape)
+            closed_form.samples(plain.tolist(), times.tolist(), view, ours)
+            closed_form._fill.compiled(out, times, view, theirs)
+            assert ours.tobytes() == theirs.tobytes()
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        (1.0, 0.5, 1.0, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0),
+        (1.0, 0.5, 1e-70, 1.0, 0.0, 0.0, 0.1, 0.2, 0.3),
+        (1e-40, 1e-40, 1e40, 1.0, 0.0, 0.0, 1e40, -1e40, 1e40),
+        (1.0, 0.5, 1.0, 1e-130, 0.0, 0.0, 0.0, 1e-59, 1e-59),
+        (1.0, 0.5, 1e40, 3.0, 0.0, 0.0, 1e-59, 0.0, 0.0),
+        (1e40, 1e40, 1e-59, 1.0, 0.0, 0.0, 1e-59, 1e40, 1e-59),
+    ],
+)
+def test_values_at_the_ends_of_the_range_end_in_a_status(numbers):
+    """Neither way raises, and both say the same."""
+    closed_form.compile_now()
+    plain, out = [0.0] * at.SIZE, np.empty(at.SIZE)
+    status = closed_form._build.compiled(*numbers, out)
+    assert motion_constants.motion_constants(*numbers, plain) == status
+    assert status == moving_axis.DONE or status in closed_form.REASONS
+
+
+def test_a_few_forms_import_neither_numba_nor_mpmath():
+    code = (
+        "import sys, symtop\n"
+        "for scene in symtop.scenes().values(): symtop.ClosedForm(scene.top, scene.start).axis([0.0, 1.0])\n"
+        "print(*({'numba', 'mpmath'} & set(sys.modules)))"
+    )
+    root = Path(__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
+    assert done.stdout.strip() == ""
+
+
+def test_many_samples_are_worth_compiling(monkeypatch):
+    kernel = closed_form.LazyKernel(closed_form.samples, closed_form._fill.arguments, patience=0.2)
+    monkeypatch.setattr(kernel, "_kept", lambda: False)
+    assert not kernel.ready(0.1)
+    monkeypatch.setattr(kernel, "compile", lambda: setattr(kernel, "compiled", True))
+    assert kernel.ready(0.11)
+    assert kernel.ready(0.0)
+
+
+# --------------------------------------------------------------------------------------------------- separatrix
+
+
+@pytest.mark.parametrize("rate", [2.0, -2.0])
+def test_the_exact_separatrix_climbs_for_ever(rate):
+    """theta = 4 atan tanh(g t/2), g = sqrt(abs(mgl)/I1), in double and in 40 digits; a pole is passed at time 0."""
+    top, start = SymmetricTop(4.0, 2.5, -4.0), Angles(0.0, 0.3, 0.2, rate, 0.7, -0.7)
+    form, precise, times = (
+        ClosedForm(top, start),
+        PreciseForm(top, start),
+        np.array([-30.0, -1.0, 0.0, 1e-9, 0.5, 3.0, 40.0]),
+    )
+    motion, axis = form(times), form.axis(times)
+    assert precise.climbs
+    assert form.nutation_period == precise.nutation_period == math.inf
+    assert form.theta_range == (0.0, math.pi)
+    assert form.phi_per_period == 0.0
+    for i, time in enumerate(times):
+        true = precise(time)
+        with mp.workdps(50):
+            assert abs(true.theta - 4 * mp.atan(mp.tanh(abs(mp.mpf(time)) / 2))) < 1e-28
+        for ours, theirs in zip(motion, true, strict=True):
+            assert abs(ours[i] - float(theirs)) <= 4 * EPS
+        np.testing.assert_allclose(axis[i], [float(x) for x in precise.axis(time)], atol=2 * EPS)
+    energy = 0.5 * top.I1 * motion.theta_dot**2 + top.mgl * np.cos(motion.theta)
+    np.testing.assert_allclose(energy, top.energy(start), rtol=4 * EPS)
+    assert np.sign(motion.theta_dot).tolist() == [-1.0, -1.0, math.copysign(1.0, rate), 1.0, 1.0, 1.0, 1.0]
+    np.testing.assert_allclose(
+        form.momentum(0.0), 4.0 * rate * np.array([math.cos(0.3), math.sin(0.3), 0.0]), rtol=4 * EPS
+    )
+
+
+def test_next_to_the_separatrix_the_motion_is_periodic():
+    top, start = SEPARATRIX
+    assert ClosedForm(top, start)(1.0).theta == pytest.approx(4.0 * math.atan(math.tanh(0.5)), rel=EPS)
+    for near in (math.nextafter(2.0, 0.0), math.nextafter(2.0, 3.0)):
+        form = ClosedForm(top, Angles(0.0, theta_dot=near))
+        assert 30.0 < form.nutation_period < 100.0
+        assert abs(form(1.0).theta - ClosedForm(top, start)(1.0).theta) < 1e-15
+    assert ClosedForm(top, Angles(0.0, theta_dot=2.0, psi_dot=1e-9)).nutation_period < 100.0
+
+
+# ---------------------------------------------------------------------------------------------- against 50 digits
+
+
+def _excess(top, start):
+    """Largest error over its allowance of theta, phi, psi and axis at 1, 1e3 and 1e6 nutations, and the arithmetic."""
+    form, precise = ClosedForm(top, start), PreciseForm(top, start, digits=50)
+    period = form.nutation_period if math.isfinite(form.nutation_period) else 1.0
+    times = period * np.array([1.0371, 1000.37, 1000000.37])
+    motion, axis, worst = form(times), form.axis(times), np.zeros((3, 4))
+    for i, time in enumerate(times):
+        true = precise(time)
+        worst[i] = [
+            float(abs(motion.theta[i] - true.theta)) / (1e-15 if true.theta < 2.0 else 2.0 * math.ulp(math.pi)),
+            float(abs(motion.phi[i] - true.phi) / (EPS * abs(true.phi) + 1e-15)),
+            float(abs(motion.psi[i] - true.psi) / (EPS * abs(true.psi) + 1e-15)),
+            float(max(abs(x - y) for x, y in zip(axis[i], precise.axis(time), strict=True))) / 1e-15,
+        ]
+    return worst, form.provenance.arithmetic
+
+
+@pytest.mark.slow
+def test_ten_thousand_tops_keep_the_accuracy_and_need_no_more_than_quad_double():
+    closed_form.compile_now()
+    arithmetic, motion, constants = Counter(), np.zeros((3, 4)), np.zeros(5)
+    for top, start in _tops(385, seed=25):  # 26 regimes
+        worst, served = _excess(top, start)
+        assert (worst <= 1.0).all(), (top, start, worst)
+        ours, _ = _short(top, start)
+        deviation = _deviation(ours, precise_constants(top, start))
+        assert (deviation <= _limits(ours)).all(), (top, start, deviation)
+        motion, constants = np.maximum(motion, worst), np.maximum(constants, deviation)
+        arithmetic[served] += 1
+    print(dict(arithmetic), motion, constants)
+    assert arithmetic["double-double"] > 0.7 * arithmetic.total()
+    assert arithmetic["40 digits"] == 0
+
+
+def test_a_top_that_no_arithmetic_serves_is_refused():
+    with pytest.raises(SymtopError, match="must meet a pole or miss it by 1e-145"):
+        ClosedForm(SymmetricTop(1.0, 0.5, 1.0), Angles(1e-160, 0.0, 0.0, 0.3, 0.4, 0.5))

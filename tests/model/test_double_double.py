@@ -1,0 +1,130 @@
+"""Double-double and quad-double against 100 digits, with double as the control."""
+
+import math
+import random
+from fractions import Fraction
+
+import mpmath as mp
+import pytest
+
+from symtop.base.parts import two_product
+from symtop.model import double_double as dd, elementary, quad_double as qd
+
+UNIT = 2.0**-106
+
+
+@pytest.fixture(autouse=True)
+def _digits():
+    with mp.workdps(100):
+        yield
+
+
+def _exact(number):
+    return sum((mp.mpf(part) for part in number), mp.mpf(0))
+
+
+def _error(number, true):
+    return float(abs((_exact(number) - true) / true))
+
+
+def _pair(draw):
+    high = draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-20.0, 20.0)
+    return dd.ordered_sum(high, draw.uniform(-0.5, 0.5) * math.ulp(high))
+
+
+def _four(draw):
+    high = draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-10.0, 10.0)
+    parts = [high]
+    for _ in range(3):
+        parts.append(draw.uniform(-0.5, 0.5) * math.ulp(parts[-1]))
+    return tuple(parts)
+
+
+def test_sum_and_product_of_two_doubles_are_exact():
+    draw = random.Random(1)
+    for _ in range(2000):
+        a, b = (draw.uniform(-1.0, 1.0) * 10.0 ** draw.uniform(-30.0, 30.0) for _ in range(2))
+        assert sum(map(Fraction, dd.two_sum(a, b))) == Fraction(a) + Fraction(b)
+        assert sum(map(Fraction, two_product(a, b))) == Fraction(a) * Fraction(b)
+    assert Fraction(0.1 * 0.1) != Fraction(0.1) ** 2  # the control: a rounded product is not
+
+
+@pytest.mark.parametrize(
+    ("ours", "true", "units"),
+    [
+        (dd.add, lambda a, b: a + b, 3),
+        (dd.sub, lambda a, b: a - b, 3),
+        (dd.mul, lambda a, b: a * b, 6),
+        (dd.div, lambda a, b: a / b, 10),
+    ],
+    ids=["add", "sub", "mul", "div"],
+)
+def test_double_double_is_right_to_a_few_units(ours, true, units):
+    draw = random.Random(2)
+    for number in range(2000):
+        a, b = _pair(draw), _pair(draw)
+        if number % 2:  # so close that most digits cancel
+            b = dd.ordered_sum(-a[0], draw.uniform(-0.5, 0.5) * math.ulp(a[0]))
+        exact = true(_exact(a), _exact(b))
+        if exact:
+            assert _error(ours(a, b), exact) <= units * UNIT
+    assert _error((0.1 / 3.0,), mp.mpf(0.1) / 3) > 1e6 * UNIT
+
+
+def test_square_root_and_rounding():
+    draw = random.Random(3)
+    for _ in range(1000):
+        a = tuple(map(abs, _pair(draw)))
+        assert _error(dd.root(a), mp.sqrt(_exact(a))) <= 4 * UNIT
+        assert dd.square(a) == dd.mul(a, a)
+    assert dd.root((-1.0, 0.0)) == (0.0, 0.0)
+    for x in (0.5, 1.5, 2.5, -0.5, 3.49, 1e15 + 0.5, 3e17, -7.0):
+        assert dd.whole_part(x) == round(x)
+
+
+def test_elementary_functions_of_double_doubles():
+    draw = random.Random(4)
+    for _ in range(500):
+        x = draw.choice([-1.0, 1.0]) * min(10.0 ** draw.uniform(-12.0, 0.798), 6.28)
+        for ours, true in zip(elementary.sincos(x), (mp.sin(x), mp.cos(x)), strict=True):
+            assert _error(ours, true) <= 8 * UNIT
+        a, b = _pair(draw), _pair(draw)
+        assert _error(elementary.arctan2(a, b), mp.atan2(_exact(a), _exact(b))) <= 12 * UNIT
+        power = draw.uniform(-300.0, 300.0)
+        assert _error(elementary.exp(power), mp.exp(power)) <= 4 * UNIT
+        size = dd.scaled(a, math.copysign(1.0, a[0]))
+        assert abs(_exact(elementary.log(size)) - mp.log(_exact(size))) <= 8 * UNIT * max(1.0, abs(math.log(size[0])))
+    near = math.pi  # its sine is the rounding error of pi: all digits but those of the third double of pi/2 cancel
+    assert _error(elementary.sincos(near)[0], mp.sin(near)) <= 8 * UNIT
+    assert math.isnan(elementary.sincos(math.nan)[0][0])
+    assert math.isnan(elementary.sincos(7.5)[1][0])
+    assert math.isnan(elementary.exp(800.0)[0])
+
+
+def test_quad_double_is_right_to_sixty_digits():
+    draw = random.Random(5)
+    for number in range(500):
+        a, b = _four(draw), _four(draw)
+        if number % 2:
+            b = (-a[0], *b[1:])
+            b = (b[0], *(draw.uniform(-0.5, 0.5) * math.ulp(a[0]) * 2.0 ** (-53 * k) for k in range(3)))
+        terms = abs(_exact(a)) + abs(_exact(b))
+        assert float(abs(_exact(qd.add(a, b)) - _exact(a) - _exact(b)) / terms) <= 2.0**-204
+        assert _error(qd.mul(a, b), _exact(a) * _exact(b)) <= 2.0**-203
+        x = draw.uniform(0.0, 1.57)
+        for ours, true in zip(qd.sincos(x), (mp.sin(x), mp.cos(x)), strict=True):
+            assert _error(ours, true) <= 1e-62
+            assert _error(qd.narrowed(ours), true) <= UNIT
+    assert _error(dd.mul((0.1, 0.0), (0.3, 1e-18)), mp.mpf(0.1) * (mp.mpf(0.3) + mp.mpf(1e-18))) > 1e-40  # the control
+
+
+def test_one_formula_serves_both_kinds():
+    a, b = (0.1, 1e-18), (0.3, -2e-18)
+    for ours in (qd.plus, qd.minus, qd.times):
+        short, long = ours(a, b), ours(qd.widened(a), qd.widened(b))
+        assert len(short) == 2
+        assert len(long) == 4
+        assert abs(_exact(short) - _exact(long)) < 1e-31
+        assert abs(_exact(qd.narrowed(long)) - _exact(long)) < 1e-32
+    assert qd.like(a, b) == b
+    assert qd.like(qd.widened(a), b) == qd.widened(b)
