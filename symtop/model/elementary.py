@@ -9,7 +9,8 @@ residual alone is in double-double:
     atan2(y, x)     a + (y cos a - x sin a)/(x cos a + y sin a),  a = atan2 of the high parts
 
 The nodes' tables hold four doubles a value (for `symtop.model.quad_double`) and are made on import from integers of 400
-bits, in 2 ms. Relative errors, measured: sin, cos 3e-32, atan2 6e-32, exp 2e-32, log 6e-32. Cost, compiled: 75 to 140 ns. Not for large arguments: `sincos` takes abs(x) <= 2 pi, `exp` abs(x) < 700.
+bits, in 2 ms. Relative errors, measured: sin, cos 3e-32, atan2 6e-32, exp 2e-32, log 6e-32. Cost, compiled: 75 to 140
+ns. Not for large arguments: `sincos` takes abs(x) <= 2 pi (not a number beyond 7), `exp` abs(x) <= 700.
 """
 
 import math
