@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import kernels, measured, startup, targets, twin
+from benchmarks import kernels, measured, startup, targets, truth, twin
 from symtop.runner import store
 from symtop.runner.study import Table
 
@@ -17,6 +17,7 @@ from symtop.runner.study import Table
 def findings(
     rows: Sequence[kernels.Row],
     started: Mapping[str, float],
+    forms: Sequence[truth.Row],
     reached: Sequence[targets.Reached],
     accuracy: float,
     facts: Mapping[str, Any],
@@ -52,6 +53,11 @@ def findings(
             ["method", "steps", "us", "steps of stormer-verlet"],
             reached_rows,
         ),
+        Table(
+            "The closed form",
+            ["call", "median us", "99 % below, us"],
+            [[row.name, f"{row.median * 1e6:.3g}", f"{row.slow * 1e6:.3g}"] for row in forms],
+        ),
         Table("Starting", ["what", "ms"], [[name, f"{seconds * 1e3:.2f}"] for name, seconds in started.items()]),
     ]
     return {
@@ -86,17 +92,24 @@ def main() -> None:
     facts = measured.circumstances()
     rows = kernels.measure()
     started = startup.measure()
+    forms = truth.measure()
     reached = targets.measure(options.accuracy)
-    for table in (kernels.lines(rows), startup.lines(started), targets.lines(reached, options.accuracy)):
+    for table in (
+        kernels.lines(rows),
+        startup.lines(started),
+        truth.lines(forms),
+        targets.lines(reached, options.accuracy),
+    ):
         print("\n".join(table), end="\n\n")
     options.results.mkdir(exist_ok=True)
     target = options.results / "bench.json"
     numbers = {
         "kernels": [row._asdict() for row in rows],
         "startup": started,
+        "closed_form": [row._asdict() for row in forms],
         "targets": {"accuracy": options.accuracy, "methods": [row._asdict() for row in reached]},
     }
-    store.write_json(target, findings(rows, started, reached, options.accuracy, facts) | numbers)
+    store.write_json(target, findings(rows, started, forms, reached, options.accuracy, facts) | numbers)
     print(f"written to {target}")
 
 

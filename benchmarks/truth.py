@@ -1,0 +1,83 @@
+"""The closed form: set-up and one sample, by the arithmetic of its constants, and a sample among many.
+
+Set-up and one sample are timed call by call, each on a top of its own, so that the median and the slow end are those of
+single forms. Samples among many are timed in batches.
+"""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from symtop.measure.timing import timings
+from symtop.model import closed_form
+from symtop.model.closed_form import ClosedForm
+from symtop.model.precise_form import PreciseForm
+from symtop.model.scenes import sleeping, spinning, steady
+from symtop.model.top import Angles, SymmetricTop
+
+COUNT, MANY, BATCHES = 2000, 10_000, 15
+
+
+class Row(NamedTuple):
+    """Seconds of one kind of call."""
+
+    name: str
+    median: float
+    slow: float  # 99 % of the calls take less
+
+
+def _tops(arithmetic: str, count: int, seed: int = 1) -> list[tuple[SymmetricTop, Angles]]:
+    """Tops whose constants come from this arithmetic: generic ones, and precessions that are all but steady."""
+    random, drawn = np.random.default_rng(seed), []
+    while len(drawn) < count:
+        I1, mgl, theta, turn, spin = (float(x) for x in random.uniform(0.2, 2.5, 5))
+        if arithmetic == "quad-double":
+            spin = (I1 * turn**2 * np.cos(theta) + mgl) / (0.7 * I1 * turn) - turn * np.cos(theta)
+        pair = SymmetricTop(I1, 0.7 * I1, mgl), Angles(theta, 0.1, 0.2, 0.0, turn, float(spin))
+        if ClosedForm(*pair).provenance.arithmetic == arithmetic:
+            drawn.append(pair)
+    return drawn
+
+
+def _each(name: str, calls: list[float]) -> Row:
+    return Row(name, float(np.median(calls)), float(np.quantile(calls, 0.99)))
+
+
+def _timed(tops: list[tuple[SymmetricTop, Angles]]) -> list[float]:
+    """Seconds of set-up and one sample of the axis, once for each top, after a round that is not counted."""
+    when, clock = np.array([1.25]), time.perf_counter
+    taken = []
+    for _ in range(2):
+        taken = []
+        for top, start in tops:
+            begun = clock()
+            ClosedForm(top, start).axis(when)
+            taken.append(clock() - begun)
+    return taken
+
+
+def measure() -> list[Row]:
+    """Set-up and one sample in each arithmetic, then one sample among many."""
+    closed_form.compile_now()
+    rows = [
+        _each(f"set-up and one sample, {kind}", _timed(_tops(kind, COUNT))) for kind in ("double-double", "quad-double")
+    ]
+    begun = time.perf_counter()
+    for scene in (sleeping(2.05), spinning(3.0), steady(5.0)):
+        PreciseForm(scene.top, scene.start, digits=40)
+    rows.append(Row("set-up in 40 digits, for comparison", (time.perf_counter() - begun) / 3, np.nan))
+    form, times = ClosedForm(*_tops("double-double", 1)[0]), np.linspace(0.0, 1e3, MANY)
+    views = {"axis": form.axis, "quaternion": form.quaternion, "angles and rates": form, "state": form.state}
+    taken = timings([lambda view=view: view(times) for view in views.values()], batches=BATCHES)
+    rows += [
+        Row(f"one sample among many, {name}", timing.best / MANY, max(timing.samples) / MANY)
+        for name, timing in zip(views, taken, strict=True)
+    ]
+    return rows
+
+
+def lines(rows: list[Row]) -> list[str]:
+    """The table."""
+    head = f"{'closed form':<50}{'median us':>12}{'99 % us':>12}"
+    return [head] + [f"{row.name:<50}{row.median * 1e6:>12.3f}{row.slow * 1e6:>12.3f}" for row in rows]
