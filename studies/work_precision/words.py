@@ -96,8 +96,8 @@ def beside(data: xr.Dataset) -> str:
         before, each = (data[key].sel(integrator=name).values for key in ("set_up_seconds", "sample_seconds"))
         if np.isfinite(before).any():
             said.append(
-                f"{name} is not ranked, because errors are measured by it. Whatever the horizon, its set-up, constants "
-                f"in 40 digits, takes {seconds(float(np.nanmin(before)))} to {seconds(float(np.nanmax(before)))}, and "
+                f"{name} is not ranked, because errors are measured by it. Whatever the horizon, its constants "
+                f"take {seconds(float(np.nanmin(before)))} to {seconds(float(np.nanmax(before)))}, and "
                 f"each sample {seconds(float(np.nanmedian(each)))}."
             )
     return " ".join(said)

@@ -270,7 +270,7 @@ class SymmetricTop:
             gained += weight * (0.5 * (x - y)) ** 2
             weight *= 2.0
             x, y = 0.5 * (x + y), math.sqrt(x * y)
-        return y, gained
+        return (y if x > 0.0 else 0.0), gained  # x = 0: a hanging top on its separatrix
 
     def _cubic(self, at: Angles) -> tuple[float, float, float, float]:
         """alpha - beta cos(theta), beta, a and b of Goldstein's nutation cubic."""

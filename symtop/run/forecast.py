@@ -72,7 +72,7 @@ def _landmarks(top: SymmetricTop, at: Angles) -> Landmarks:
 
 
 def landmarks(scene: Scene) -> Landmarks:
-    """The landmarks of a scene's motion; made once (20 ms, most of it the closed form) and kept."""
+    """The landmarks of a scene's motion; made once and kept."""
     return _landmarks(scene.top, scene.start)
 
 

@@ -10,6 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+import symtop
 from symtop.base.validate import SymtopError
 from symtop.model import (
     closed_form,
@@ -268,8 +269,21 @@ def test_the_exact_separatrix_climbs_for_ever(rate):
     )
 
 
+def test_a_scene_on_the_separatrix_is_simulated_and_has_a_reference(monkeypatch, tmp_path):
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    climbing = symtop.Scene("climbing", *SEPARATRIX, 5.0)
+    run = symtop.simulate(climbing, "strang", step_size=0.01)
+    assert run.attrs["outcome"] == "ok"
+    true = 4.0 * np.arctan(np.tanh(0.5 * run["time"].values))
+    assert np.abs(np.arccos(run["axis"].values[:, 2]) - true).max() < 1e-3
+    truth = symtop.reference(climbing, [0.0, 1.0, 5.0], precision="closed-form")
+    np.testing.assert_allclose(truth["theta"], 4.0 * np.arctan(np.tanh([0.0, 0.5, 2.5])), atol=4 * EPS)
+    assert truth["theta_error_bound"].max() < 1e-13
+
+
 def test_next_to_the_separatrix_the_motion_is_periodic():
     top, start = SEPARATRIX
+    assert top.nutation_period(start) == ClosedForm(top, start).nutation_period == math.inf
     assert ClosedForm(top, start)(1.0).theta == pytest.approx(4.0 * math.atan(math.tanh(0.5)), rel=EPS)
     for near in (math.nextafter(2.0, 0.0), math.nextafter(2.0, 3.0)):
         form = ClosedForm(top, Angles(0.0, theta_dot=near))
