@@ -151,13 +151,14 @@ PAGES = {
     "splitting-high-order": "splitting methods above order 4 in charts without poles",
     "runge-kutta": "explicit Runge-Kutta methods of fixed step",
     "gauss": "Gauss methods",
-    "adaptive": "adaptive methods and the exact solution",
+    "adaptive-angles": "adaptive methods in the angles chart",
+    "adaptive-space": "adaptive methods in charts without poles, and the exact solution",
     "other": "other methods",
 }
 
 
 def pages(names: Sequence[str]) -> dict[str, list[str]]:
-    """The integrators of the atlas by page: one a family, the large splitting family in three."""
+    """The integrators of the atlas by page: one a family, or several where it is large."""
     by_page: dict[str, list[str]] = {}
     for name in names:
         method = integrator(name) if split_name(name)[0] in integrators() else None
@@ -168,6 +169,6 @@ def pages(names: Sequence[str]) -> dict[str, list[str]]:
         elif method and page == "runge-kutta" and method.symmetric:
             page = "gauss"
         elif method and not method.fixed_step:
-            page = "adaptive"
+            page = "adaptive-angles" if method.charts() == ("angles",) else "adaptive-space"
         by_page.setdefault(page, []).append(name)
     return by_page

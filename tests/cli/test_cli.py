@@ -48,8 +48,8 @@ def test_tables_are_complete_and_json_is_json():
         (["run", "spheroid", "midpoint"], "needs --step-size"),
         (["run", "spheroid", "rk4[axis]"], "rk4[axis] has a fixed step and needs --step-size"),
         (
-            ["run", "spheroid", "rk4[attitude]", "--step-size", "0.1"],
-            "chart of rk4 'attitude' is unknown; known: angles",
+            ["run", "spheroid", "midpoint[attitude]", "--step-size", "0.1"],
+            "chart of midpoint 'attitude' is unknown; known: angles",
         ),
         (["run", "spheroid", "rk4[axs]", "--step-size", "0.1"], "did you mean axis"),
         (["run", "spheroid", "rk5[axis]", "--step-size", "0.1"], "did you mean rk45"),

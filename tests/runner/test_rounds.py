@@ -92,7 +92,11 @@ def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, 
 def timed(tmp_path_factory):
     """The study that times methods, with two of them on one scene, and its results."""
     whole, results = runner.load("work_precision"), tmp_path_factory.mktemp("timed")
-    few = [one for one in whole.cases(True) if one.scene == "spheroid" and one.integrator in ("midpoint", "strang")]
+    few = [
+        one
+        for one in whole.cases(True)
+        if one.scene == "spheroid" and one.integrator in ("midpoint[angles]", "strang[axis]")
+    ]
     said = {"pictures": lambda _: [], "tables": lambda _: [], "charts": lambda _: [], "verdict": lambda _: ["It ran."]}
     small = dataclasses.replace(whole, cases=lambda _: few, opening=None, **said)
     assert runner.run(small, results, quiet=True)["failures"] == []
@@ -128,7 +132,7 @@ def survives(settings: dict) -> bool:
 
 def test_a_record_among_settings_is_noticed():
     assert survives({"runs": [["midpoint", 0, 0.1, (1, 2)]], "longest": math.nan, "none": None})
-    assert not survives({"runs": [TimedRun("midpoint", 0, 0, 0.1, (1, 2))]})
+    assert not survives({"runs": [TimedRun("midpoint[angles]", 0, 0, 0.1, 100.0, 50.0, (1, 2))]})
     assert not survives({"counts": {1: "one"}})
 
 
