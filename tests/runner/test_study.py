@@ -416,16 +416,16 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
 
     unlucky = Integrator(name="unlucky", family="other", summary="", solvers={"angles": solve})
     whole = runner.load("stability")
-    cases = [case for case in whole.cases(True) if case.scene == "goldstein" and case.integrator == "midpoint"]
-    cases.append(dataclasses.replace(cases[0], integrator="unlucky"))
+    cases = [case for case in whole.cases(True) if case.scene == "goldstein" and case.integrator == "midpoint[angles]"]
+    cases.append(dataclasses.replace(cases[0], integrator="unlucky[angles]"))
     small = dataclasses.replace(whole, cases=lambda quick: cases)
     symtop.register(unlucky)
     try:
         found = runner.run(small, tmp_path, quick=True, quiet=True)
     finally:
         registry._registry.pop("unlucky")
-    assert found["failures"] == ["unlucky on goldstein failed: RuntimeError: no luck"]
-    assert list(datasets.read(tmp_path / "stability.nc")["integrator"].values) == ["midpoint"]
+    assert found["failures"] == ["unlucky[angles] on goldstein failed: RuntimeError: no luck"]
+    assert list(datasets.read(tmp_path / "stability.nc")["integrator"].values) == ["midpoint[angles]"]
     assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten
 
 
