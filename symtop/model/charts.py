@@ -94,25 +94,6 @@ def transverse_from_quaternion(quaternion: Array) -> Array:
     return np.stack([w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)], axis=-1)
 
 
-def quaternion_from_frame(axis: Array, transverse: Array) -> Array:
-    """Unit quaternion of the body whose third and first axes are given, shape (..., 4); the sign is arbitrary.
-
-    Every row of 4 q q^T is a multiple of q; the row with the largest diagonal loses no digits (Shepperd 1978).
-    """
-    a, b, e = (np.moveaxis(column, -1, 0) for column in (transverse, np.cross(axis, transverse), axis))
-    rows = (
-        (1.0 + a[0] + b[1] + e[2], b[2] - e[1], e[0] - a[2], a[1] - b[0]),
-        (b[2] - e[1], 1.0 + a[0] - b[1] - e[2], a[1] + b[0], a[2] + e[0]),
-        (e[0] - a[2], a[1] + b[0], 1.0 - a[0] + b[1] - e[2], b[2] + e[1]),
-        (a[1] - b[0], a[2] + e[0], b[2] + e[1], 1.0 - a[0] - b[1] + e[2]),
-    )
-    products = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-    best = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
-    row = np.take_along_axis(products, best[..., None, None], axis=-2)[..., 0, :]
-    unit: Array = row / np.sqrt(np.sum(row * row, axis=-1, keepdims=True))
-    return unit
-
-
 def theta_from_axis(axis: Array) -> Array:
     """Inclination in [0, pi], accurate at both poles and for axes that are not quite of length one."""
     return np.arctan2(np.sqrt(axis[..., 0] ** 2 + axis[..., 1] ** 2), axis[..., 2])
