@@ -185,8 +185,6 @@ def driver(  # noqa: C901  (one loop, read in one piece)
         kind: Callable[..., Any], numbers: Callable[..., Any], scale: Callable[..., Any], sample: Callable[..., Any]
     ) -> Callable[..., tuple[int, int, int]]:
         march = register_jitable(marching(sample))
-        for part in (numbers, scale, sample):
-            register_jitable(part)
 
         def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
             top, at = Body(*plain[:3]), Start(*plain[3:])

@@ -60,6 +60,9 @@ class Preparation:
     size: int  # of the state
     check: Callable[[Angles], None] | None = None
 
+    def __post_init__(self) -> None:
+        register_jitable(self.numbers)  # at once: what a kernel is made of must not hang on what has run
+
     def __call__(self, top: SymmetricTop, at: Angles) -> tuple[Any, Numbers]:
         """Kernel parameters and state of a start."""
         if self.check is not None:
@@ -70,8 +73,6 @@ class Preparation:
 @functools.cache
 def _on_numbers(scale: Callable[..., Any], kind: Callable[..., Any]) -> Any:
     """`scale` by itself, compiled: between plain numbers and a rule."""
-    register_jitable(scale)
-
     def scaled(body, rule, h):  # type: ignore[no-untyped-def]
         return scale(kind(*rule), Body(*body), h)
 
@@ -85,6 +86,9 @@ class Scaled:
     rule: Any  # a NamedTuple
     scale: Callable[..., Any]
     fit: Callable[..., Any] | None = None
+
+    def __post_init__(self) -> None:
+        register_jitable(self.scale)
 
     def __call__(self, top: SymmetricTop, at: Angles, h: float) -> Any:
         """The rule of one run."""
@@ -110,8 +114,6 @@ class Later:
 @functools.cache
 def _on_samples(sample: Callable[..., Any], kind: Callable[..., Any]) -> Any:
     """`sample` for many samples, compiled."""
-    register_jitable(sample)
-
     def shown(par, times, states, out):  # type: ignore[no-untyped-def]
         top = kind(*par)
         for i in range(len(times)):
@@ -128,6 +130,9 @@ class Shown:
 
     sample: Callable[..., Any]
     size: int
+
+    def __post_init__(self) -> None:
+        register_jitable(self.sample)
 
     def __call__(self, par: Any, times: Array, states: Array) -> Array:
         """States of the chart, shape (samples, size), of states of the kernel."""

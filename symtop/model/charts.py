@@ -146,8 +146,11 @@ def angles_from_attitude(top: SymmetricTop, state: Array) -> Angles:
 def axis_distance(first: Array, second: Array, low: Array | float = 0.0) -> Array:
     """Angle between two axes in radians, shape (...), to 1e-16 however small; `second` may have a low half."""
     gap = (first - second) - low  # exact before the low half where the two are close; a x b = (a - b) x b
-    cross = np.cross(gap, second)
-    angle: Array = np.arctan2(np.sqrt(np.sum(cross * cross, axis=-1)), np.sum(first * second, axis=-1))
+    (a, b, c), (x, y, z), (u, v, w) = (np.moveaxis(part, -1, 0) for part in (first, second, gap))
+    # by components: `np.cross` and sums of three take 25 us more for 300 axes, and the guard compares so many
+    cross = v * z - w * y, w * x - u * z, u * y - v * x
+    sine = np.sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2])
+    angle: Array = np.arctan2(sine, a * x + b * y + c * z)
     return angle
 
 
