@@ -194,8 +194,8 @@ def _checked(method: Integrator, chart: str, plan: Plan, run: object) -> Run:
         raise SymtopError(
             f"integrator {method.name} must return p_phi and p_psi of shape {shape[:1]} and an outcome of {outcomes}"
         )
-    whole: Any = np.isfinite(run.states).all(axis=1)
-    if run.outcome == "ok" and not whole.all():
+    if run.outcome == "ok" and not np.isfinite(run.states).all():
+        whole: Any = np.isfinite(run.states).all(axis=1)
         reached = float(plan.times[int(np.argmin(whole)) - 1]) if whole[0] else 0.0
         return run._replace(outcome="not_finite", reached=reached)
     return run
