@@ -63,7 +63,7 @@ def _put_together(times: Any, columns: Mapping[str, Any]) -> xr.Dataset:
         variables[name] = _variable(xr.Variable, dims, values)
         sizes[dims[-1]] = values.shape[-1]
     clock = xr.indexes.PandasIndex(pd.Index(times, name="time"), "time", times.dtype, fastpath=True)
-    indexes = {"time": clock}
+    indexes: dict[Any, Any] = {"time": clock}
     variables |= clock.create_variables()
     for name in _parts(columns):
         indexes[name], labels, sizes[name] = _labels(name)

@@ -103,8 +103,9 @@ class Loop:
 
     A run records the state after ``marks[j]`` steps for each j (increasing whole numbers; a mark at 0 records the
     start). `begun` and `advance` do the same in stretches, and the bits do not depend on where a stretch ends.
-    ``whole(kind, prepare, scale, sample)`` is a run in one compiled call, `run(numbers, rule, h, marks, states, momenta)`
-    from the plain numbers of `symtop.methods.preparation` to filled arrays; it returns steps, work and outcome.
+    ``whole(kind, prepare, scale, sample)`` is a run in one compiled call, from the plain numbers of
+    `symtop.methods.preparation` to filled arrays: ``run(numbers, rule, h, marks, states, momenta)`` returns steps, work
+    and outcome.
     """
 
     begin: Callable[..., Any]
@@ -203,7 +204,8 @@ def driver(  # noqa: C901  (one loop, read in one piece)
             momenta[max(j, int(marks[0] == 0)) :] = np.nan
             return k, work, outcome
 
-        return compile_kernel(run)
+        compiled: Callable[..., tuple[int, int, int]] = compile_kernel(run)
+        return compiled
 
     @functools.cache
     def plain() -> Loop:

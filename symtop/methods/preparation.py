@@ -71,8 +71,9 @@ class Preparation:
 
 
 @functools.cache
-def _on_numbers(scale: Callable[..., Any], kind: Callable[..., Any]) -> Any:
+def _on_numbers(scale: Callable[..., Any], kind: Any) -> Any:
     """`scale` by itself, compiled: between plain numbers and a rule."""
+
     def scaled(body, rule, h):  # type: ignore[no-untyped-def]
         return scale(kind(*rule), Body(*body), h)
 
@@ -92,7 +93,8 @@ class Scaled:
 
     def __call__(self, top: SymmetricTop, at: Angles, h: float) -> Any:
         """The rule of one run."""
-        compiled = _on_numbers(self.scale, type(self.rule))
+        kind: Any = type(self.rule)
+        compiled = _on_numbers(self.scale, kind)
         return compiled((top.I1, top.I3, top.mgl), tuple(self.fitted(top, at, h)), h)
 
     def fitted(self, top: SymmetricTop, at: Angles, h: float) -> Any:
@@ -106,14 +108,15 @@ class Later:
 
     make: Callable[[], Any]
 
-    def __call__(self, top: SymmetricTop, at: Angles, h: float) -> Any:
+    def __call__(self, *_run: object) -> Any:
         """The rule of any run."""
         return self.make()
 
 
 @functools.cache
-def _on_samples(sample: Callable[..., Any], kind: Callable[..., Any]) -> Any:
+def _on_samples(sample: Callable[..., Any], kind: Any) -> Any:
     """`sample` for many samples, compiled."""
+
     def shown(par, times, states, out):  # type: ignore[no-untyped-def]
         top = kind(*par)
         for i in range(len(times)):
@@ -137,9 +140,9 @@ class Shown:
     def __call__(self, par: Any, times: Array, states: Array) -> Array:
         """States of the chart, shape (samples, size), of states of the kernel."""
         out = np.empty((len(times), self.size))
-        _on_samples(self.sample, type(par))(
-            tuple(par), np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states), out
-        )
+        kind: Any = type(par)
+        flat_times, flat_states = np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states)
+        _on_samples(self.sample, kind)(tuple(par), flat_times, flat_states, out)
         return out
 
 

@@ -27,8 +27,8 @@ from numpy.typing import ArrayLike
 from symtop.base import datasets, fingerprint, imports
 from symtop.base.cache import cache_root
 from symtop.base.multiprecision import context
-from symtop.base.over_time import over_time
 from symtop.base.numbers import EPSILON, TINY
+from symtop.base.over_time import over_time
 from symtop.base.validate import SymtopError, SymtopWarning, one_of
 from symtop.methods import taylor
 from symtop.model import charts

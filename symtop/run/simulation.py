@@ -34,9 +34,9 @@ STRETCHES = 17  # of a nutation: two of them are less than `WIDEST_GAP`
 
 
 def _unseen(times: Any, period: float) -> float:
-    """The widest stretch of nutation phases, as a fraction of a period, in which no sample falls; an upper bound will do.
+    """The widest stretch of nutation phases, as a fraction of a period, in which no sample falls, or a bound of it.
 
-    Where each of 17 equal stretches has a sample, none of 2/17 is without, and nothing is sorted.
+    Where each of 17 equal stretches has a sample, none of 2/17 is without one, and nothing is sorted.
     """
     phases = np.mod(times / period, 1.0)
     if np.bincount((STRETCHES * phases).astype(np.int64), minlength=STRETCHES)[:STRETCHES].all():
