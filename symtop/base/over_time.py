@@ -62,9 +62,10 @@ def _put_together(times: Any, columns: Mapping[str, Any]) -> xr.Dataset:
         dims = ("time",) if values.ndim == 1 else _DIMS[values.shape[1]]
         variables[name] = _variable(xr.Variable, dims, values)
         sizes[dims[-1]] = values.shape[-1]
-    clock = xr.indexes.PandasIndex(pd.Index(times, name="time"), "time", times.dtype, fastpath=True)
-    indexes: dict[Any, Any] = {"time": clock}
-    variables |= clock.create_variables()
+    clock = pd.Index._simple_new(times.copy(), name="time")
+    indexes = {"time": xr.indexes.PandasIndex(clock, "time", times.dtype, fastpath=True)}
+    adapter: Any = type(_labels("component")[1])
+    variables["time"] = _variable(xr.IndexVariable, ("time",), adapter(clock), {})
     for name in _parts(columns):
         indexes[name], labels, sizes[name] = _labels(name)
         variables[name] = _variable(xr.IndexVariable, (name,), labels, {})

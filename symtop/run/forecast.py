@@ -125,8 +125,10 @@ def _probe(
     with np.errstate(all="ignore"):
         axis = View(chart, scene.top, np.asarray(run.states)).axis
         error = charts.axis_distance(axis, form.axis(since + piece.times))
-    error[~np.isfinite(error)] = math.inf
-    outcome = "not_finite" if run.outcome == "ok" and not np.isfinite(error).all() else run.outcome
+    outcome = run.outcome
+    if not (finite := np.isfinite(error)).all():
+        error[~finite] = math.inf
+        outcome = "not_finite" if outcome == "ok" else outcome
     return Probe(piece.times, error, outcome, since + run.reached)
 
 
