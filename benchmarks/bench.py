@@ -80,7 +80,7 @@ def findings(
         "verdict": [
             *said,
             f"`simulate` takes {took['simulate']:.0f} us for {whole_run.STEPS} steps of {whole_run.METHOD} on "
-            f"{whole_run.SCENE}: {took['solver, every step shown']:.0f} in the solver and {took['guard']:.0f} in the guard.",
+            f"{whole_run.SCENE}: {took['solver, every step shown']:.0f} in the solver, {took['guard']:.0f} in the guard.",
             f"A run of one step takes {one_step[slowest] * 1e6:.1f} us at most, with {slowest}.",
         ],
         "tables": [table._asdict() for table in tables],

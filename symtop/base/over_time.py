@@ -63,7 +63,7 @@ def _put_together(times: Any, columns: Mapping[str, Any]) -> xr.Dataset:
         variables[name] = _variable(xr.Variable, dims, values)
         sizes[dims[-1]] = values.shape[-1]
     clock = pd.Index._simple_new(times.copy(), name="time")
-    indexes = {"time": xr.indexes.PandasIndex(clock, "time", times.dtype, fastpath=True)}
+    indexes: dict[Any, Any] = {"time": xr.indexes.PandasIndex(clock, "time", times.dtype, fastpath=True)}
     adapter: Any = type(_labels("component")[1])
     variables["time"] = _variable(xr.IndexVariable, ("time",), adapter(clock), {})
     for name in _parts(columns):

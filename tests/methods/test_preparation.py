@@ -1,4 +1,4 @@
-"""What surrounds a kernel compiles to the bits of the same functions in Python, and a run at once is one in stretches."""
+"""What surrounds a kernel compiles to the bits of its Python, and a run at once is a run in stretches."""
 
 import dataclasses
 import math
@@ -77,7 +77,7 @@ def test_a_table_that_is_not_closed_is_another_one():
 
 def in_python(solver):
     """The same solver with a preparation that does not compile: a run in stretches."""
-    return dataclasses.replace(solver, prepare=lambda top, at: solver.prepare(top, at))
+    return dataclasses.replace(solver, prepare=solver.prepare.__call__)
 
 
 def assert_the_same_run(solver, top, start, plan):
