@@ -28,6 +28,10 @@ def findings(
     said = kernels.verdict(rows)
     took = {item.name: item.seconds * 1e6 for item in items}
     slowest = max(one_step, key=lambda name: one_step[name])
+    run = (
+        f"`simulate` takes {took['simulate']:.0f} us for {whole_run.STEPS} steps of {whole_run.METHOD} on "
+        f"{whole_run.SCENE}, {took['solver, every step shown']:.0f} in the solver and {took['guard']:.0f} in the guard."
+    )
     kernel_rows = [
         [f"{row.name}[{row.chart}]", f"{row.nanoseconds:.1f}", f"{row.in_c:.1f}", f"{row.ratio:.2f}",
          f"{row.ratio_low:.2f} to {row.ratio_high:.2f}",
@@ -77,12 +81,7 @@ def findings(
             f"One process, all kernels and their C twins (gcc) interleaved in random order; {kernels.SCENE}, a step of "
             f"1/{kernels.PER_NUTATION:g} of a nutation. The spread is what five fifths of the batches would have said."
         ),
-        "verdict": [
-            *said,
-            f"`simulate` takes {took['simulate']:.0f} us for {whole_run.STEPS} steps of {whole_run.METHOD} on "
-            f"{whole_run.SCENE}: {took['solver, every step shown']:.0f} in the solver, {took['guard']:.0f} in the guard.",
-            f"A run of one step takes {one_step[slowest] * 1e6:.1f} us at most, with {slowest}.",
-        ],
+        "verdict": [*said, run, f"A run of one step takes {one_step[slowest] * 1e6:.1f} us at most, with {slowest}."],
         "tables": [table._asdict() for table in tables],
         "charts": [],
         "opening": None,
