@@ -92,7 +92,7 @@ class FixedStep:
             fit, scale, rule = rule.fitted if rule.fit else None, rule.scale, rule.rule
         elif isinstance(rule, Later):
             rule = rule.make()
-        elif callable(rule):
+        if not isinstance(rule, tuple) or not rule:  # a function of Python, or numbers in an array
             return None
         kind = plain if type(rule) is tuple else type(rule)
         run = loop.whole(kind, prepare.numbers, scale, sample)

@@ -159,6 +159,23 @@ def test_functions_of_python_still_make_a_solver():
     assert seen == [0.01]
 
 
+@pytest.mark.parametrize("rule", [(0.0,), np.array([0.5, 0.25]), 0.5])
+def test_a_rule_may_be_whatever_a_kernel_takes(rule):
+    def begin(par, rule, state, h):
+        return (0.0,)
+
+    def increment(par, rule, state, carry, h):
+        return (h * state[1], 0.0, 0.0, 0.0), carry, 1, 0
+
+    def observe(par, rule, before, dstate, h):
+        return 0.0, 0.0
+
+    solver = FixedStep(loops.driver(begin, increment, observe), rule, reduced, 1, implicit=False)
+    run = solver(SymmetricTop(1.0, 1.0, 1.0), Angles(1.0, theta_dot=0.5), Plan.steps(0.25, [0, 1, 4]))
+    assert run.states[:, 0].tolist() == [1.0, 1.125, 1.5]
+    assert (solver._whole is not None) == isinstance(rule, tuple)
+
+
 def test_a_tuned_drift_hangs_on_the_start():
     entry = composition("tuned", (1.0,), (0.5, 0.5), chart="space", rotation="cayley-tuned")
     solver = entry.solvers["axis"]
