@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.methods.compiled import compile_kernel, register_jitable
+from symtop.base.compiled import compile_kernel, register_jitable
 from symtop.model import top as model
 from symtop.model.top import Angles, SymmetricTop
 

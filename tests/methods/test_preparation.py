@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import symtop
+from symtop.base.compiled import compile_kernel
 from symtop.methods import loop as loops, splitting_angles, splitting_space
 from symtop.methods.angles import reduced
 from symtop.methods.coefficients import METHODS, exact_sum
-from symtop.methods.compiled import compile_kernel
 from symtop.methods.euler_lagrange import with_rates
 from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.plan import Plan
