@@ -112,7 +112,7 @@ def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree
 
 def _plain(value: Any) -> Any:
     """Attributes of netCDF files are strings, numbers or lists of them."""
-    if isinstance(value, (str, int, float)) and not isinstance(value, bool):
+    if type(value) in {str, float, int} or (isinstance(value, (str, int, float)) and not isinstance(value, bool)):
         return value
     return json.dumps(value, sort_keys=True, default=str)
 
