@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import kernels, measured, startup, targets, truth, twin
+from benchmarks import kernels, measured, startup, targets, truth, twin, whole_run
 from symtop.runner import store
 from symtop.runner.study import Table
 
@@ -19,12 +19,19 @@ def findings(
     started: Mapping[str, float],
     forms: Sequence[truth.Row],
     reached: Sequence[targets.Reached],
+    items: Sequence[whole_run.Item],
+    one_step: Mapping[str, float],
     accuracy: float,
     facts: Mapping[str, Any],
 ) -> dict[str, Any]:
     """The numbers in the form in which the report shows a study."""
     said = kernels.verdict(rows)
-    added = started["simulate adds to its kernel"]
+    took = {item.name: item.seconds * 1e6 for item in items}
+    slowest = max(one_step, key=lambda name: one_step[name])
+    run = (
+        f"`simulate` takes {took['simulate']:.0f} us for {whole_run.STEPS} steps of {whole_run.METHOD} on "
+        f"{whole_run.SCENE}, {took['solver, every step shown']:.0f} in the solver and {took['guard']:.0f} in the guard."
+    )
     kernel_rows = [
         [f"{row.name}[{row.chart}]", f"{row.nanoseconds:.1f}", f"{row.in_c:.1f}", f"{row.ratio:.2f}",
          f"{row.ratio_low:.2f} to {row.ratio_high:.2f}",
@@ -58,6 +65,12 @@ def findings(
             ["call", "median us", "99 % below, us"],
             [[row.name, f"{row.median * 1e6:.3g}", f"{row.slow * 1e6:.3g}"] for row in forms],
         ),
+        Table(
+            f"A run of {whole_run.STEPS} steps of {whole_run.METHOD} on {whole_run.SCENE}, by its parts",
+            ["part", "us", "steps of the method"],
+            [[item.name, f"{item.seconds * 1e6:.1f}", f"{item.steps:.0f}"] for item in items],
+        ),
+        Table("A run of one step", ["method", "us"], [[name, f"{s * 1e6:.2f}"] for name, s in one_step.items()]),
         Table("Starting", ["what", "ms"], [[name, f"{seconds * 1e3:.2f}"] for name, seconds in started.items()]),
     ]
     return {
@@ -68,7 +81,7 @@ def findings(
             f"One process, all kernels and their C twins (gcc) interleaved in random order; {kernels.SCENE}, a step of "
             f"1/{kernels.PER_NUTATION:g} of a nutation. The spread is what five fifths of the batches would have said."
         ),
-        "verdict": [*said, f"`simulate` adds {added * 1e3:.2f} ms to the kernel that it calls."],
+        "verdict": [*said, run, f"A run of one step takes {one_step[slowest] * 1e6:.1f} us at most, with {slowest}."],
         "tables": [table._asdict() for table in tables],
         "charts": [],
         "opening": None,
@@ -94,11 +107,13 @@ def main() -> None:
     started = startup.measure()
     forms = truth.measure()
     reached = targets.measure(options.accuracy)
+    items, one_step = whole_run.measure(), whole_run.one_step()
     for table in (
         kernels.lines(rows),
         startup.lines(started),
         truth.lines(forms),
         targets.lines(reached, options.accuracy),
+        whole_run.lines(items, one_step),
     ):
         print("\n".join(table), end="\n\n")
     options.results.mkdir(exist_ok=True)
@@ -107,9 +122,11 @@ def main() -> None:
         "kernels": [row._asdict() for row in rows],
         "startup": started,
         "closed_form": [row._asdict() for row in forms],
+        "run": {"parts": [item._asdict() for item in items], "one_step": one_step},
         "targets": {"accuracy": options.accuracy, "methods": [row._asdict() for row in reached]},
     }
-    store.write_json(target, findings(rows, started, forms, reached, options.accuracy, facts) | numbers)
+    content = findings(rows, started, forms, reached, items, one_step, options.accuracy, facts)
+    store.write_json(target, content | numbers)
     print(f"written to {target}")
 
 

@@ -1,14 +1,10 @@
-"""What a user waits for before the first number: import, first use, and what `simulate` adds to a kernel."""
+"""What a user waits for before the first number: import and first use."""
 
 import os
 import subprocess
 import sys
 import tempfile
 import time
-
-import symtop
-from symtop.measure.timing import timings
-from symtop.methods.plan import Plan
 
 STEP = 0.01
 FIRST = f"import symtop; symtop.simulate('spheroid', 'midpoint', step_size={STEP})"
@@ -28,21 +24,12 @@ def measure(repeats: int = 3) -> dict[str, float]:
         cold = _process(FIRST, cache)
         warm = min(_process(FIRST, cache) for _ in range(repeats))
     bare = min(_process("pass") for _ in range(repeats))
-    scene = symtop.scene("spheroid")
-    steps = round(scene.horizon / STEP)
-    plan = Plan.steps(scene.horizon / steps, [steps], scene.horizon)
-    solve = symtop.integrator("midpoint").solvers["angles"]
-    whole, kernel = timings(
-        [lambda: symtop.simulate(scene, "midpoint", step_size=STEP), lambda: solve(scene.top, scene.start, plan)],
-        batches=15,
-    )
     return {
         "python": bare,
         "import symtop": min(_process("import symtop") for _ in range(repeats)) - bare,
         "symtop --help": min(_process("from symtop.cli.main import main; main(['--help'])") for _ in range(repeats)),
         "first simulate, nothing cached": cold,
         "first simulate, kernels cached": warm,
-        "simulate adds to its kernel": whole.best - kernel.best,
     }
 
 

@@ -4,14 +4,15 @@ The chart ends at theta = 0 and pi. p_phi and p_psi enter as parameters, so ever
 show them again from the increments that it produced (`observe` in `loop`).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.base.compiled import register_jitable
 from symtop.base.validate import SymtopError
 from symtop.methods.outcomes import LEFT_CHART, NOT_FINITE, OK
-from symtop.model.top import Angles, SymmetricTop
+from symtop.methods.preparation import Preparation, conserved
+from symtop.model.top import Angles
 
 
 class ReducedTop(NamedTuple):
@@ -49,9 +50,11 @@ def require_chart(at: Angles) -> None:
         raise SymtopError(f"theta must lie inside (0, pi) for an integrator in the angles chart, not {at.theta!r}")
 
 
-def reduced(top: SymmetricTop, at: Angles) -> tuple[ReducedTop, tuple[float, ...]]:
+def _reduced(top: Any, at: Any) -> Any:
     """Kernel parameters and state of a start; p_theta0 = dL/dtheta' is the discrete Legendre transform's start."""
-    require_chart(at)
-    momenta = top.momenta(at)
+    momenta = conserved(top, at)
     par = ReducedTop(top.I1, top.I3, top.mgl, momenta.p_psi, momenta.north, momenta.south)
     return par, (at.theta, top.I1 * at.theta_dot, at.phi, at.psi)
+
+
+reduced = Preparation(_reduced, 4, require_chart)

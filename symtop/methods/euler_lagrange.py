@@ -19,7 +19,7 @@ import numpy as np
 from symtop.base.compiled import register_jitable
 from symtop.methods.angles import BareTop, chart_outcome, require_chart
 from symtop.methods.plan import Array
-from symtop.model.top import Angles, SymmetricTop
+from symtop.methods.preparation import Preparation, Shown
 
 LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws the line
 
@@ -43,11 +43,13 @@ def field_angles(par: Any, y: Any) -> Any:
     return y[3], y[4], y[5], theta_ddot, phi_ddot, psi_ddot
 
 
-def with_rates(top: SymmetricTop, at: Angles) -> tuple[BareTop, tuple[float, ...]]:
+def _with_rates(top: Any, at: Any) -> Any:
     """Kernel parameters and state of a start."""
-    require_chart(at)
     state = (at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot)
     return BareTop(top.I1, top.I3, top.mgl), state
+
+
+with_rates = Preparation(_with_rates, 6, require_chart)
 
 
 @register_jitable
@@ -78,6 +80,9 @@ def sampled_momenta(par: Any, states: Array) -> tuple[Array, Array]:
     return p_phi, p_psi
 
 
-def to_angles(par: Any, times: Array, states: Array) -> Array:
-    """Unreduced states, shape (samples, 6), as (theta, p_theta, phi, psi), the angles chart of `simulate`."""
-    return np.stack([states[:, 0], par.I1 * states[:, 3], states[:, 1], states[:, 2]], axis=-1)
+def _to_angles(par: Any, t: float, y: Any) -> Any:
+    """An unreduced state as (theta, p_theta, phi, psi), the angles chart of `simulate`."""
+    return y[0], par.I1 * y[3], y[1], y[2]
+
+
+to_angles = Shown(_to_angles, 4)

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 from symtop.methods import euler_lagrange, space
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.plan import Array, Run
+from symtop.methods.preparation import Shown
 from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import space_momenta
 
@@ -32,12 +33,8 @@ class Formulation(NamedTuple):
     ended: Callable[[Any], int]  # outcome of a state: OK, or how the chart was left
     observe: Callable[..., Any]  # (par, rule, before, dstate, h) -> p_phi and p_psi after a step
     prepare: Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]  # parameters and state of a start
-    present: Callable[[Any, Array, Array], Array]  # (par, times, states) -> states of the chart that `simulate` shows
+    present: Shown | None  # (par, times, states) -> states of the chart that `simulate` shows, where they differ
     momenta: Callable[[Any, Array], tuple[Array, Array]]  # (par, states) -> p_phi and p_psi of samples
-
-
-def _as_they_are(par: Any, times: Array, states: Array) -> Array:
-    return states
 
 
 def _axis_momenta(par: Any, states: Array) -> tuple[Array, Array]:
@@ -57,16 +54,9 @@ FORMULATIONS = {
         euler_lagrange.to_angles,
         euler_lagrange.sampled_momenta,
     ),
-    "axis": Formulation(
-        space.field_axis, space.ended_space, space.observe_axis, space.on_axis, _as_they_are, _axis_momenta
-    ),
+    "axis": Formulation(space.field_axis, space.ended_space, space.observe_axis, space.on_axis, None, _axis_momenta),
     "attitude": Formulation(
-        space.field_attitude,
-        space.ended_space,
-        space.observe_attitude,
-        space.on_attitude,
-        _as_they_are,
-        _attitude_momenta,
+        space.field_attitude, space.ended_space, space.observe_attitude, space.on_attitude, None, _attitude_momenta
     ),
 }
 
@@ -76,4 +66,5 @@ def as_run(
 ) -> Run:
     """Samples of the state that was integrated, shape (samples, dimension), with both momenta recomputed from it."""
     p_phi, p_psi = form.momenta(par, states)
-    return Run(form.present(par, times, states), p_phi, p_psi, steps, evaluations, 0, OUTCOMES[outcome], reached)
+    shown = states if form.present is None else form.present(par, times, states)
+    return Run(shown, p_phi, p_psi, steps, evaluations, 0, OUTCOMES[outcome], reached)

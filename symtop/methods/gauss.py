@@ -38,10 +38,10 @@ from symtop.base.multiprecision import context
 from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import Loop, driver
 from symtop.methods.outcomes import NOT_CONVERGED, OK
+from symtop.methods.preparation import Later
 from symtop.methods.registry import Array, Integrator
 from symtop.methods.space import field_axis, field_frame, frame_to_attitude, observe_axis, on_axis, on_frame
 from symtop.methods.stage_newton import solve_stages
-from symtop.model.top import Angles, SymmetricTop
 
 STAGES = (1, 2, 3, 4, 5, 6)
 DIGITS = 40  # of the multiprecision that coefficients are computed in
@@ -213,9 +213,7 @@ march_axis, march_frame = _loop(field_axis), _loop(field_frame)
 def gauss(stages: int) -> Integrator:
     """The Gauss method with 1 to 6 stages, named after its order; its coefficients are computed at the first run."""
 
-    def rule(top: SymmetricTop, start: Angles, h: float) -> GaussRule:
-        return gauss_rule(stages)
-
+    rule = Later(functools.partial(gauss_rule, stages))
     return Integrator(
         name=f"gauss-{2 * stages}",
         family="runge-kutta",

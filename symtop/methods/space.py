@@ -12,15 +12,18 @@ p_phi = L_z and p_psi = L.e are not parameters of these charts: they are read of
 to them shows.
 """
 
-from functools import partial
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.base.compiled import register_jitable
 from symtop.methods.outcomes import NOT_FINITE, OK
+from symtop.methods.preparation import Preparation, Shown
 from symtop.model import charts
-from symtop.model.top import Angles, SymmetricTop
+
+axis_parts, quaternion_parts = register_jitable(charts.axis_parts), register_jitable(charts.quaternion_parts)
+momentum_parts = register_jitable(charts.momentum_parts)
 
 
 class SpaceTop(NamedTuple):
@@ -31,28 +34,66 @@ class SpaceTop(NamedTuple):
     twist: float
 
 
-def _prepare(chart: str, top: SymmetricTop, at: Angles) -> tuple[SpaceTop, tuple[float, ...]]:
-    """Kernel parameters and state of a start."""
-    spin = top.I3 * at.spin * (1.0 / top.I3 - 1.0 / top.I1)
-    return SpaceTop(top.I1, top.mgl, spin), charts.space_numbers(chart, top, at)
+@register_jitable
+def _numbers(top: Any, at: Any) -> Any:
+    """Kernel parameters of a start."""
+    spin = top.I3 * (at.psi_dot + at.phi_dot * math.cos(at.theta))
+    return SpaceTop(top.I1, top.mgl, spin * (1.0 / top.I3 - 1.0 / top.I1))
 
 
-on_axis, on_attitude = partial(_prepare, "axis"), partial(_prepare, "attitude")
+@register_jitable
+def _momentum(top: Any, at: Any) -> Any:
+    return momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
 
 
-def on_frame(top: SymmetricTop, at: Angles) -> tuple[SpaceTop, tuple[float, ...]]:
+@register_jitable
+def _on_axis(top: Any, at: Any) -> Any:
+    """Kernel parameters and state (e, L) of a start."""
+    return _numbers(top, at), (*axis_parts(math, at.theta, at.phi), *_momentum(top, at))
+
+
+def _on_attitude(top: Any, at: Any) -> Any:
+    """Kernel parameters and state (q, L) of a start."""
+    return _numbers(top, at), (*quaternion_parts(math, at.theta, at.phi, at.psi), *_momentum(top, at))
+
+
+def _on_frame(top: Any, at: Any) -> Any:
     """Kernel parameters and state (e, L, a) of a start, where a is the body's first axis."""
-    par, state = on_axis(top, at)
-    across = charts.transverse_from_quaternion(charts.quaternion_from_angles(at.theta, at.phi, at.psi))
-    return par, (*state, *(float(value) for value in across))
+    w, x, y, z = quaternion_parts(math, at.theta, at.phi, at.psi)
+    par, state = _on_axis(top, at)
+    return par, (*state, w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
 
 
-def frame_to_attitude(par: SpaceTop, times: charts.Array, states: charts.Array) -> charts.Array:
-    """Frame states, shape (samples, 9), as attitude states (q, L), shape (samples, 7)."""
-    w, x, y, z = charts.quaternion_from_frame(states[:, :3], states[:, 6:]).T
-    c, s = np.cos(0.5 * par.twist * times), np.sin(0.5 * par.twist * times)
-    quaternion = np.stack([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s], axis=-1)
-    return np.concatenate([quaternion, states[:, 3:6]], axis=-1)
+on_axis, on_attitude, on_frame = Preparation(_on_axis, 6), Preparation(_on_attitude, 7), Preparation(_on_frame, 9)
+
+
+@register_jitable
+def _rows(e: Any, a: Any, b: Any) -> Any:
+    """The rows of 4 q q^T, from the columns of the rotation matrix (Shepperd 1978)."""
+    return (
+        (1.0 + a[0] + b[1] + e[2], b[2] - e[1], e[0] - a[2], a[1] - b[0]),
+        (b[2] - e[1], 1.0 + a[0] - b[1] - e[2], a[1] + b[0], a[2] + e[0]),
+        (e[0] - a[2], a[1] + b[0], 1.0 - a[0] + b[1] - e[2], b[2] + e[1]),
+        (a[1] - b[0], a[2] + e[0], b[2] + e[1], 1.0 - a[0] - b[1] + e[2]),
+    )
+
+
+def _frame_to_attitude(par: Any, t: float, y: Any) -> Any:
+    """A frame state as an attitude state (q, L); the sign of q is arbitrary."""
+    e, a = (y[0], y[1], y[2]), (y[6], y[7], y[8])
+    b = (e[1] * a[2] - e[2] * a[1], e[2] * a[0] - e[0] * a[2], e[0] * a[1] - e[1] * a[0])
+    rows = _rows(e, a, b)
+    best, largest = rows[0], rows[0][0]  # the row with the largest diagonal loses no digits
+    for i in range(1, 4):
+        if rows[i][i] > largest:
+            best, largest = rows[i], rows[i][i]
+    length = math.sqrt(best[0] * best[0] + best[1] * best[1] + best[2] * best[2] + best[3] * best[3])
+    qw, qx, qy, qz = best[0] / length, best[1] / length, best[2] / length, best[3] / length
+    c, s = math.cos(0.5 * par.twist * t), math.sin(0.5 * par.twist * t)
+    return qw * c - qz * s, qx * c + qy * s, qy * c - qx * s, qz * c + qw * s, y[3], y[4], y[5]
+
+
+frame_to_attitude = Shown(_frame_to_attitude, 7)
 
 
 @register_jitable

@@ -14,7 +14,6 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters II.5 a
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
 
 from symtop.base.validate import SymtopError, finite, one_of, row
 from symtop.methods import splitting_angles, splitting_space
@@ -22,6 +21,7 @@ from symtop.methods.angles import reduced
 from symtop.methods.coefficients import METHODS
 from symtop.methods.fixed_step import FixedStep, Prepare
 from symtop.methods.loop import Loop
+from symtop.methods.preparation import Scaled
 from symtop.methods.registry import Integrator, ModifiedEnergy
 from symtop.methods.space import on_attitude, on_axis
 from symtop.methods.splitting_loop import Composition, closed
@@ -65,10 +65,12 @@ def composition(
         raise SymtopError(
             f"chart must be 'space' for a composition with a gradient, a rotation or a processor, not {chart!r}"
         )
+    table = rule._replace(turn=ROTATIONS.index(rotation), processor=boost)
     if chart == "angles":
-        stages = partial(splitting_angles.stages, rule)
+        stages = Scaled(table, splitting_angles.scale)
     else:
-        stages = partial(splitting_space.stages, rule, rotation, boost)
+        fit = splitting_space.tuned if table.turn == splitting_space.TUNED else None
+        stages = Scaled(table, splitting_space.scale, fit)
     one_drift = bare and rule.drift == (1.0,)
     closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if one_drift and rule.kick == (0.5, 0.5) else None
     modified, sleeps = closed_forms or (None, None)

@@ -19,9 +19,9 @@ from symtop.base.compiled import register_jitable
 from symtop.methods.angles import chart_outcome
 from symtop.methods.loop import driver
 from symtop.methods.registry import Array
-from symtop.methods.splitting_loop import Composition, Stages, compose
+from symtop.methods.splitting_loop import compose, stages
 from symtop.model import top as model
-from symtop.model.top import Angles, Momenta, SymmetricTop
+from symtop.model.top import Momenta
 from symtop.model.view import View
 
 effective_force = register_jitable(model.effective_force)
@@ -47,9 +47,9 @@ def drift_angles(rule: Any, state: Any, step: Any, tau: float) -> Any:
     return (step[0] + tau * (state[1] + step[1]), step[1], step[2], step[3])
 
 
-def stages(rule: Composition, top: SymmetricTop, start: Angles, h: float) -> Stages:
+def scale(rule: Any, top: Any, h: float) -> Any:
     """Kicks in time, drifts in time over I1."""
-    return rule.stages(h / top.I1, h)
+    return stages(rule, h / top.I1, h, 0.0, 0.0)
 
 
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:

@@ -26,14 +26,9 @@ class Composition(NamedTuple):
     kick: tuple[float, ...]  # b_0 .. b_n
     gradient: tuple[float, ...]  # c_0 .. c_n
     forces: int  # a step
-
-    def stages(self, drift: float, kick: float, bend: float = 0.0, turn: int = 0, boost: float = 0.0) -> "Stages":
-        """The coefficients times what a whole step drifts and kicks by."""
-        return Stages(
-            exact_sum([a * drift for a in self.drift], drift),
-            exact_sum([b * kick for b in self.kick], kick),
-            tuple(c * bend for c in self.gradient), self.forces, turn, boost,
-        )  # fmt: skip
+    turn: int = 0  # which rotation a drift is
+    processor: float = 0.0
+    stretch: float = 1.0  # of a drift whose angle is tuned
 
 
 class Stages(NamedTuple):
@@ -45,6 +40,40 @@ class Stages(NamedTuple):
     forces: int
     turn: int  # which rotation a drift is
     boost: float  # parameter of the processor
+
+
+@register_jitable
+def scaled(values: Any, by: float) -> Any:
+    """Coefficients times a number."""
+    for i in range(len(values)):
+        values = set_item(values, i, values[i] * by)
+    return values
+
+
+@register_jitable
+def close(values: Any, total: float) -> Any:
+    """`coefficients.exact_sum` of a tuple in a kernel: what is missing from `total` goes to the middle.
+
+    The sum of Knuth's two-sums and of what they round off is that of `math.fsum` but for 1e-16 of the surplus itself.
+    """
+    high, low, n = -total, 0.0, len(values)
+    for i in range(n):
+        moved = high + values[i]
+        back = moved - high
+        low += (high - (moved - back)) + (values[i] - back)
+        high = moved
+    surplus, middle = high + low, n // 2
+    if n % 2:
+        return set_item(values, middle, values[middle] - surplus)
+    values = set_item(values, middle - 1, values[middle - 1] - 0.5 * surplus)
+    return set_item(values, middle, values[middle] - 0.5 * surplus)
+
+
+@register_jitable
+def stages(rule: Any, drift: float, kick: float, bend: float, boost: float) -> Any:
+    """The coefficients of a `Composition` times what a whole step drifts, kicks, bends and boosts by."""
+    drifts, kicks = close(scaled(rule.drift, drift), drift), close(scaled(rule.kick, kick), kick)
+    return Stages(drifts, kicks, scaled(rule.gradient, bend), rule.forces, rule.turn, boost)
 
 
 def closed(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float]) -> Composition:

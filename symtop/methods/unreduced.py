@@ -31,10 +31,9 @@ from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver
 from symtop.methods.newton import Correction, newton
 from symtop.methods.outcomes import NOT_CONVERGED
-from symtop.methods.registry import Array, Integrator
-from symtop.model.top import Angles, SymmetricTop
+from symtop.methods.preparation import Preparation, Shown, conserved
+from symtop.methods.registry import Integrator
 
-ANGLES_CHART = (0, 3, 1, 2)  # theta, p_theta, phi, psi among theta, phi, psi, p_theta, p_phi, p_psi
 NEGLIGIBLE = 0.25 * float(np.finfo(float).eps)  # relative to the rates: a correction that changes nothing
 
 
@@ -207,18 +206,20 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 march = driver(begin, increment, observe)
 
 
-def with_momenta(top: SymmetricTop, at: Angles) -> tuple[BareTop, tuple[float, ...]]:
+def _with_momenta(top: Any, at: Any) -> Any:
     """Kernel parameters and state of a start: the momenta are dL/dq' there."""
-    require_chart(at)
-    momenta = top.momenta(at)
+    momenta = conserved(top, at)
     return BareTop(top.I1, top.I3, top.mgl), (
         at.theta, at.phi, at.psi, top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi,
     )  # fmt: skip
 
 
-def _in_angles(par: BareTop, times: Array, states: Array) -> Array:
+def _in_angles(par: Any, t: float, y: Any) -> Any:
     """(theta, p_theta, phi, psi) of the six state variables; p_phi and p_psi are columns of their own."""
-    return states[:, ANGLES_CHART]
+    return y[0], y[3], y[1], y[2]
+
+
+with_momenta, in_angles = Preparation(_with_momenta, 6, require_chart), Shown(_in_angles, 4)
 
 
 def unreduced(method: Integrator) -> Integrator:
@@ -230,7 +231,7 @@ def unreduced(method: Integrator) -> Integrator:
         method,
         name=f"{method.name}-unreduced",
         summary=f"{method.summary}, in all three angles with nothing eliminated",
-        solvers={"angles": FixedStep(march, rule, with_momenta, len(rule.nodes), implicit=True, present=_in_angles)},
+        solvers={"angles": FixedStep(march, rule, with_momenta, len(rule.nodes), implicit=True, present=in_angles)},
         modified_energy=None,
         about="",
     )

@@ -21,8 +21,9 @@ from symtop.model.top import Momenta, SymmetricTop
 
 def space_energy(top: SymmetricTop, axis: Any, momentum: Any, p_psi: Any) -> Any:
     """Energy of space-frame states: |L|^2/2 I1 + p_psi^2 (1/I3 - 1/I1)/2 + mgl e_z; axis and momentum (..., 3)."""
+    x, y, z = momentum[..., 0], momentum[..., 1], momentum[..., 2]  # by components: `np.sum` over three takes 7 us more
     return (
-        np.sum(momentum * momentum, axis=-1) / (2.0 * top.I1)
+        (x * x + y * y + z * z) / (2.0 * top.I1)
         + 0.5 * p_psi**2 * (1.0 / top.I3 - 1.0 / top.I1)
         + top.mgl * axis[..., 2]
     )

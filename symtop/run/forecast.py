@@ -14,7 +14,7 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters X.3 an
 
 import functools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -96,6 +96,20 @@ class Forecast(NamedTuple):
     reached: float
 
 
+@functools.cache
+def _places() -> charts.Array:
+    """Where a probe of length `POINTS` is sampled: not commensurate with the nutation."""
+    place = np.arange(1.0, POINTS + 1.0)
+    place[:-1] += np.mod(GOLDEN * place[:-1], 1.0) - 0.5
+    return place
+
+
+@functools.lru_cache(maxsize=256)
+def _marks(steps: int) -> Any:
+    """The same in whole steps of a probe; 25 us, and the steps of a probe are few numbers (`STEPS`)."""
+    return np.unique(np.maximum(np.rint(_places() * (steps / POINTS)).astype(np.int64), 1))
+
+
 def _probe(
     scene: Scene, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
 ) -> Probe:
@@ -103,20 +117,18 @@ def _probe(
     form, start = closed_form(scene), scene.start
     if since:
         start = Angles(*(float(value) for value in form(since)))
-    place = np.arange(1.0, POINTS + 1.0)
-    place[:-1] += np.mod(GOLDEN * place[:-1], 1.0) - 0.5  # not commensurate with the nutation
     if method.fixed_step:
-        steps = max(1, round(duration / step))
-        marks = np.unique(np.maximum(np.rint(place * (steps / POINTS)).astype(np.int64), 1))
-        piece = Plan.steps(step, marks)
+        piece = Plan.steps(step, _marks(max(1, round(duration / step))))
     else:
-        piece = Plan.until(duration * (place / POINTS), plan.tolerance)
+        piece = Plan.until(duration * (_places() / POINTS), plan.tolerance)
     run = solve(method, chart, scene.top, start, piece)
     with np.errstate(all="ignore"):
         axis = View(chart, scene.top, np.asarray(run.states)).axis
         error = charts.axis_distance(axis, form.axis(since + piece.times))
-    error[~np.isfinite(error)] = math.inf
-    outcome = "not_finite" if run.outcome == "ok" and not np.isfinite(error).all() else run.outcome
+    outcome = run.outcome
+    if not (finite := np.isfinite(error)).all():
+        error[~finite] = math.inf
+        outcome = "not_finite" if outcome == "ok" else outcome
     return Probe(piece.times, error, outcome, since + run.reached)
 
 

@@ -28,6 +28,7 @@ from symtop.base import datasets, fingerprint, imports
 from symtop.base.cache import cache_root
 from symtop.base.multiprecision import context
 from symtop.base.numbers import EPSILON, TINY
+from symtop.base.over_time import over_time
 from symtop.base.validate import SymtopError, SymtopWarning, one_of
 from symtop.methods import taylor
 from symtop.model import charts
@@ -228,7 +229,7 @@ def _compute(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
         _raise_to_distance(bounds, shown, _closed_values(scene, times))
     columns |= {f"{name}_error_bound": bound for name, bound in bounds.items()}
     columns |= {name: np.full(times.size, value) for name, value in _constants(scene).items()}
-    return datasets.over_time(times, columns).assign_attrs(overlap_with_integration=overlap)
+    return over_time(times, columns).assign_attrs(overlap_with_integration=overlap)
 
 
 def _bounds(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks import bench, kernels, measured, targets, truth, twin
+from benchmarks import bench, kernels, measured, targets, truth, twin, whole_run
 from symtop.measure.timing import Timing, timings
 from symtop.report import page
 from symtop.runner import store
@@ -79,9 +79,11 @@ def test_what_the_benchmark_leaves_is_what_the_report_shows(tmp_path):
     rows = [kernels.Row("midpoint", "angles", 200.0, 0.01, 180.0, 1.11, 1.1, 1.3, 0.0, 2.2),
             kernels.Row("gauss-8", "axis", 900.0, 0.01, 600.0, 1.5, 1.4, 1.6, 1e-16, 9.9)]  # fmt: skip
     facts = measured.circumstances() | {"measured": "2001-02-03", "processor": "an abacus"}
-    started = {"simulate adds to its kernel": 9e-4}
     forms = [truth.Row("set-up and one sample, double-double", 4.9e-6, 6.4e-6)]
-    content = bench.findings(rows, started, forms, [targets.Reached("rk4", 99, 1e-5, 400.0)], 1e-9, facts)
+    names = ("simulate", "guard", "solver, every step shown")
+    items = [whole_run.Item(name, 1e-6 * 10**k, 10.0**k) for k, name in enumerate(names)]
+    reached, one_step = [targets.Reached("rk4", 99, 1e-5, 400.0)], {"rk4[axis]": 2.25e-6, "gauss-2[axis]": 3e-6}
+    content = bench.findings(rows, {}, forms, reached, items, one_step, 1e-9, facts)
     store.write_json(tmp_path / "bench.json", content)
     text = page.write(tmp_path).read_text()
     markdown = (tmp_path / "report.md").read_text()
@@ -89,6 +91,7 @@ def test_what_the_benchmark_leaves_is_what_the_report_shows(tmp_path):
         "1 of 2 kernels are within 1.25 times their C twin",
         "set-up and one sample, double-double",
         "gauss-8[axis] 1.50",
+        "3.0 us at most, with gauss-2[axis]",
         "2001-02-03",
         "an abacus",
     ):

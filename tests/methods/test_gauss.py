@@ -13,7 +13,7 @@ from symtop.measure.step_map import one_step as map_of, symplectic_defect
 from symtop.methods.fixed_step import FixedStep
 from symtop.methods.gauss import STAGES, gauss_rule, march_axis, march_frame
 from symtop.methods.registry import integrator
-from symtop.methods.space import field_axis, frame_to_attitude, on_axis, on_frame
+from symtop.methods.space import SpaceTop, field_axis, frame_to_attitude, on_axis, on_frame
 from symtop.model import charts
 from symtop.model.scenes import steady
 from symtop.run.linear_stability import linear_limits, trace
@@ -219,7 +219,8 @@ def test_frames_are_attitudes(theta):
     phi, psi = (values.ravel() for values in np.meshgrid(np.linspace(-3, 3, 7), np.linspace(0, 6, 7)))
     quaternion = charts.quaternion_from_angles(theta, phi, psi)
     axis, across = charts.axis_from_quaternion(quaternion), charts.transverse_from_quaternion(quaternion)
-    again = charts.quaternion_from_frame(axis, across)
+    frames = np.concatenate([axis, np.zeros_like(axis), across], axis=1)
+    again = frame_to_attitude(SpaceTop(1.0, 1.0, 0.0), np.zeros(phi.size), frames)[:, :4]
     assert np.max(charts.attitude_distance(again, quaternion)) < 2e-15
 
 

@@ -14,6 +14,7 @@ from symtop.measure.order import power_law
 from symtop.measure.step_map import one_step, symplectic_defect
 from symtop.methods import coefficients as tables, splitting_space as space
 from symtop.methods.plan import Plan
+from symtop.methods.preparation import Scaled
 from symtop.methods.splitting import built_in, composition
 from symtop.model import charts
 from symtop.model.scenes import closed_form
@@ -122,7 +123,7 @@ def extended_error(table, scene, steps):
 
     wide = np.longdouble
     h = wide(8) / steps
-    rule = space.stages(tables_rule(table), "exact", 0.0, scene.top, scene.start, float(h))
+    rule = Scaled(tables_rule(table), space.scale)(scene.top, scene.start, float(h))
     half, pull = wide(0.5) * h / wide(scene.top.I1), h * wide(scene.top.mgl)
     state = start_numbers("axis", "longdouble", scene.top, scene.start)[0]
     for _ in range(steps):
@@ -336,8 +337,8 @@ def test_a_processed_run_starts_where_it_was_told():
 
 def test_a_new_composition_of_a_known_length_compiles_nothing():
     scene = symtop.scene("spheroid")
-    march = space.march_axis.march
     run(METHODS["yoshida-4"], scene, 0.01, [1], "axis")
+    march = METHODS["yoshida-4"].solvers["axis"]._whole.run
     known = len(march.signatures)
     run(composition("thirds", (1 / 3,) * 3, (1 / 6, 1 / 3, 1 / 3, 1 / 6), chart="space"), scene, 0.01, [1], "axis")
     run(composition("chin-like", (0.2, 0.6, 0.2), (0.1, 0.4, 0.4, 0.1), (0, 1e-3, 1e-3, 0), chart="space"), scene,

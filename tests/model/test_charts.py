@@ -109,3 +109,27 @@ def test_unwrapping_follows_an_error_of_many_turns():
     assert (
         np.abs(wrapped + 2 * np.pi * np.rint((guide - wrapped) / (2 * np.pi)) - angle).max() > 6.0
     )  # snapping would not
+
+
+def test_an_unwrapped_angle_has_the_bits_of_numpy():
+    """At angles that jump often, rarely, never, by exactly half a turn, and where a run has failed."""
+    draw = np.random.default_rng(2)
+    for k in range(300):
+        guide = np.cumsum(draw.normal(size=200) * 10.0 ** draw.uniform(-2, 1))
+        angle = np.remainder(guide + np.cumsum(draw.normal(size=200) * 0.05), 2.0 * np.pi) - np.pi
+        if k % 4 == 1:
+            angle[draw.integers(0, 200, 9)] = np.nan
+        if k % 4 == 2:
+            angle, guide = np.pi * draw.integers(-3, 4, 200), np.zeros(200)
+        lag = np.unwrap(angle - guide)
+        expected = guide + (lag - 2.0 * np.pi * np.rint(lag[0] / (2.0 * np.pi)))
+        np.testing.assert_array_equal(charts.unwrapped(angle, guide), expected)
+
+
+def test_distances_of_axes_have_the_bits_of_a_cross_product():
+    draw = np.random.default_rng(3)
+    first = draw.normal(size=(400, 3))
+    for second in (draw.normal(size=(400, 3)), first + 1e-9 * draw.normal(size=(400, 3)), first[7]):
+        cross = np.cross(first - second, second)
+        expected = np.arctan2(np.sqrt(np.sum(cross * cross, axis=-1)), np.sum(first * second, axis=-1))
+        np.testing.assert_array_equal(charts.axis_distance(first, second), expected)

@@ -1,13 +1,16 @@
 """simulate(): the dataset it promises, its sampling, and what it refuses."""
 
+import json
 import math
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import symtop
-from symtop.base import datasets
-from symtop.run.simulation import sample_times
+from symtop.base import datasets, over_time
+from symtop.base.numbers import GOLDEN
+from symtop.run.simulation import WIDEST_GAP, sample_times
 
 
 def test_the_dataset_is_the_one_that_is_promised():
@@ -73,6 +76,57 @@ def test_sampling_falls_on_whole_steps_and_covers_the_run():
     assert times == pytest.approx(marks * (8.0 / 977))
     few, _, _ = sample_times(8.0, 101, 1.18, steps=10)
     assert few.size == 11  # no more samples than steps
+
+
+def sorted_times(horizon, samples, period, steps):
+    """Samples as they are defined: each mark once, and the widest gap of all phases in their order."""
+    last = samples - 1
+    for dithered in (False, True):
+        place = np.arange(samples, dtype=float)
+        if dithered:
+            place[1:last] += np.mod(GOLDEN * place[1:last], 1.0) - 0.5
+        marks = None if steps is None else np.unique(np.rint(steps * (place / last)).astype(np.int64))
+        times = horizon * (place / last) if steps is None else marks * (horizon / steps)
+        phases = np.sort(np.mod(times / period, 1.0))
+        gap = np.max(np.diff(phases, append=phases[0] + 1.0))
+        every = steps is not None and marks.size > steps
+        if not (math.isfinite(period) and horizon > 2.0 * period) or gap < WIDEST_GAP or every:
+            break
+    return times, marks, dithered
+
+
+def test_samples_are_those_of_a_sort_whether_it_was_needed_or_not():
+    draw, dithered = np.random.default_rng(4), 0
+    for k in range(4000):
+        samples, period = int(draw.integers(2, 300)), float(10.0 ** draw.uniform(-1, 1))
+        horizon = period * (float(draw.integers(1, 600)) / draw.integers(1, 5) if k % 2 else draw.uniform(0.1, 300.0))
+        steps = None if k % 5 == 0 else int(draw.integers(1, 3 * samples))
+        times, marks, scattered = sample_times(horizon, samples, period, steps)
+        expected = sorted_times(horizon, samples, period, steps)
+        np.testing.assert_array_equal(times, expected[0])
+        assert steps is None or np.array_equal(marks, expected[1])
+        assert scattered == expected[2]
+        dithered += scattered
+    assert 200 < dithered < 3800  # both happen
+
+
+@pytest.mark.parametrize("row", ["strang[axis]", "strang[attitude]", "midpoint[angles]", "rk45[angles]"])
+@pytest.mark.parametrize("scene", ["spheroid", "goldstein", "grazing"])
+def test_the_dataset_is_the_one_of_xarray_itself(scene, row, monkeypatch):
+    """With the public constructor in place of the quick one: values, types, order, coordinates, attributes."""
+    control = {"tolerance": 1e-6} if row.startswith("rk45") else {"step_size": 0.01}
+    quick, public = [], []
+    for kept in (quick, public):
+        kept.append(symtop.simulate(scene, row, samples=101, horizon=2.0, guard=False, **control))
+        monkeypatch.setattr(over_time, "fits", lambda: False)
+    xr.testing.assert_identical(quick[0], public[0])
+    assert over_time._alike(quick[0], public[0])
+    assert list(quick[0].attrs.items()) == list(public[0].attrs.items())
+    for record in ("top", "start"):
+        told = json.loads(quick[0].attrs[record])
+        held = getattr(symtop.scene(scene), record)
+        assert told == {name: getattr(held, name) for name in held.__slots__}
+        assert quick[0].attrs[record] == json.dumps(told, sort_keys=True)
 
 
 def test_files_are_whole_reproducible_and_readable(tmp_path):

@@ -1,0 +1,164 @@
+"""From a top and a start to the numbers that a kernel steps, by functions that are Python and compile as they stand.
+
+    prepare(top, at) -> (par, state)         the numbers of the top, and the start as the kernel steps it
+    scale(rule, top, h) -> rule              the coefficients of a method times the step
+    sample(par, t, state) -> state           a sample at the time t, in the chart that a user sees
+
+A `Preparation`, a `Scaled` rule and a `Shown` chart each hold one such function. Called, they are what a function of
+Python would be; a run of a few steps takes the function itself and compiles it into the loop (`loop.Loop.whole`), for
+what surrounds a kernel costs more than its steps. Of 10.4 us that one step of `strang` took, 4 were numba looking at
+four NamedTuples (1.0 us for each; 0.1 us for nine doubles, an array or a plain tuple), 2.6 the preparation in Python.
+"""
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop.base.compiled import compile_kernel, register_jitable
+from symtop.model import top as model
+from symtop.model.top import Angles, SymmetricTop
+
+Array = NDArray[np.float64]
+Numbers = tuple[float, ...]  # I1, I3, mgl, theta, phi, psi, theta', phi', psi'
+
+conserved = register_jitable(model.conserved)
+
+
+class Body(NamedTuple):
+    """A top in compiled code, with the names of `SymmetricTop`."""
+
+    I1: float
+    I3: float
+    mgl: float
+
+
+class Start(NamedTuple):
+    """A start in compiled code, with the names of `Angles`."""
+
+    theta: float
+    phi: float
+    psi: float
+    theta_dot: float
+    phi_dot: float
+    psi_dot: float
+
+
+def flat(top: SymmetricTop, at: Angles) -> Numbers:
+    """A top and a start as nine plain numbers."""
+    return top.I1, top.I3, top.mgl, at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """What a kernel steps: `numbers(top, at)` compiles, `check(at)` refuses a start that the kernel cannot step."""
+
+    numbers: Callable[..., tuple[Any, Numbers]]
+    size: int  # of the state
+    check: Callable[[Angles], None] | None = None
+
+    def __post_init__(self) -> None:
+        register_jitable(self.numbers)  # at once: what a kernel is made of must not hang on what has run
+
+    def __call__(self, top: SymmetricTop, at: Angles) -> tuple[Any, Numbers]:
+        """Kernel parameters and state of a start."""
+        if self.check is not None:
+            self.check(at)
+        return self.numbers(top, at)
+
+
+@functools.cache
+def _on_numbers(scale: Callable[..., Any], kind: Any) -> Any:
+    """`scale` by itself, compiled: between plain numbers and a rule."""
+
+    def scaled(body, rule, h):  # type: ignore[no-untyped-def]
+        return scale(kind(*rule), Body(*body), h)
+
+    return compile_kernel(scaled)
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """A rule whose numbers hang on the top and the step; `fit(rule, top, start, h)` adds what hangs on the start."""
+
+    rule: Any  # a NamedTuple
+    scale: Callable[..., Any]
+    fit: Callable[..., Any] | None = None
+
+    def __post_init__(self) -> None:
+        register_jitable(self.scale)
+
+    def __call__(self, top: SymmetricTop, at: Angles, h: float) -> Any:
+        """The rule of one run."""
+        kind: Any = type(self.rule)
+        compiled = _on_numbers(self.scale, kind)
+        return compiled((top.I1, top.I3, top.mgl), tuple(self.fitted(top, at, h)), h)
+
+    def fitted(self, top: SymmetricTop, at: Angles, h: float) -> Any:
+        """The rule before it is scaled."""
+        return self.rule if self.fit is None else self.fit(self.rule, top, at, h)
+
+
+@dataclass(frozen=True)
+class Later:
+    """A rule that hangs on nothing, made when it is first used: coefficients may take milliseconds."""
+
+    make: Callable[[], Any]
+
+    def __call__(self, *_run: object) -> Any:
+        """The rule of any run."""
+        return self.make()
+
+
+@functools.cache
+def _on_samples(sample: Callable[..., Any], kind: Any) -> Any:
+    """`sample` for many samples, compiled."""
+
+    def shown(par, times, states, out):  # type: ignore[no-untyped-def]
+        top = kind(*par)
+        for i in range(len(times)):
+            seen = sample(top, times[i], states[i])
+            for m in range(len(seen)):
+                out[i, m] = seen[m]
+
+    return compile_kernel(shown)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a user sees of a kernel's states: `sample(par, t, state)` compiles and returns `size` numbers."""
+
+    sample: Callable[..., Any]
+    size: int
+
+    def __post_init__(self) -> None:
+        register_jitable(self.sample)
+
+    def __call__(self, par: Any, times: Array, states: Array) -> Array:
+        """States of the chart, shape (samples, size), of states of the kernel."""
+        out = np.empty((len(times), self.size))
+        kind: Any = type(par)
+        flat_times, flat_states = np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states)
+        _on_samples(self.sample, kind)(tuple(par), flat_times, flat_states, out)
+        return out
+
+
+@register_jitable
+def plain(*values: Any) -> Any:
+    """A rule that is no NamedTuple, as it is."""
+    return values
+
+
+@register_jitable
+def as_it_is(rule: Any, top: Any, h: float) -> Any:
+    """The numbers of a method that hang on neither the top nor the step."""
+    return rule
+
+
+@register_jitable
+def as_it_steps(par: Any, t: float, state: Any) -> Any:
+    """A sample that shows the state of the kernel."""
+    return state
