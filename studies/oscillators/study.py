@@ -32,12 +32,13 @@ def cases(quick: bool) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """Errors against the analytic solution, or against the damped top's truth."""
+    """Errors against the analytic solution, or against the damped top's truth; ``chart`` is what was stepped in."""
     plan, method = case.settings, case.integrator
     if case.scene not in OSCILLATORS:
-        return tables.damped_top_table(scene(case.scene), method, plan["counts"], plan["horizon"])
+        table = tables.damped_top_table(scene(case.scene), method, plan["counts"], plan["horizon"])
+        return table.assign(chart="angles")
     oscillator = OSCILLATORS[case.scene]
-    data = tables.decay(oscillator, method, plan["long_step"], LONG)
+    data = tables.decay(oscillator, method, plan["long_step"], LONG).assign(chart="position")
     if method != RK45:
         data = data.merge(tables.convergence(oscillator, method, plan["steps"], HORIZON))
     return data.merge(tables.notebook_history(oscillator, 0.1, HORIZON)) if method == "midpoint" else data
