@@ -1,7 +1,7 @@
 """The two calls of symtop's own methods: `simulate` as a user types it, and the kernel alone.
 
-The kernel alone has its parameters, its start and its step as numbers; `taylor` has a compiled stepper of heyoka whose
-time, state and parameters are set back. An adaptive kernel of ours is called with a ready plan.
+The kernel alone is one compiled call, from top, start and step to the last state; `taylor` has a compiled stepper of
+heyoka whose time, state and parameters are set back. An adaptive kernel of ours is called with a ready plan.
 """
 
 from collections.abc import Callable
@@ -32,10 +32,8 @@ def inner(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Inner:
     top, start = scene.top, scene.start
     fixed = inside(method.solvers[chart])
     if fixed is not None:
-        par, rule, state = fixed.setup(top, start, plan.step_size)
-        loop, step, marks = fixed.loop, plan.step_size, plan.marks[-1:]
-        return Inner(lambda: loop(par, rule, state, step, marks), lambda done: fixed.run(
-            top, start, Plan.steps(step, marks), par, done).states[-1])  # fmt: skip
+        ends = Plan.steps(plan.step_size, plan.marks[-1:])
+        return Inner(lambda: fixed(top, start, ends), lambda run: run.states[-1])
     if method.family == "taylor":
         stepper = taylor.stepper(chart, "double", plan.tolerance)
         numbers, parameters = taylor.start_numbers(chart, "double", top, start)
