@@ -19,6 +19,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from symtop.methods import taylor
+from symtop.methods.angles import BareTop
+from symtop.methods.euler_lagrange import sampled_momenta, to_angles
 from symtop.methods.formulations import FORMULATIONS
 from symtop.methods.plan import Array
 from symtop.methods.registry import Integrator, integrators
@@ -99,8 +101,8 @@ def taylor_in_angles() -> Integrator:
     """The row ``taylor[angles]``: heyoka on the Euler-Lagrange equations, from the same formulas as the others."""
 
     def read(top: SymmetricTop, times: Array, states: Array) -> tuple[Array, Array, Array]:
-        form = FORMULATIONS["angles"]
-        return form.present(top, times, states), *form.momenta(top, states)
+        par = BareTop(top.I1, top.I3, top.mgl)
+        return to_angles(par, times, states), *sampled_momenta(par, states)
 
     method, solvers = integrators()["taylor"], {"angles": taylor.solver("angles", "double", read)}
     return replace(method, name="taylor[angles]", solvers=solvers)
