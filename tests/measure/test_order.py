@@ -80,3 +80,19 @@ def test_no_slope_confirms_two_orders():
         words = [order_verdict(claim, fit(slope, 0.2)) for claim in (1, 2, 3)]
         assert words.count("confirmed") <= 1
     assert 0.2 + BESIDE < 0.5 <= 0.1 + CLEARLY
+
+
+def test_a_step_that_was_taken_twice_is_one_point():
+    """Two points of the same step say nothing of the scatter: counted twice they made 8.9 +- 0.1 of order 10."""
+    rng = np.random.default_rng(3)
+    steps = np.geomspace(0.6, 0.8, 6)
+    errors = 1e-11 * steps**10.0 * (1.0 + 0.3 * steps**2) * np.exp(0.01 * rng.standard_normal(6))
+    once = order(steps, errors, 1e-16, 1.0, 10, symmetric=True)
+    thrice = order(np.tile(steps, 3), np.tile(errors, 3), 1e-16, 1.0, 10, symmetric=True)
+    assert (once.slope, once.interval) == (thrice.slope, thrice.interval) or not (
+        math.isfinite(once.slope) or math.isfinite(thrice.slope)
+    )
+    dense = np.geomspace(0.02, 0.4, 20)
+    fits = [order(np.repeat(dense, n), np.repeat(dense**2.0, n), 1e-16, 1.0, 2, symmetric=True) for n in (1, 2)]
+    assert fits[0].slope == fits[1].slope == pytest.approx(2.0, abs=1e-3)
+    assert fits[0].used.sum() == fits[1].used.sum()
