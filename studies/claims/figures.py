@@ -51,8 +51,10 @@ def _matrix(judged: dict[str, list[Finding]]) -> Picture:
                for verdict, color in COLORS.items()]  # fmt: skip
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
     caption = (
-        f"Every claim of every integrator, on {SCENE} where a row names no other scene: {count_words(judged)}. The "
-        "text of a cell is what was measured; grey cells claim nothing, white ones do not apply."
+        f"Every claim of every integrator, on {SCENE} where a row names no other scene: {count_words(judged)}. A claim "
+        "is judged in every chart of a method, and its worst chart is shown; the long runs take up to a million steps, "
+        "all other measurements a ladder of steps or tolerances. The text of a cell is what was measured; grey cells "
+        "claim nothing, white ones do not apply."
     )
     alt = f"A matrix of integrators and claims with a symbol for each verdict: {LEGEND}."
     return Picture("ledger", figure, caption, alt)
@@ -74,10 +76,10 @@ def _bracket(data: xr.Dataset) -> Picture:
     falling = [name for name, (_, defect) in measured.items() if defect[-1] < defect[0] / REFINED]
     level = [name for name in measured if name not in falling]
     caption = (
-        "How far one step is from preserving the Poisson bracket, which a symplectic step does, against the width of "
-        "the central differences that measure it. For a symplectic step the defect is an error of the differencing and "
-        f"falls with the square of the width: {', '.join(falling) or 'none'}. For the others it is real and levels "
-        f"off: {', '.join(level) or 'none'}."
+        f"How far one step is from preserving the Poisson bracket, which a symplectic step does, on {SCENE} in the "
+        "chart where it is farthest, against the width of the central differences that measure it. For a symplectic "
+        "step the defect is an error of the differencing and falls with the square of the width: "
+        f"{', '.join(falling) or 'none'}. For the others it is real and levels off: {', '.join(level) or 'none'}."
     )
     alt = (
         "Log-log plot of the defect against the differencing width: lines of slope two for symplectic methods, level "

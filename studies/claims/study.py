@@ -28,8 +28,12 @@ def cases(quick: bool) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The findings on one integrator."""
-    return judge(integrator(case.integrator), scene(case.scene), quick=case.settings["quick"]).dataset()
+    """The findings on one integrator, in every chart that it works in."""
+    return (
+        judge(integrator(case.integrator), scene(case.scene), quick=case.settings["quick"])
+        .dataset()
+        .assign(chart="every")
+    )
 
 
 STUDY = Study(

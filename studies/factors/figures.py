@@ -75,8 +75,9 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
         "waterfall",
         figure,
         f"Where the factor comes from. {words.product(*shown[0])} Each bar changes what its label names and holds the "
-        "other three factors and the accuracy; the ratios multiply to the total. Language: SciPy's loop with its "
-        "right-hand side in Python, then compiled, then the whole loop compiled. Hatched bars are slower. Public "
+        "other three factors and the accuracy, by the coarsest step or tolerance found; the ratios multiply to the "
+        "total. Language: SciPy's loop with its right-hand side in Python, then compiled, then the whole loop compiled. "
+        "Hatched bars are slower. Public "
         f"calls return {SAMPLES} samples, a kernel two. Above, the call becomes bare last: what simulate adds to a run "
         "hides the method. Below, it becomes bare at once: the ratios differ, the product does not. "
         f" Noise (median over least sample) is at most {noise:.0%}.",
@@ -125,9 +126,9 @@ def draw_charts(data: xr.Dataset) -> Picture:
     return Picture(
         "charts",
         figure,
-        f"Methods by chart on {first}, each at the coarsest setting found that meets the axis error in the title; bare "
-        "kernels, compiled but for DOP853, which is SciPy's. Further left is better; the line joins the charts of one "
-        f"method. A method that is missing needs more than the study's budget. {sentences}",
+        f"Methods by chart on {first}, each at the coarsest step or tolerance found that meets the axis error in the "
+        "title; bare kernels, compiled but for DOP853, which is SciPy's. Further left is better; the line joins "
+        f"the charts of one method. A method that is missing needs more than the study's budget. {sentences}",
         "Dot plots, a row for each method, open, full and half-full markers for angles, axis and attitude.",
     )
 

@@ -64,7 +64,8 @@ def winners(data: xr.Dataset) -> Picture:
     return Picture(
         "winners",
         figure,
-        f"The fastest compiled row, method[chart], for each axis error that steps and tolerances were searched for. "
+        f"The fastest compiled row, method[chart], on each scene, for each axis error that steps and tolerances were "
+        "searched for. "
         f"Most often: {most}, of {len(met)} cells.{words.not_asked(data)} Pale and with a tilde: its lead over at "
         "least one other row is within the noise. All times are measured; the closed form is not ranked.",
         "Coloured cells naming the fastest row, a line a scene, a column an accuracy.",

@@ -16,7 +16,10 @@ from symtop.methods.registry import integrators, split_name
 from symtop.model.scenes import scenes
 from symtop.runner.grid import grid_rows
 
-STUDIES = ("drift", "stability", "reduction", "notebook", "oscillators", "truth")
+STUDIES = (
+    "truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction", "claims", "notebook",
+    "oscillators",
+)  # fmt: skip
 MUST_SAY = {
     "a step or a tolerance": r"\bsteps?\b|\btolerances?\b",
     "a scene": rf"\b(scenes?|oscillator|{'|'.join(map(re.escape, scenes()))})\b",
