@@ -76,7 +76,7 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
         figure,
         f"Where the factor comes from. {words.product(*shown[0])} Each bar changes what its label names and holds the "
         "other three factors and the accuracy, by the coarsest step or tolerance found; the ratios multiply to the "
-        "total. Language: SciPy's loop with its right-hand side in Python, then compiled, then the whole loop compiled. "
+        "total. Language: SciPy's loop with its right-hand side in Python, then compiled, then the whole loop. "
         "Hatched bars are slower. Public "
         f"calls return {SAMPLES} samples, a kernel two. Above, the call becomes bare last: what simulate adds to a run "
         "hides the method. Below, it becomes bare at once: the ratios differ, the product does not. "
