@@ -5,6 +5,7 @@ import json
 import math
 import os
 import random
+import sys
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,14 @@ def _registered_for_one_file():
     """Forget the integrators, scenes and plug-ins that a file of tests registered, so that files run in any order."""
     with _registered_for_a_while():
         yield
+
+
+@pytest.fixture(autouse=True)
+def _figures_closed():
+    """Close the figures that a test has drawn: matplotlib warns of more than 20, and a warning is an error here."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
 
 
 @pytest.fixture(scope="session")
