@@ -73,7 +73,7 @@ def test_the_second_time_nothing_is_computed_and_damaged_cases_are(results):
     victims[0].write_bytes(victims[0].read_bytes()[:1000])
     victims[1].write_bytes(b"\0" * 4096)
     victims[2].unlink()
-    mended = runner.run(study, results, quick=True, quiet=True)
+    mended = runner.run(study, results, quick=True, quiet=True, save=style.save)
     assert mended["computed"] == 3
     assert datasets.read(results / "convergence.nc").equals(before)
 
