@@ -5,18 +5,21 @@
 # make test            run the fast tests            make test-all   run all tests
 # make lint            run ruff and mypy             make clean      delete .venv, caches and what studies stored
 # make bench           time the kernels against C    make peers      run the same tops in other libraries
+# make engines         run physics engines against their maps
 # Each target makes .venv first if it is missing or out of date.
 
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 PEERS := benchmarks/peers/.venv
+ENGINES := benchmarks/engines/.venv
+OLDER := benchmarks/engines/.venv-mujoco-3
 
 .DEFAULT_GOAL := help
-.PHONY: help setup studies quick report check-results test test-all lint bench peers clean
+.PHONY: help setup studies quick report check-results test test-all lint bench peers engines clean
 
 help:
-	@sed -n '1,8s/^# //p' Makefile
+	@sed -n '1,9s/^# //p' Makefile
 
 setup: $(READY)
 
@@ -46,11 +49,11 @@ check-results: $(READY)
 
 test: $(READY)
 	@echo "symtop: running the fast tests (make test-all runs all)"
-	@$(BIN)/python -m pytest -m "not slow"
+	@$(BIN)/python -m pytest -m "not slow" --numprocesses auto --dist loadfile
 
 test-all: $(READY)
 	@echo "symtop: running all tests"
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 lint: $(READY)
 	@$(BIN)/ruff check .
@@ -71,6 +74,19 @@ $(PEERS)/.ready: pyproject.toml constraints.txt benchmarks/peers/constraints.txt
 	@$(PEERS)/bin/python benchmarks/peers/install.py
 	@touch $(PEERS)/.ready
 
+engines: $(ENGINES)/.ready
+	@echo "symtop: running physics engines against their maps (a minute)"
+	@$(ENGINES)/bin/python -m benchmarks.engines
+	@if [ -x $(OLDER)/bin/python ]; then $(OLDER)/bin/python -m benchmarks.engines --only mujoco --add; fi
+
+$(ENGINES)/.ready: pyproject.toml constraints.txt benchmarks/engines/constraints.txt benchmarks/engines/node/package.json
+	@echo "symtop: making $(ENGINES) and installing physics engines (a gigabyte, some minutes, once)"
+	@$(PYTHON) -m venv $(ENGINES)
+	@$(ENGINES)/bin/python benchmarks/engines/install.py
+	@$(PYTHON) -m venv $(OLDER)
+	@$(OLDER)/bin/python benchmarks/engines/install.py mujoco==3.17.0
+	@touch $(ENGINES)/.ready
+
 clean:
-	rm -rf .venv $(PEERS) .pytest_cache .ruff_cache .mypy_cache benchmarks/build results/cases results/quick
-	find results -maxdepth 1 \( -name '*.nc' -o -name '*.json' \) ! -name 'peers.*' ! -name bench.json -delete
+	rm -rf .venv $(PEERS) $(ENGINES) $(OLDER) .pytest_cache .ruff_cache .mypy_cache benchmarks/build results/cases results/quick
+	find results -maxdepth 1 \( -name '*.nc' -o -name '*.json' \) ! -name 'peers.*' ! -name bench.json ! -name live-engines.json -delete

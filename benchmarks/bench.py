@@ -1,4 +1,4 @@
-"""Every kernel beside C, what starting costs, and the time to an accuracy: results/bench.json, which the report shows.
+"""Kernels beside C, alone and in lanes, what starting costs, the time to an accuracy: results/bench.json in the report.
 
 make bench        (needs gcc; the twins are built into benchmarks/build)
 """
@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import kernels, measured, startup, targets, truth, twin, whole_run
+from benchmarks import ensemble, kernels, lanes, measured, startup, targets, truth, twin, whole_run
 from symtop.runner import store
 from symtop.runner.study import Table
 
@@ -21,6 +21,8 @@ def findings(
     reached: Sequence[targets.Reached],
     items: Sequence[whole_run.Item],
     one_step: Mapping[str, float],
+    many: Sequence[ensemble.Item],
+    together: lanes.Measured,
     accuracy: float,
     facts: Mapping[str, Any],
 ) -> dict[str, Any]:
@@ -70,7 +72,14 @@ def findings(
             ["part", "us", "steps of the method"],
             [[item.name, f"{item.seconds * 1e6:.1f}", f"{item.steps:.0f}"] for item in items],
         ),
+        *lanes.tables(together),
         Table("A run of one step", ["method", "us"], [[name, f"{s * 1e6:.2f}"] for name, s in one_step.items()]),
+        Table(
+            f"A member of an ensemble: {ensemble.NUTATIONS * ensemble.PER_NUTATION} steps of {ensemble.METHOD} "
+            f"[{ensemble.CHART}], {ensemble.SAMPLES} samples, {ensemble.MEMBERS} tops",
+            ["what", "us a member", "times faster than `simulate`"],
+            [[item.name, f"{item.seconds * 1e6:.2f}", f"{item.ratio:.3g}"] for item in many],
+        ),
         Table("Starting", ["what", "ms"], [[name, f"{seconds * 1e3:.2f}"] for name, seconds in started.items()]),
     ]
     return {
@@ -81,7 +90,13 @@ def findings(
             f"One process, all kernels and their C twins (gcc) interleaved in random order; {kernels.SCENE}, a step of "
             f"1/{kernels.PER_NUTATION:g} of a nutation. The spread is what five fifths of the batches would have said."
         ),
-        "verdict": [*said, run, f"A run of one step takes {one_step[slowest] * 1e6:.1f} us at most, with {slowest}."],
+        "verdict": [
+            *said,
+            *lanes.verdict(together),
+            *ensemble.verdict(many),
+            run,
+            f"A run of one step takes {one_step[slowest] * 1e6:.1f} us at most, with {slowest}.",
+        ],
         "tables": [table._asdict() for table in tables],
         "charts": [],
         "opening": None,
@@ -108,12 +123,16 @@ def main() -> None:
     forms = truth.measure()
     reached = targets.measure(options.accuracy)
     items, one_step = whole_run.measure(), whole_run.one_step()
+    many = ensemble.measure()
+    together = lanes.measure()
     for table in (
         kernels.lines(rows),
         startup.lines(started),
         truth.lines(forms),
         targets.lines(reached, options.accuracy),
         whole_run.lines(items, one_step),
+        ensemble.lines(many),
+        lanes.lines(together),
     ):
         print("\n".join(table), end="\n\n")
     options.results.mkdir(exist_ok=True)
@@ -123,9 +142,11 @@ def main() -> None:
         "startup": started,
         "closed_form": [row._asdict() for row in forms],
         "run": {"parts": [item._asdict() for item in items], "one_step": one_step},
+        "ensemble": [item._asdict() for item in many],
+        "lanes": {name: [row._asdict() for row in rows] for name, rows in together._asdict().items()},
         "targets": {"accuracy": options.accuracy, "methods": [row._asdict() for row in reached]},
     }
-    content = findings(rows, started, forms, reached, items, one_step, options.accuracy, facts)
+    content = findings(rows, started, forms, reached, items, one_step, many, together, options.accuracy, facts)
     store.write_json(target, content | numbers)
     print(f"written to {target}")
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import symtop
 from benchmarks import twin
 from symtop.measure.timing import Timing, timings
+from symtop.methods.registry import methods
 
 SCENE = "spheroid"
 PER_NUTATION = 400.37
@@ -52,7 +53,7 @@ def kernels() -> dict[tuple[str, str], twin.Kernel]:
     h = scene.nutation_period / PER_NUTATION
     found = {
         (method.name, chart): twin.kernel_of(method, chart, scene, h)
-        for method in symtop.integrators().values()
+        for method in methods().values()
         if method.fixed_step and method.implementation == "compiled"
         for chart in method.solvers
     }

@@ -12,6 +12,7 @@ import numpy as np
 import symtop
 from symtop.measure.timing import timings
 from symtop.methods.plan import Plan
+from symtop.methods.registry import methods
 from symtop.model import charts
 
 HORIZON = 8.0
@@ -51,7 +52,7 @@ def measure(accuracy: float = ACCURACY) -> list[Reached]:
     """Find the steps, time the runs; the fastest method first."""
     scene = symtop.scene("spheroid")
     found = {}
-    for method in symtop.integrators().values():
+    for method in methods().values():
         chart = "attitude" if "attitude" in method.solvers else "angles"
         if method.fixed_step and chart in method.solvers:
             steps = steps_needed(method, scene, chart, accuracy)

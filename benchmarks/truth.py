@@ -1,7 +1,7 @@
-"""The closed form: set-up and one sample, by the arithmetic of its constants, and a sample among many.
+"""The closed form: set-up and one sample, by the arithmetic of its constants, a sample among many, and many tops.
 
 Set-up and one sample are timed call by call, each on a top of its own, so that the median and the slow end are those of
-single forms. Samples among many are timed in batches.
+single forms. Samples among many, the constants of one top among many and a long reference are timed in batches.
 """
 
 import time
@@ -12,11 +12,14 @@ import numpy as np
 from symtop.measure.timing import timings
 from symtop.model import closed_form
 from symtop.model.closed_form import ClosedForm
+from symtop.model.closed_forms import ClosedForms
 from symtop.model.precise_form import PreciseForm
 from symtop.model.scenes import sleeping, spinning, steady
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, SymmetricTop, flat
+from symtop.run.reference import reference
 
 COUNT, MANY, BATCHES = 2000, 10_000, 15
+FAR = np.linspace(0.0, 1e5, 1001)  # times of the long reference
 
 
 class Row(NamedTuple):
@@ -76,7 +79,23 @@ def measure() -> list[Row]:
         Row(f"one sample among many, {name}", timing.best / MANY, max(timing.samples) / MANY)
         for name, timing in zip(views, taken, strict=True)
     ]
-    return rows
+    return rows + _of_many()
+
+
+def _of_many() -> list[Row]:
+    """The forms of many tops at once, for each of them, and a reference that has been asked for before."""
+    numbers = np.array([flat(*pair) for pair in _tops("double-double", COUNT)])
+    forms, times = ClosedForms(numbers), np.linspace(0.0, 20.0, 11)
+    calls = {
+        "constants of one top among many": (lambda: ClosedForms(numbers), COUNT),
+        "one sample of one top among many, axis": (lambda: forms.axis(times), COUNT * times.size),
+        "reference of spheroid at 1001 times to 1e5": (lambda: reference("spheroid", FAR), 1),
+    }
+    taken = timings([call for call, _ in calls.values()], batches=BATCHES)
+    return [
+        Row(name, timing.best / share, max(timing.samples) / share)
+        for (name, (_, share)), timing in zip(calls.items(), taken, strict=True)
+    ]
 
 
 def lines(rows: list[Row]) -> list[str]:

@@ -19,9 +19,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.methods import (
+    attitude_series,
+    axis_series,
+    collective_gauss,
     discrete_lagrangian,
+    energy_momentum,
+    exact_discrete,
     galerkin,
     gauss,
+    generalised_alpha,
+    kahan,
+    lie_runge_kutta,
+    lie_variational,
     runge_kutta,
     splitting_angles,
     splitting_space,
@@ -29,6 +38,7 @@ from symtop.methods import (
 )
 from symtop.methods.fixed_step import inside
 from symtop.methods.registry import Integrator
+from symtop.methods.series import DEFAULT_ORDER
 from symtop.model.scenes import Scene
 
 SOURCES = Path(__file__).resolve().parent / "twins"
@@ -55,7 +65,8 @@ def kernel_of(method: Integrator, chart: str, scene: Scene, h: float) -> Kernel 
 
 def _macros(rule: Any, chart: str = "") -> dict[str, int]:
     """What numba, too, knows when it compiles: the length of the table, and the chart."""
-    lengths = {"drift": "DRIFTS", "nodes": "NODES", "a": "STAGES"}
+    lengths = {"drift": "DRIFTS", "nodes": "NODES", "a": "STAGES", "shares": "SHARES", "weights": "WEIGHTS"}
+    lengths |= {"counts": "STAGES"} if hasattr(rule, "counts") else {"mu": "STAGES"}
     rows = {"a": "b"}  # a tableau is as long as its weights
     found = {macro: len(getattr(rule, rows.get(row, row))) for row, macro in lengths.items() if hasattr(rule, row)}
     return found | ({chart: 1} if chart else {})
@@ -70,13 +81,27 @@ FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
     splitting_space.march_axis: ("splitting_space", ""),
     splitting_space.march_attitude: ("splitting_space", "ATTITUDE"),
     **{loop: ("runge_kutta", chart.upper()) for chart, loop in runge_kutta.LOOPS.items()},
+    exact_discrete.march_axis: ("exact_discrete", ""),
+    exact_discrete.march_attitude: ("exact_discrete", ""),
+    axis_series.march(DEFAULT_ORDER): ("series", ""),
+    attitude_series.march(DEFAULT_ORDER): ("series", "ATTITUDE"),
     gauss.march_axis: ("gauss", "AXIS"),
     gauss.march_frame: ("gauss", "FRAME"),
+    kahan.march_axis: ("kahan", ""),
+    kahan.march_frame: ("kahan", "FRAME"),
+    lie_runge_kutta.march: ("lie_group", "RUNGE_KUTTA"),
+    lie_variational.march: ("lie_group", "VARIATIONAL"),
+    energy_momentum.march: ("lie_group", "ENERGY_MOMENTUM"),
+    generalised_alpha.march: ("lie_group", "ALPHA"),
+    collective_gauss.march: ("lie_group", "COLLECTIVE"),
 }
 # maps between the variables that are stepped and those that are shown, once a run
 SHOWN: dict[Callable[..., Any], tuple[Callable[..., Any], Callable[..., Any]]] = {
     splitting_space.march_axis: (splitting_space.enter_axis, splitting_space.present_axis),
     splitting_space.march_attitude: (splitting_space.enter_attitude, splitting_space.present_attitude),
+    exact_discrete.march_axis: (exact_discrete.enter, exact_discrete.present_axis),
+    exact_discrete.march_attitude: (exact_discrete.enter, exact_discrete.present_attitude),
+    attitude_series.march(DEFAULT_ORDER): (lambda _par, _rule, state, _h: state, attitude_series.present),
 }
 
 
@@ -109,7 +134,10 @@ def numbers(record: Any) -> list[float]:
         square = [(0, most - stages), (0, most - stages)]
         padded = (np.pad(record.mu, square), np.pad(record.b, square[:1]), np.pad(record.predict, square))
         return [float(stages), *(float(value) for part in padded for value in part.ravel())]
-    return [value for part in record for value in (numbers(part) if isinstance(part, tuple) else [float(part)])]
+    if isinstance(record, np.ndarray):
+        return [float(value) for value in record.ravel()]
+    nested = (tuple, np.ndarray)
+    return [value for part in record for value in (numbers(part) if isinstance(part, nested) else [float(part)])]
 
 
 class Twin:

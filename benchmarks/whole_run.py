@@ -13,10 +13,12 @@ import symtop
 from symtop.base import datasets
 from symtop.base.over_time import over_time
 from symtop.measure.timing import bare_run, timings
+from symtop.methods.calling import solve
 from symtop.methods.fixed_step import inside
+from symtop.methods.registry import methods
 from symtop.model.scenes import closed_form
 from symtop.run.guard import warning
-from symtop.run.simulation import as_dataset, make_plan, solve_plan
+from symtop.run.simulation import as_dataset, make_plan
 
 SCENE, METHOD, CHART, STEPS = "spheroid", "strang", "axis", 400
 BATCHES, BATCH = 40, 2e-3
@@ -35,8 +37,9 @@ def measure() -> list[Item]:
     scene, method = symtop.scene(SCENE), symtop.integrator(METHOD).row(CHART)
     h = scene.horizon / STEPS
     plan, _ = make_plan(scene, method, h, None, horizon=scene.horizon, samples=501)
-    run = solve_plan(method, CHART, scene.top, scene.start, plan)
+    run = solve(method, CHART, scene.top, scene.start, plan)
     data, form = as_dataset(scene, CHART, plan, run), closed_form(scene)
+    axes = data["axis"].to_numpy()[:300]
     columns = {str(name): values.to_numpy() for name, values in data.data_vars.items()}
     attributes: dict[str, Any] = dict(symtop.simulate(scene, method, step_size=h).attrs)
     del attributes["title"]
@@ -44,10 +47,10 @@ def measure() -> list[Item]:
         "the steps alone": bare_run(scene, method, CHART, h, scene.horizon),
         "plan": lambda: make_plan(scene, method, h, None, horizon=scene.horizon, samples=501),
         "guard": lambda: warning(scene, method, CHART, plan),
-        "closed form at the guard's points": lambda: form.axis(plan.times[:300]),
-        "solver, every step shown": lambda: solve_plan(method, CHART, scene.top, scene.start, plan),
+        "closed form at the guard's points": lambda: form.axis_distance(plan.times[:300], axes),
+        "solver, every step shown": lambda: solve(method, CHART, scene.top, scene.start, plan),
         "columns and dataset": lambda: as_dataset(scene, CHART, plan, run),
-        "closed form at the samples": lambda: form(plan.times),
+        "closed form at the samples": lambda: form.turns(plan.times),
         "dataset of columns": lambda: over_time(plan.times, columns),
         "attributes": lambda: datasets.describe(data, "bench", **attributes),
         "simulate without the guard": lambda: symtop.simulate(scene, method, step_size=h, guard=False),
@@ -63,7 +66,7 @@ def one_step() -> dict[str, float]:
     scene = symtop.scene(SCENE)
     calls = {
         f"{method.name}[{chart}]": bare_run(scene, method, chart, 0.01, 0.01)
-        for method in symtop.integrators().values()
+        for method in methods().values()
         for chart, solver in method.solvers.items()
         if method.fixed_step and inside(solver) is not None
     }

@@ -1,4 +1,4 @@
 """The studies that ship with symtop: one folder a question."""
 
 # of the report; others follow
-ORDER = ("truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction")
+ORDER = ("population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction")

@@ -1,9 +1,9 @@
 """`recommend`: the cheapest integrator, with its step or tolerance, that meets an accuracy on a scene.
 
-    1. Candidates. A stored work-precision study lists the methods that were cheapest on the stored scene nearest to
-       this one. The distance of two scenes is that of four dimensionless numbers which fix the motion of the axis:
-       cos(theta) at both turning points, and both momenta over sqrt(I1 mgl). Without a stored study every compiled
-       method is a candidate.
+    1. Candidates. A stored population study counts on how many of the random tops nearest to this one a method was
+       the cheapest or nearly so; a stored work-precision study lists the methods that were cheapest on the nearest
+       scene. The distance is that of four dimensionless numbers which fix the motion of the axis
+       (`symtop.measure.nearest`). Without a stored study every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
        (`symtop.measure.settings`). The error is measured against the closed form, its target is lowered by the law of
        growth, and one run is timed.
@@ -18,6 +18,9 @@ The confidence of the advice is one of:
     none                       no method meets the accuracy; the integrator is None
 
 An accuracy below the bound of the reference is answered with ``none`` before any run, because no run could show it.
+
+The closed form is no candidate: it is what errors are measured by, and a top with friction, drive or another body
+attached has none. For the top as it stands it is mostly the fastest way, and the advice says so with its time.
 """
 
 import math
@@ -30,19 +33,20 @@ import numpy as np
 import xarray as xr
 
 from symtop.base import datasets
-from symtop.base.numbers import TINY
 from symtop.base.validate import SymtopError, one_of, positive
 from symtop.measure import ranking, settings
 from symtop.measure.errors import QUANTITIES
+from symtop.measure.nearest import STORED, Near, distances, nearest, regime
 from symtop.measure.phase import FREQUENCIES
-from symtop.methods.registry import Integrator, integrator, split_name
+from symtop.measure.timing import bare_run, timings
+from symtop.methods.registry import Integrator, integrator, integrators, is_built_in, split_name
 from symtop.model import scenes
-from symtop.model.scenes import Scene
+from symtop.model.scenes import Scene, horizon_of
 from symtop.run.simulation import MOST_STEPS
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
 STORED_STUDY = "work_precision.nc"
-CANDIDATES = 8  # methods of the stored study that are tried
+CANDIDATES = 8  # methods of the stored studies that are tried
 FINALISTS = 3  # methods that are run to the whole horizon
 TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
 CONFIDENCE = {
@@ -58,7 +62,8 @@ class Advice:
     """A recommended integrator with its step or tolerance, and how sure that is.
 
     `expected_error` is the largest error of `quantity` expected over `horizon`; `seconds` is the wall time of the bare
-    run on this machine. `fails` says why other methods that were tried were not recommended.
+    run on this machine. `closed_form` compares it with the evaluation of the closed form. `fails` says why other
+    methods were not recommended. `command` and `python` are lines that make the recommended run.
     """
 
     scene: str
@@ -73,11 +78,19 @@ class Advice:
     confidence: str
     reason: str
     runner_up: str = ""
+    closed_form: str = ""
+    nearest: str = ""
     fails: tuple[str, ...] = ()
+    command: str = ""
+    python: str = ""
 
     def __str__(self) -> str:
-        runner = [f"Runner-up: {self.runner_up}"] if self.runner_up else []
-        return "\n".join([self.reason, *runner, *self.fails])
+        named = {"Runner-up": self.runner_up, "": self.nearest, " ": self.closed_form}
+        lines = [f"{name}: {text}" if name.strip() else text for name, text in named.items() if text]
+        last = {"Run it": self.command, "In Python": self.python}
+        return "\n".join(
+            [self.reason, *lines, *self.fails, *(f"{name}: {text}" for name, text in last.items() if text)]
+        )
 
 
 class _Question(NamedTuple):
@@ -101,15 +114,6 @@ class _Trial(NamedTuple):
         return f"{self.met.integrator.name} with {self.met.integrator.setting(self.met.setting).label}"
 
 
-def regime(scene: Scene) -> np.ndarray:
-    """Four dimensionless numbers of a scene: cos(theta) at both turning points, asinh of both scaled momenta."""
-    top, start = scene.top, scene.start
-    low, high = sorted(top.turning_cosines(start))
-    unit = math.sqrt(top.I1 * max(abs(top.mgl), TINY))
-    momenta = top.momenta(start)
-    return np.array([low, high, math.asinh(momenta.p_psi / unit), math.asinh(momenta.p_phi / unit)])
-
-
 def recommend(
     scene: "str | Scene", *, accuracy: float, quantity: str = "axis", horizon: float | None = None,
     results: str | Path | None = None,
@@ -118,29 +122,32 @@ def recommend(
 
     `accuracy` is the largest absolute error of `quantity` over the run: radians for ``axis``, ``attitude`` and
     ``theta``, the units of the scene for others. `horizon` is the scene's own by default. `results` is a folder with a
-    stored ``work_precision.nc``; without it every compiled method is tried. Raises SymtopError for arguments that are
-    out of range. It runs what it recommends, which takes from 0.1 s to half a minute.
+    stored ``work_precision.nc``, and ``population.nc`` if it is there; without it every compiled method is tried.
+    Raises SymtopError for arguments that are out of range. It runs what it recommends, which takes from 0.1 s to half
+    a minute.
     """
     scene = scenes.scene(scene)
     accuracy = positive("accuracy", accuracy)
     if accuracy >= math.pi:
         raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}")
     one_of("quantity", quantity, KNOWN_QUANTITIES)
-    horizon = scene.horizon if horizon is None else positive("horizon", horizon)
+    horizon = scene.horizon if horizon is None else horizon_of(horizon)
     data = None if results is None else _stored(Path(results) / STORED_STUDY)
     limit = settings.judgeable(scene, quantity, horizon)
     question = _Question(scene, accuracy, quantity, horizon)
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
-    guesses, source = _candidates(question, data)
+    near = None if results is None else nearest(Path(results) / STORED, scene, quantity, accuracy, horizon)
+    guesses, source = _candidates(question, data, near)
     source += f" ({Path(results) / STORED_STUDY})" if results is not None else ""
     trials: list[_Trial] = []
     fails: dict[str, list[str]] = {}
     patience = math.inf
     methods = {name: integrator(name) for name in guesses}
     # Methods of high order first: they are the cheapest at most accuracies, and their cost ends the other searches.
-    for name in sorted(guesses, key=lambda name: -(methods[name].order or 0)):
+    ordered = sorted(guesses, key=lambda name: -(methods[name].order or 0))
+    for name in ordered:
         trial = _try(question, methods[name], guesses[name], patience)
         if isinstance(trial, _Trial):
             trials.append(trial)
@@ -159,7 +166,7 @@ def recommend(
             fails.setdefault(confirmed, []).append(trial.met.integrator.name)
     ranked.sort(key=lambda trial: trial.seconds)
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
-    return _advice(question, ranked, sentences, source)
+    return _advice(question, ranked, sentences + _not_tried(), source, near)
 
 
 def _stored(file: Path) -> xr.Dataset:
@@ -188,13 +195,21 @@ def _usable(quantity: str) -> list[str]:
     ]
 
 
+def _not_tried() -> tuple[str, ...]:
+    """A sentence on the user's own methods in plain Python, whose times say nothing beside those of compiled ones."""
+    names = [own.name for own in integrators().values() if own.implementation == "python" and not is_built_in(own.name)]
+    return (f"Not tried, as only compiled methods are timed: {', '.join(names)}.",) if names else ()
+
+
 def _same(row: str, usable: Sequence[str]) -> str | None:
     """The usable name of a stored row, of the same method in another chart if need be; None if there is none."""
     method = split_name(row)[0]
     return next((name for name in (row, *usable) if name in usable and split_name(name)[0] == method), None)
 
 
-def _candidates(question: _Question, data: xr.Dataset | None) -> tuple[dict[str, float | None], str]:
+def _candidates(
+    question: _Question, data: xr.Dataset | None, near: Near | None = None
+) -> tuple[dict[str, float | None], str]:
     """Names of methods to try, each with a first guess of its setting, and a phrase on their origin."""
     scene, accuracy, quantity, horizon = question
     usable = _usable(quantity)
@@ -206,21 +221,31 @@ def _candidates(question: _Question, data: xr.Dataset | None) -> tuple[dict[str,
     if not stored:
         return everyone, f"tried all {len(everyone)} compiled methods (the stored study holds no known scene)"
     numbers = regime(scene)
-    nearest = min(stored, key=lambda name: float(np.sum((regime(stored[name]) - numbers) ** 2)))
+    closest = min(stored, key=lambda name: float(distances(regime(stored[name])[np.newaxis], numbers)[0]))
     nutations = horizon / scene.nutation_period
     column = int(np.argmin(np.abs(np.log(data["horizon"].values / max(nutations, 1e-3)))))
-    cell = data.sel(scene=nearest).isel(horizon=column)
-    chosen: dict[str, float | None] = {}
+    cell = data.sel(scene=closest).isel(horizon=column)
+    cheapest: dict[str, float | None] = {}
     stored_as = "axis" if quantity == "attitude" else quantity  # the study runs what shows the axis
     for place in ranking.cheapest(cell, accuracy, stored_as):
         name = _same(place.integrator, usable)
-        if name is not None and name not in chosen and len(chosen) < CANDIDATES:
+        if name is not None and name not in cheapest:
             row = cell.sel(integrator=place.integrator).isel(setting=place.setting)
-            chosen[name] = _setting(row, scene, stored[nearest])
+            cheapest[name] = _setting(row, scene, stored[closest])
+    served = _served(near, usable)
+    chosen = {name: cheapest.get(name) for name in [*served, *cheapest][:CANDIDATES]}
     if not chosen:
-        cause = f"none met it on {nearest}, the nearest stored scene"
+        cause = f"none met it on {closest}, the nearest stored scene"
         return everyone, f"tried all {len(everyone)} compiled methods ({cause})"
-    return chosen, f"tried the {len(chosen)} methods that are cheapest on {nearest}, the nearest stored scene"
+    if near is not None and served:
+        return chosen, f"tried the {len(chosen)} methods that served most of the {near.tops} nearest random tops"
+    return chosen, f"tried the {len(chosen)} methods that are cheapest on {closest}, the nearest stored scene"
+
+
+def _served(near: Near | None, usable: Sequence[str]) -> list[str]:
+    """The usable methods that served one of the nearest tops or more, the most first."""
+    rows = [row for row, count in near.served.items() if count] if near is not None else []
+    return list(dict.fromkeys(filter(None, (_same(row, usable) for row in rows))))
 
 
 def _setting(row: xr.Dataset, scene: Scene, stored: Scene) -> float:
@@ -263,14 +288,17 @@ def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
     return _Trial(met, met.error, settings.seconds(scene, met, quantity, horizon), confidence)
 
 
-def _advice(question: _Question, ranked: Sequence[_Trial], fails: tuple[str, ...], source: str) -> Advice:
+def _advice(
+    question: _Question, ranked: Sequence[_Trial], fails: tuple[str, ...], source: str, near: Near | None = None
+) -> Advice:
     scene, accuracy, quantity, horizon = question
     goal = f"{quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}"
     if not ranked:
-        reason = f"Nothing that was tried meets {goal}; {source}. The closed form, integrator exact, takes no steps."
+        reason = f"Nothing that was tried meets {goal}; {source}."
         return Advice(
             scene.name, quantity, accuracy, horizon, integrator=None, step_size=None, tolerance=None,
-            expected_error=math.nan, seconds=math.nan, confidence="none", reason=reason, fails=fails,
+            expected_error=math.nan, seconds=math.nan, confidence="none", reason=reason,
+            closed_form=_without_steps(question, math.nan), fails=fails,
         )  # fmt: skip
     best = ranked[0]
     worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
@@ -279,5 +307,43 @@ def _advice(question: _Question, ranked: Sequence[_Trial], fails: tuple[str, ...
     return Advice(
         scene.name, quantity, accuracy, horizon, best.met.integrator.name, best.met.setting if step else None,
         None if step else best.met.setting, best.error, best.seconds, best.confidence,
-        reason=f"{best.words()} meets {goal}: {worth}; {source}.", runner_up="".join(runners), fails=fails,
+        reason=f"{best.words()} meets {goal}: {worth}; {source}.", runner_up="".join(runners),
+        closed_form=_without_steps(question, best.seconds), nearest=_on_nearest(near, best.met.integrator.name),
+        fails=fails, **_lines(question, best.met),
     )  # fmt: skip
+
+
+def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
+    """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
+    scene, _, _, horizon = question
+    value, name = float(f"{met.setting:.5g}"), met.integrator.name
+    known, whole = scenes.scenes().get(scene.name) == scene, horizon == scene.horizon
+    shown, control = f'"{name}"' if "[" in name else name, str(met.integrator.control)
+    until = "" if whole else f" --horizon {horizon:g}"
+    command = f"symtop run {scene.name} {shown} --{control.replace('_', '-')} {value!r}{until}"
+    of, until = f'"{scene.name}"' if known else "scene", "" if whole else f", horizon={horizon!r}"
+    python = f'symtop.simulate({of}, "{name}", {control}={value!r}{until})'
+    return {"command": command if known else "", "python": python}
+
+
+def _on_nearest(near: Near | None, name: str) -> str:
+    """How many of the nearest random tops a method served; empty if its rows are not in the study."""
+    rows = [row for row in near.served if split_name(row)[0] == split_name(name)[0]] if near is not None else []
+    return near.words(name if name in rows else rows[0]) if near is not None and rows else ""
+
+
+def _without_steps(question: _Question, best: float) -> str:
+    """What the closed form costs beside a run of `best` seconds (nan if there is none), and why it is not advised."""
+    scene, _, quantity, horizon = question
+    exact = integrator("exact")
+    call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
+    taken = timings([call], batches=5, batch=0.002)[0].best
+    limit = settings.judgeable(scene, quantity, horizon)
+    error = f", with an error below {limit:.1g}" if math.isfinite(limit) else ""
+    if not best > taken:
+        more = f", {taken / best:.2g} times that" if math.isfinite(best) else ""
+        return f"The closed form, integrator exact, takes {taken * 1e6:.2g} us{more}{error}, and no step."
+    return (
+        f"The fastest way is no integrator: the closed form (exact) takes {taken * 1e6:.2g} us, {best / taken:.2g} "
+        f"times less{error}. The integrators are compared for what they do where there is no closed form."
+    )

@@ -14,6 +14,8 @@ from symtop.advise import regime
 from symtop.cli.main import main
 from symtop.measure import settings
 from symtop.measure.errors import errors_against
+from symtop.measure.nearest import Near
+from symtop.methods.registry import methods
 
 
 def measured(scene, advice, quantity="axis"):
@@ -102,6 +104,25 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
     advice = symtop.recommend("spheroid", accuracy=1e-3, horizon=20.0)
     run = symtop.simulate("spheroid", advice.integrator, step_size=advice.step_size, tolerance=advice.tolerance)
     assert run.attrs["integrator"] == advice.integrator
+
+
+def test_candidates_start_from_the_nearest_random_tops_and_the_advice_counts_them():
+    near = Near({"rk4[axis]": 40, "strang[axis]": 7, "stormer-verlet[angles]": 0}, 50, "axis", 1e-6, 10.0)
+    assert advise._served(near, advise._usable("axis")) == ["rk4[axis]", "strang[axis]"]
+    assert advise._served(near, advise._usable("attitude")) == ["rk4[angles]", "strang[attitude]"]  # by method
+    assert "on 40 of the 50 nearest random tops" in advise._on_nearest(near, "rk4[axis]")
+    assert "stormer-verlet[angles] was" in advise._on_nearest(near, "stormer-verlet")
+    assert "on 0 of the 50" in advise._on_nearest(near, "stormer-verlet")  # and it says so
+    assert advise._on_nearest(near, "gauss-4[axis]") == ""
+    assert advise._on_nearest(None, "rk4[axis]") == ""
+    assert advise._served(None, ["rk4[axis]"]) == []
+
+
+def test_nothing_is_said_of_random_tops_without_results(monkeypatch):
+    few(monkeypatch, 1)
+    advice = symtop.recommend("spheroid", accuracy=1e-3, horizon=20.0)
+    assert advice.nearest == ""
+    assert "random" not in str(advice)
 
 
 def test_an_older_study_is_refused_with_a_remedy(tmp_path):
@@ -221,7 +242,7 @@ def test_sixty_random_tops():
             if number % 6 == 0:
                 searches = [
                     settings.search(scene, method, accuracy, "axis", scene.horizon, patience=2e6)
-                    for method in symtop.integrators().values()
+                    for method in methods().values()
                     if method.implementation == "compiled"
                     and method.control is not None
                     and method.name != "taylor-quad"

@@ -6,7 +6,8 @@ make peers        (makes benchmarks/peers/.venv once)
 import argparse
 from pathlib import Path
 
-from benchmarks.peers import ADAPTERS, load
+from benchmarks.peers import ADAPTERS, load, together
+from benchmarks.peers.adapters.diffrax import PACKAGE as DIFFRAX, SOLVERS
 from benchmarks.peers.measure import SCENES, measure
 from benchmarks.peers.study import STUDY, measured
 from benchmarks.peers.summary import lines
@@ -23,20 +24,25 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", default=list(ADAPTERS), help="these libraries")
     parser.add_argument("--redraw", action="store_true", help="use the stored dataset")
     options = parser.parse_args()
-    file = options.results / "peers.nc"
+    file, told = options.results / "peers.nc", options.results / "peers.json"
     peers, missing = load(tuple(options.only))
     for sentence in missing:
         print(sentence)
     if options.redraw:
         data = datasets.read(file)
+        many = [together.Row(**row) for row in (store.read_json(told) or {}).get("together", [])]
     else:
         data = datasets.describe(measure(peers, options.scenes), STUDY.title, question=STUDY.question)
         datasets.write(data, file)
+        many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())
     findings = run.findings_of(
         STUDY, data, options.results, style.save, failures=missing, cases=data["seconds"].count().item()
     )
-    store.write_json(options.results / "peers.json", findings | {"measured": measured(data)})
-    print("\n".join(lines(data)))
+    if many:
+        findings["tables"].append(together.table(many)._asdict())
+        findings["verdict"] = [*findings["verdict"], *together.verdict(many)]
+    store.write_json(told, findings | {"measured": measured(data), "together": [row._asdict() for row in many]})
+    print("\n".join([*lines(data), "", *together.lines(many)]))
 
 
 if __name__ == "__main__":

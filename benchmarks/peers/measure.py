@@ -28,7 +28,7 @@ from benchmarks.peers.common import Inner, Library, axes_of
 from symtop.measure.accuracy import SAMPLES, judge_limit
 from symtop.measure.settings import seek, step_ladder
 from symtop.measure.timing import timings
-from symtop.methods.registry import Integrator
+from symtop.methods.registry import Integrator, methods
 from symtop.model import charts
 from symtop.model.scenes import Scene
 from symtop.run.reference import reference
@@ -152,7 +152,7 @@ def ours(scene: Scene, tell: Callable[[str], None]) -> list[tuple[Peer, list[Poi
     chosen: dict[str, tuple[Peer, list[Point]]] = {}
     rough: dict[float, list[tuple[float, str]]] = {target: [] for target in TARGETS}
     searched = {}
-    for method in symtop.integrators().values():
+    for method in methods().values():
         if method.implementation != "compiled" or method.control is None or method.name.startswith("taylor-"):
             continue  # no control: the closed form, which is the truth here
         points = worth_timing(search(scene, method))

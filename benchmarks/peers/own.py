@@ -12,9 +12,10 @@ import numpy as np
 import symtop
 from benchmarks.peers.common import Inner
 from symtop.methods import taylor
+from symtop.methods.calling import solve
 from symtop.methods.fixed_step import inside
 from symtop.methods.plan import Plan
-from symtop.methods.registry import Integrator, solve
+from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 
 LANGUAGE = "numba, inside the kernel"

@@ -1,6 +1,7 @@
 /* Twin of symtop/methods/discrete_lagrangian.py; NODES is the number of nodes of the rule. */
 
 #include "march.h"
+#include "sines.h"
 
 #define DIM 4
 #define SMALLEST 1e-18
@@ -17,11 +18,7 @@ static inline Sums node_sums(const Rule *rule, double theta, double d, double si
     double first = 0.0, shift = 0.0, square = 0.0;
     for (int i = 0; i < NODES; i++) {
         double a = rule->nodes[i], w = rule->weights[i], sin_x = sin_start, cos_x = cos_start;
-        if (a != 0.0) {
-            double x = 0.5 * (theta + a * d);
-            sin_x = sin(x);
-            cos_x = cos(x);
-        }
+        if (a != 0.0) sines(0.5 * (theta + a * d), &sin_x, &cos_x);
         double low = sin_x * sin_x, high = cos_x * cos_x, s = 2.0 * sin_x * cos_x, c = high - low;
         if (i == 0) first = low;
         double gap = low - first;
@@ -47,10 +44,7 @@ static inline Sums node_sums(const Rule *rule, double theta, double d, double si
 
 static inline void start_trig(const Rule *rule, double theta, double *s, double *c) {
     *s = *c = 0.0;
-    if (rule->nodes[0] == 0.0) {
-        *s = sin(0.5 * theta);
-        *c = cos(0.5 * theta);
-    }
+    if (rule->nodes[0] == 0.0) sines(0.5 * theta, s, c);
 }
 
 static inline Forces forces(const Par *par, const Sums *t) {

@@ -2,18 +2,17 @@
    (symtop/methods/euler_lagrange.py). -DAXIS, -DFRAME, -DATTITUDE or -DANGLES chooses one, and with it Par and DIM. */
 
 #ifdef ANGLES
+#include "sines.h"
 #define DIM 6
 typedef struct { double I1, I3, mgl; } Par;
 
 static inline void field(const Par *par, const double *y, double *f) {
-    double s = sin(y[0]), c = cos(y[0]);
+    double s, c;
+    sines(y[0], &s, &c);
+    if (s == 0.0) s = NAN;
     f[0] = y[3];
     f[1] = y[4];
     f[2] = y[5];
-    if (s == 0.0) {
-        f[3] = f[4] = f[5] = NAN;
-        return;
-    }
     double spin = par->I3 * (y[5] + y[4] * c);
     double turn = y[3] * (spin - 2.0 * par->I1 * y[4] * c) / (par->I1 * s);
     f[3] = s * (y[4] * (par->I1 * y[4] * c - spin) + par->mgl) / par->I1;

@@ -1,6 +1,7 @@
 /* Twin of symtop/methods/galerkin.py. */
 
 #include "march.h"
+#include "sines.h"
 
 #define DIM 4
 #define SMALLEST 1e-18
@@ -15,7 +16,9 @@ typedef struct { double value, by_m, by_1; } Jet;
 typedef struct { Jet V0, Vm, V1, plus, minus; } Trial;
 
 static inline Node node(const Par *par, double theta) {
-    double sin_x = sin(0.5 * theta), cos_x = cos(0.5 * theta), low = sin_x * sin_x, high = cos_x * cos_x;
+    double sin_x, cos_x;
+    sines(0.5 * theta, &sin_x, &cos_x);
+    double low = sin_x * sin_x, high = cos_x * cos_x;
     Node found = {0.25 / (par->I1 * high), 0.25 / (par->I1 * low), sin_x / cos_x, 2.0 * sin_x * cos_x, high - low};
     return found;
 }

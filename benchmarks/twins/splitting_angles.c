@@ -1,6 +1,7 @@
 /* Twin of symtop/methods/splitting_angles.py; DRIFTS is the number of drifts in the table. */
 
 #include "march.h"
+#include "sines.h"
 
 #define DIM 4
 
@@ -9,7 +10,8 @@ typedef struct { double drift[DRIFTS], kick[DRIFTS + 1], bend[DRIFTS + 1], force
 typedef struct { double slope, rate, turn; } Carry;
 
 static inline Carry force(const Par *par, double theta) {
-    double s = sin(0.5 * theta), c = cos(0.5 * theta);
+    double s, c;
+    sines(0.5 * theta, &s, &c);
     double up = par->north / (s * s), down = par->south / (c * c), tilt = s * c;
     double slope = tilt * ((up + down) * (down - up) / (8.0 * par->I1) - 2.0 * par->mgl);
     double rate = (up + down) / (4.0 * par->I1);

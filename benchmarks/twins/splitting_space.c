@@ -4,6 +4,7 @@
    no part of a step; the caller does them. */
 
 #include "march.h"
+#include "half_angle.h"
 
 #ifdef ATTITUDE
 #define PLACE 4
@@ -15,21 +16,6 @@
 typedef struct { double I1, mgl, twist; } Par;
 typedef struct { double drift[DRIFTS], kick[DRIFTS + 1], bend[DRIFTS + 1], forces, turn, boost; } Rule;
 typedef struct { double x, y, z; } Carry;
-
-static const double SINE[9] = {
-    1.0, 1.0 / 6, 1.0 / 120, 1.0 / 5040, 1.0 / 362880, 1.0 / 39916800, 1.0 / 6227020800, 1.0 / 1307674368000,
-    1.0 / 355687428096000,
-};
-static const double COSINE[9] = {
-    1.0 / 2, 1.0 / 24, 1.0 / 720, 1.0 / 40320, 1.0 / 3628800, 1.0 / 479001600, 1.0 / 87178291200,
-    1.0 / 20922789888000, 1.0 / 6402373705728000,
-};
-
-static inline double series(double x, const double *c) {
-    double y = x * x, z = y * y;
-    double low = (c[0] - c[1] * x) + y * (c[2] - c[3] * x), high = (c[4] - c[5] * x) + y * (c[6] - c[7] * x);
-    return low + z * (high + z * c[8]);
-}
 
 static inline void rotor(const Rule *rule, const double *L, double half, double *s, double *m) {
     double square = half * half * (L[0] * L[0] + L[1] * L[1] + L[2] * L[2]);

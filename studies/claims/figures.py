@@ -3,8 +3,8 @@
 import numpy as np
 import xarray as xr
 
-from symtop.judge.claims import SCENE
-from symtop.judge.ledger import CLAIMS, Finding, spoken
+from symtop.judging.claims import SCENE
+from symtop.judging.ledger import CLAIMS, Finding, spoken
 from symtop.report import style
 from symtop.runner.study import Picture
 

@@ -2,7 +2,7 @@
 
 import xarray as xr
 
-from symtop.judge.claims import judge
+from symtop.judging.claims import judge
 from symtop.methods.registry import integrator, integrators
 from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes

@@ -5,8 +5,8 @@ from itertools import product
 import numpy as np
 import xarray as xr
 
-from symtop.judge.claims import SCENE
-from symtop.judge.ledger import Finding, read
+from symtop.judging.claims import SCENE
+from symtop.judging.ledger import Finding, read
 
 
 def findings(data: xr.Dataset) -> dict[str, list[Finding]]:

@@ -4,8 +4,8 @@ from collections import Counter
 
 import xarray as xr
 
-from symtop.judge.claims import SCENE
-from symtop.judge.ledger import CLAIMS, VERDICTS, Finding, spoken
+from symtop.judging.claims import SCENE
+from symtop.judging.ledger import CLAIMS, VERDICTS, Finding, spoken
 from symtop.runner.study import Table
 
 from .tables import findings

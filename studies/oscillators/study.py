@@ -1,24 +1,27 @@
-"""What becomes of a discrete Lagrangian when energy is taken away?
+"""What becomes of a discrete Lagrangian when energy is taken away, and when is it exact?
 
 The notebook integrated a damped oscillator by the discrete Lagrangian, and stopped at a guess about the forces. What it
 was after is done here: the virtual work of the force F over one step splits into F_d^- at its start and F_d^+ at its
 end, and the forced discrete Euler-Lagrange equations are
 
     D1 L_d(q1, q2) + D2 L_d(q0, q1) + F_d^-(q1, q2) + F_d^+(q0, q1) = 0.
+
+Without friction the harmonic oscillator has an exact discrete Lagrangian in closed form. So have the planar quartic
+oscillator and, by two of these, the top (`quartic`): the line from the seed to `exact-discrete`.
 """
 
 import xarray as xr
 
 from symtop.model.scenes import scene
-from symtop.runner.study import Case, Study
+from symtop.runner.study import Case, Picture, Study
 
-from . import figures, tables, words
+from . import figures, quartic_figures, quartic_tables, tables, words
 from .oscillator import ONE_SIDED
 from .tables import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOPS
 
 
 def cases(quick: bool) -> list[Case]:
-    """Every damping with both rules and the one-sided force; two of them against RK45; two damped tops."""
+    """Every damping with both rules and the one-sided force; two of them against RK45; damped tops; quartic ones."""
     steps = [10.0 ** (-k / 4.0) for k in range(13 if quick else 17)]
     counts = [1000 * 2**k for k in range(4 if quick else 6)]
     grid = []
@@ -28,12 +31,21 @@ def cases(quick: bool) -> list[Case]:
         grid += [Case(name, RK45, plan)] if name in AGAINST_RK45 else []
     for name in list(TOPS)[: 1 if quick else 2]:
         grid += [Case(name, method, {"counts": counts, "horizon": TOPS[name]}) for method in (*RULES, RK45)]
+    plan = {"periods": quartic_tables.PERIODS, "steps": list(quartic_tables.STEPS)}
+    grid += [Case(name, method, plan) for name in quartic_tables.QUARTICS for method in quartic_tables.MAPS]
     return grid
+
+
+def pictures(data: xr.Dataset) -> list[Picture]:
+    """Friction first, then the exact map."""
+    return [*figures.pictures(data), *quartic_figures.pictures(data)]
 
 
 def measure(case: Case) -> xr.Dataset:
     """Errors against the analytic solution, or against the damped top's truth; ``chart`` is what was stepped in."""
     plan, method = case.settings, case.integrator
+    if case.scene in quartic_tables.QUARTICS:
+        return quartic_tables.quartic_table(case.scene, method, plan["steps"], plan["periods"]).assign(chart="position")
     if case.scene not in OSCILLATORS:
         table = tables.damped_top_table(scene(case.scene), method, plan["counts"], plan["horizon"])
         return table.assign(chart="angles")
@@ -47,7 +59,7 @@ def measure(case: Case) -> xr.Dataset:
 STUDY = Study(
     name="oscillators",
     title="Oscillators and friction",
-    question="What becomes of a discrete Lagrangian when energy is taken away?",
+    question="What becomes of a discrete Lagrangian when energy is taken away, and when is it exact?",
     how_to_read=words.HOW_TO_READ,
-    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+    cases=cases, measure=measure, pictures=pictures, tables=words.tables, verdict=words.verdict,
 )  # fmt: skip

@@ -5,13 +5,16 @@ import xarray as xr
 
 from symtop.runner.study import Table
 
+from . import quartic_tables
 from .oscillator import ONE_SIDED, Oscillator
 from .tables import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOP_TOLERANCE, Column, order, tops
 
 HOW_TO_READ = (
     "The damped oscillator has an exact solution, so that every error is known. The slope of a line is the order. The "
     "top in damped gimbals shows Noether's theorem with friction: the momentum of a cyclic coordinate is no longer "
-    "conserved but balanced, p1 - p0 = F_d^- + F_d^+. The balance is an identity of the method and holds at any step."
+    "conserved but balanced, p1 - p0 = F_d^- + F_d^+. The balance is an identity of the method and holds at any step. "
+    "The planar quartic oscillators have no friction: for them a discrete Lagrangian in closed form is exact at any "
+    "step."
 )
 
 
@@ -79,7 +82,7 @@ def verdict(data: xr.Dataset) -> list[str]:
         f"most {largest_balance(data, RULES):.1e}, against {largest_balance(data, (RK45,)):.1e} with RK45 at tolerance "
         f"{TOP_TOLERANCE:g}."
     )
-    return [orders, update, energy(data), balance]
+    return [orders, update, energy(data), balance, *quartic_tables.sentences(data)]
 
 
 def tables(data: xr.Dataset) -> list[Table]:
@@ -97,4 +100,5 @@ def tables(data: xr.Dataset) -> list[Table]:
     ]  # fmt: skip
     orders = ["order of x", "order of the slow exponent"]
     header = ["b", "regime", "rule", *orders, f"relative energy error to T = {LONG:g}"]
-    return [Table(f"Damped oscillator against the analytic solution, T = {HORIZON:g}; no chart", header, rows)]
+    damped = Table(f"Damped oscillator against the analytic solution, T = {HORIZON:g}; no chart", header, rows)
+    return [damped, *quartic_tables.tables(data)]

@@ -10,7 +10,7 @@ import math
 import xarray as xr
 
 from symtop.measure.settings import ladder
-from symtop.methods.registry import integrator, integrators
+from symtop.methods.registry import integrator, methods
 from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
@@ -37,7 +37,7 @@ def cases(quick: bool) -> list[Case]:
         start, period = scene(name), scene(name).nutation_period
         several = [
             method
-            for method in integrators().values()
+            for method in methods().values()
             if method.implementation == "compiled" and len(method.charts()) > 1 and name == FIRST
         ]
         for method in several[:6] if quick else several:
@@ -47,7 +47,7 @@ def cases(quick: bool) -> list[Case]:
         plan = {"horizon": 8.0 * period, "step_sizes": [period / 30.7, period / 307.0], "batches": 3 if quick else 5}
         grid += [Case(name, reduced, {"part": "twins", **plan}) for reduced in tables.unreduced_forms()]
         plan = {"horizon": 2.0 * period, "counts": [50 * 2**k for k in range(4 if quick else 6)]}
-        known = [method.name for method in integrators().values() if reduced_first(start, method)]
+        known = [method.name for method in methods().values() if reduced_first(start, method)]
         grid += [Case(name, method, {"part": "commutation", **plan}) for method in known]
     return grid
 

@@ -38,12 +38,20 @@ LINES = {  # over the maps: label and dashes
 FALL_SPEED, FALL_PERIOD = 1.2, 4.22  # of the grazing family: rad/s at the pole, and its nutation period, s
 
 
+def sampled(outcome: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint8]:
+    """A map with this many rows and columns: the cells in the middle of each."""
+    row, column = (
+        (2 * np.arange(n) + 1) * size // (2 * n) for n, size in zip((height, width), outcome.shape, strict=True)
+    )
+    return outcome[row][:, column]
+
+
 def painted(outcome: NDArray[np.uint8]) -> NDArray[np.float64]:
     """A map of outcomes, shape (rows, columns), as an image (height, width, 3) with hatches."""
     from matplotlib.colors import to_rgb
 
     height, width = RASTER
-    big = outcome[np.arange(height) * outcome.shape[0] // height][:, np.arange(width) * outcome.shape[1] // width]
+    big = sampled(outcome, height, width)
     image = np.ones((*big.shape, 3))
     for index, word in enumerate(VERDICTS):
         region = big == index
@@ -57,6 +65,7 @@ def _name_regions(axis: Any, outcome: NDArray[np.uint8], extent: Sequence[float]
     """Write each outcome's name where its largest region is widest, if it fits."""
     from scipy.ndimage import distance_transform_edt, label
 
+    outcome = sampled(outcome, *np.minimum(RASTER, outcome.shape).tolist())
     height, width = outcome.shape
     for index in map(int, np.unique(outcome)):
         word = VERDICTS[index].replace("_", " ")

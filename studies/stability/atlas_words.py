@@ -161,6 +161,7 @@ def summary(data: xr.Dataset, family: str) -> list[str]:
     if by_name:
         sentences.append(
             f"For the median row, {np.median([one.silent for one in by_name.values()]):.0%} of inaccurate runs "
-            "end without an error; only the comparison with the truth shows that they are wrong."
+            "end without an error, whether or not they keep the energy; only the comparison with the truth shows "
+            "that they are wrong."
         )
     return sentences

@@ -18,8 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symtop.methods.calling import solve
 from symtop.methods.plan import Plan
-from symtop.methods.registry import Integrator, solve
+from symtop.methods.registry import Integrator
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles

@@ -3,7 +3,7 @@
 Points at the upper edge of the panel of the pole, x, are runs that ended early. Values below 1e-16 are drawn there.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,21 +26,19 @@ SLEEPERS = ("strang", "cayley", "midpoint", "gauss-4", "yoshida-4")
 GUIDE = {"color": GREY, "lw": 0.9, "zorder": 1}
 
 
-def pictures(data: xr.Dataset) -> list[Picture]:
-    """All figures that the dataset has something for."""
-    drawn = []
+def pictures(data: xr.Dataset) -> Iterator[Picture]:
+    """All figures that the dataset has something for, one after the other: with a plug-in they are more than twenty."""
     for family in families(data):
         sentences = {name: line.sentence for name, line in advice(data, family).items()}
         for page, names in pages(list(sentences)).items():
             figure = atlas_page(data, family, names, sentences)
             caption = page_caption(data, family, page, names)
-            drawn.append(Picture(f"atlas-{family}-{page}", figure, caption, f"Maps of outcomes: {', '.join(names)}."))
+            yield Picture(f"atlas-{family}-{page}", figure, caption, f"Maps of outcomes: {', '.join(names)}.")
     if set(MECHANISMS) & set(map(str, data["scene"].values)):
         measured = mechanism_sentences(data, ("grazing", "separatrix"))
         caption = " ".join([f"Six ways to fail, each measured alone. {held_fixed(data)}", *measured])
         alt = "Six panels: pole grazing, resonances, sleeping threshold, separatrix, sampling, solver tolerance."
-        drawn.append(Picture("mechanisms", mechanism_panels(data), caption, alt))
-    return drawn
+        yield Picture("mechanisms", mechanism_panels(data), caption, alt)
 
 
 def mechanism_panels(data: xr.Dataset) -> Any:
@@ -77,7 +75,8 @@ def _marked(style: Look, size: float = 1.0) -> dict[str, Any]:
 def _pole(axis: Any, data: xr.Dataset) -> None:
     for name, style, cell in _each(data):
         x, y = cell[Column.PARAMETER].values, cell[Column.GRAZING_ERROR].values
-        axis.plot(x, y, style.marker + "-", **_marked(style, 0.6), markevery=4, lw=1.0, label=name)
+        every = max(1, int(np.isfinite(x).sum()) // 12)
+        axis.plot(x, y, style.marker + "-", **_marked(style, 0.6), markevery=every, lw=1.0, label=name)
         gone = np.isfinite(x) & ~np.isfinite(y)
         axis.plot(x[gone], np.full(int(gone.sum()), 1.0), "x", color=style.color, ms=4.0, mew=0.8)
     axis.plot([], [], "x", color=GREY, ms=4.0, label="run ended early")

@@ -8,32 +8,35 @@ scenes of a family. A *spin* family is one scene with its spin changed, in units
 so that it is a pendulum at r = 0.1 and a fast gyroscope at r = 30. The *grazing* family falls past a pole at a distance
 of 1.1 delta. `verdicts.judge` compares every run with the closed form.
 
-A map costs what its steps cost. Runs go straight to the integrator's solver, with 20 to 60 us between them. All runs of
-one scene share one evaluation of the truth (1 ms) and one judgement. Samples are taken at the same fractions of a
-nutation for every spin, and these are not commensurate with the nutation.
+Compiled methods run whole columns of a map in one call, in lanes where the method has them: the runs of a column have
+equally many steps, so that no lane waits for another. Other methods run one after another. The constants of a row's
+closed form are computed once, and all runs are judged in compiled passes (`symtop.measure.many_verdicts`). Samples are
+taken at the same fractions of a nutation for every spin, and these are not commensurate with the nutation.
 """
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.measure.verdicts import barriers, judge, pole_passed
+from symtop.measure.many_verdicts import Judged, judge_runs, truths
+from symtop.methods.calling import solve
+from symtop.methods.fixed_step import FixedStep
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.plan import Plan
-from symtop.methods.registry import Integrator, solve
+from symtop.methods.registry import Integrator
 from symtop.model import charts, scenes
 from symtop.model.charts import Array
-from symtop.model.scenes import Scene, closed_form
-from symtop.model.top import Angles
-from symtop.model.view import View
+from symtop.model.scenes import Scene
+from symtop.model.top import Angles, flat
 from symtop.run.simulation import sample_times
 
 NOT_RUN = 255  # stored where a map has no run
 SAMPLES = 49  # of a run
+MOST = 400_000  # samples of the runs that are made in one call: 26 MB
 
 
 def spin_unit(scene: Scene) -> float:
@@ -80,59 +83,72 @@ def row_plan(method: Integrator, settings: Sequence[float], periods: float) -> R
     return RowPlan(method, tuple(settings), tuple(marks), phases)
 
 
-class Judged(NamedTuple):
-    """What became of the runs of one row of a map, or of all its rows; the last dimension is that of the settings."""
+class Made(NamedTuple):
+    """The runs of some rows of a map at some of its settings; NaN after a failure."""
 
-    verdict: NDArray[np.uint8]  # index into VERDICTS
-    axis_error: Array  # largest over the run; NaN if it ended early
+    states: Array  # (rows, settings, samples, dimension)
+    momenta: Array  # (rows, settings, samples, 2): p_phi and p_psi
+    outcome: NDArray[np.int64]  # (rows, settings), indices into OUTCOMES
 
 
-def row(runs: RowPlan, scene: Scene) -> Judged:
-    """Run and judge one row of a map: one scene at every setting."""
-    chart = runs.method.chart_for("axis")
-    period = scene.nutation_period
-    outcome = np.zeros(len(runs.settings), dtype=np.int64)
-    shape = runs.phases.shape
-    states, momenta = np.full((*shape, charts.DIMENSIONS[chart]), math.nan), np.full((2, *shape), math.nan)
+def one_by_one(runs: RowPlan, chart: str, scene: Scene) -> Made:
+    """The runs of one row by one call of the solver each; NaN beyond the last sample of a run, too."""
+    period, shape = scene.nutation_period, runs.phases.shape
+    states, momenta = np.full((1, *shape, charts.DIMENSIONS[chart]), math.nan), np.full((1, *shape, 2), math.nan)
+    outcome = np.zeros((1, len(runs.settings)), dtype=np.int64)
     for k, value in enumerate(runs.settings):
         plan = Plan.steps(value * period, runs.marks[k]) if runs.marks else Plan.until(runs.phases[k] * period, value)
         run = solve(runs.method, chart, scene.top, scene.start, plan)
         count = len(run.p_phi)
-        states[k, :count] = run.states
-        momenta[0, k, :count], momenta[1, k, :count] = run.p_phi, run.p_psi
-        outcome[k] = OUTCOMES.index(run.outcome)
-        if outcome[k] == 0 and not np.isfinite(run.states).all():
-            outcome[k] = OUTCOMES.index("not_finite")
-    with np.errstate(all="ignore"):
-        return _judged(scene, View(chart, scene.top, states, *momenta), runs.phases, outcome)
+        states[0, k, :count] = run.states
+        momenta[0, k, :count, 0], momenta[0, k, :count, 1] = run.p_phi, run.p_psi
+        outcome[0, k] = OUTCOMES.index(run.outcome)
+    return Made(states, momenta, outcome)
 
 
-def _judged(scene: Scene, seen: View, phases: Array, outcome: NDArray[np.int64]) -> Judged:
-    energy = seen.energy
-    drift = np.abs(energy - energy[:, :1]) / scene.energy_scale
-    half = SAMPLES // 2
-    early, late = np.fmax.reduce(drift[:, :half], axis=1), np.fmax.reduce(drift[:, half:], axis=1, initial=0.0)
-    few = ~np.isfinite(phases[:, half])  # a run of few steps: its halves are counted in its own samples
-    for k in np.flatnonzero(few):
-        taken = drift[k, np.isfinite(phases[k])]
-        early[k], late[k] = taken[: taken.size // 2].max(initial=0.0), taken[taken.size // 2 :].max(initial=0.0)
-    # the truth is computed anew for each row: 1.1 ms for 200 runs, where the runs themselves take 8 ms and more
-    good, true = np.isfinite(phases), np.full((*phases.shape, 3), math.nan)
-    true[good] = closed_form(scene).axis(phases[good] * scene.nutation_period)
-    error = np.fmax.reduce(charts.axis_distance(seen.axis, true), axis=1)
-    error[outcome != 0] = math.nan
-    passed = pole_passed(scene, seen.p_phi, seen.p_psi).any(axis=1)
-    low, high = np.fmin.reduce(seen.theta, axis=1), np.fmax.reduce(seen.theta, axis=1)
-    return Judged(judge(_barriers(scene), outcome, error, low, high, early, late, passed), error)
+def together(runs: RowPlan, solver: FixedStep, columns: slice, family: Sequence[Scene]) -> Made:
+    """The runs of all rows at settings that are sampled equally often, in one call, to the same bits."""
+    marks, settings = np.array(runs.marks[columns]), runs.settings[columns]
+    numbers = np.repeat([flat(scene.top, scene.start) for scene in family], len(settings), axis=0)
+    h = np.outer([scene.nutation_period for scene in family], settings)
+    done = solver.many(numbers, h.ravel(), np.tile(marks, (len(family), 1)))
+    return Made(*(values.reshape(*h.shape, *values.shape[1:]) for values in (done.states, done.momenta, done.outcome)))
 
 
-_barriers = functools.lru_cache(maxsize=512)(barriers)
+def columns_together(runs: RowPlan, n: int) -> Iterator[slice]:
+    """Neighbouring settings that are sampled equally often, with no more than `MOST` samples of n rows."""
+    counts = [marks.size for marks in runs.marks]
+    first = 0
+    while first < len(counts):
+        end = first + 1
+        while end < len(counts) and counts[end] == counts[first] and (end + 1 - first) * counts[first] * n <= MOST:
+            end += 1
+        yield slice(first, end)
+        first = end
 
 
 def outcome_map(
-    name: str, parameters: Sequence[float], method: Integrator, settings: Sequence[float], periods: float
-) -> Judged:
-    """Run and judge a whole map of the family of scenes called `name`: a row a scene, a column a setting."""
-    runs, scene_at = row_plan(method, settings, periods), family(name)
-    verdicts, errors = zip(*(row(runs, scene_at(float(value))) for value in parameters), strict=True)
-    return Judged(np.stack(verdicts), np.stack(errors))
+    name: str, parameters: Sequence[float], method: Integrator, settings: Sequence[float], periods: float,
+    followed: Sequence[int] | None = None,
+) -> Judged:  # fmt: skip
+    """Run and judge a whole map of the family of scenes called `name`: a row a scene, a column a setting.
+
+    The axis errors of inaccurate runs are the largest in the columns `followed`, in all if it is None; in the others
+    they are some that are too large.
+    """
+    runs, family_scenes = row_plan(method, settings, periods), list(map(family(name), map(float, parameters)))
+    truth, whole = truths(family_scenes), np.zeros(len(settings), dtype=bool)
+    whole[slice(None) if followed is None else list(followed)] = True
+    chart = method.chart_for("axis")
+    solver = method.solvers[chart]
+    if isinstance(solver, FixedStep) and not solver.in_python:
+        pieces = [(slice(None), columns) for columns in columns_together(runs, len(family_scenes))]
+        made = (together(runs, solver, columns, family_scenes) for _, columns in pieces)
+    else:
+        pieces = [(slice(i, i + 1), slice(None)) for i in range(len(family_scenes))]
+        made = (one_by_one(runs, chart, scene) for scene in family_scenes)
+    judged = Judged.begun(len(family_scenes), len(settings))
+    for (rows, columns), part in zip(pieces, made, strict=True):
+        seen = judge_runs(truth.part(rows), runs.phases[columns], whole[columns], *part)
+        judged.verdict[rows, columns], judged.axis_error[rows, columns] = seen
+    return judged

@@ -58,7 +58,11 @@ class Column:
 def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
     """An outcome map over a family of scenes and the control, with the linear limits of a fixed step over it."""
     parameters, ladder = settings["parameters"], settings["ladder"]
-    runs = outcome_map(name, parameters, method, ladder, settings["periods"])
+    shown = []
+    if name == "grazing":
+        nearest = np.abs(np.log(np.asarray(ladder, float) / settings["shown"]))
+        shown = [int(np.argmin(nearest)) if method.control else 0]
+    runs = outcome_map(name, parameters, method, ladder, settings["periods"], shown)
     table: dict[str, Any] = {
         Column.OUTCOME: (("parameter", "setting"), runs.verdict),
         Column.PARAMETER: ("parameter", np.asarray(parameters, float)),
@@ -66,12 +70,10 @@ def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.
         Column.CONTROL: method.control or "none",
         Column.GRID: f"{len(ladder)} x {len(parameters)}",
     }
-    if name == "grazing":
-        nearest = np.abs(np.log(np.asarray(ladder, float) / settings["shown"]))
-        column = int(np.argmin(nearest)) if method.control else 0
+    for column in shown:
         table[Column.SHOWN_SETTING] = float(ladder[column])
         table[Column.GRAZING_ERROR] = ("parameter", runs.axis_error[:, column])
-    elif method.fixed_step and settings.get("limits"):
+    if method.fixed_step and settings.get("limits"):
         values = np.asarray(settings["limits"], float)
         ends = np.array([family_limits(name, method, float(value), ladder[-1]) for value in values])
         table[Column.LIMIT_PARAMETER] = ("curve", values)

@@ -8,8 +8,8 @@ from symtop.runner.study import Picture
 
 from .tables import BOUND, ERROR, SOURCES, bound_ratios
 
-COLORS = (style.ORANGE, style.VERMILLION, style.GREEN, style.BLUE, style.PURPLE, style.BLACK)
-LOOKS = dict(zip(SOURCES, zip(COLORS, "v<^>D*", strict=True), strict=True))
+COLORS = (style.ORANGE, style.VERMILLION, style.GREEN, style.BLUE, style.PURPLE, style.SKY, style.BLACK)
+LOOKS = dict(zip(SOURCES, zip(COLORS, "v<^>DX*", strict=True), strict=True))
 NEAREST = 1e-36  # rad: where an error of exactly zero is drawn
 
 
@@ -32,7 +32,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         f"{float(data['horizon'].min()):g} s to {float(data['horizon'].max()):.0e} s on {data.sizes['scene']} scenes. "
         "A "
         "source is a Taylor integration at the tolerance of its arithmetic's rounding, in the axis or the attitude "
-        "chart, or the closed form in double; the start is the same for all. The shade above an error reaches up to "
+        "chart, the discrete map iterated in double, or the closed form in double; the start is the same for all. The "
+        "shade above an error reaches up to "
         f"the bound that the reference claims. Errors above their bound: {broken}. The median bound is {ratio:.0f} "
         "times the error. The errors of an integration grow with time; those of the closed form in double stay within "
         f"{flat:.0e} rad at every horizon."

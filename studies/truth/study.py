@@ -1,14 +1,14 @@
 """How well is the truth known?
 
 Errors elsewhere are measured against a reference. Here the reference itself is measured: a Taylor integration in three
-precisions and two charts, and the closed form in double, all against the closed form in 45 digits; and values that
-others have published are computed anew.
+precisions and two charts, the discrete map iterated, and the closed form in double, all against the closed form in 45
+digits; and values that others have published are computed anew.
 """
 
 import xarray as xr
 
 from symtop.model.scenes import scene
-from symtop.run.reference import have_heyoka
+from symtop.run.witnesses import have_heyoka
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
@@ -23,14 +23,18 @@ LEFT_OUT = {
     "unstable or nearly so: errors grow with the motion": ("sleeping", "sleeping-unstable", "separatrix"),
 }
 LONGEST = {"spheroid": 1e5, "goldstein": 1e4, "hairer-lubich-wanner": 1e4}  # horizons, s; 1e3 elsewhere
-AFFORDABLE = {"quadruple, attitude": 100.0, "closed form": 1e6}  # horizons, s: a limit of machine time, not of accuracy
+AFFORDABLE = {
+    "quadruple, attitude": 100.0,
+    "discrete map": 1e6,
+    "closed form": 1e6,
+}  # horizons, s: a limit of machine time, not of accuracy
 
 
 def cases(quick: bool) -> list[Case]:
     """Every source on every scene, from t = 8 to as far as it is affordable."""
     grid = []
     for name in grid_scenes(LEFT_OUT):
-        for source in SOURCES if have_heyoka() else ("closed form",):
+        for source in SOURCES if have_heyoka() else ("discrete map", "closed form"):
             furthest = AFFORDABLE.get(source, LONGEST.get(name, 1e3))
             horizons = [8.0] + [10.0**k for k in (range(2, 3) if quick else range(2, 7)) if 10.0**k <= furthest]
             grid.append(Case(name, source, {"horizons": horizons}))

@@ -10,7 +10,8 @@ from symtop.base.multiprecision import context
 from symtop.model import charts
 from symtop.model.precise_form import PreciseForm
 from symtop.model.scenes import Scene, closed_form
-from symtop.run.reference import integrate, reference
+from symtop.run.reference import PRECISIONS, reference
+from symtop.run.witnesses import integrate, iterated
 
 # name: precision, chart
 SOURCES = {
@@ -19,6 +20,7 @@ SOURCES = {
     "long double, axis": ("longdouble", "axis"),
     "long double, attitude": ("longdouble", "attitude"),
     "quadruple, attitude": ("quad", "attitude"),
+    "discrete map": ("discrete-map", "attitude"),
     "closed form": ("closed-form", "attitude"),
 }
 PROBES = 7  # times within the last nutation before a horizon
@@ -42,8 +44,9 @@ def source_errors(scene: Scene, source: str, horizons: list[float]) -> xr.Datase
         columns[SECONDS].append(time.perf_counter() - start)
         distances = (distance(axis, precise.axis(float(t))) for axis, t in zip(path, times, strict=True))
         columns[ERROR].append(max(distances))
-        claims = reference(scene, times, precision)["axis_error_bound"] if chart == "attitude" else np.array(np.nan)
-        columns[BOUND].append(float(claims.max()))
+        claims = chart == "attitude" and precision in PRECISIONS
+        bound = reference(scene, times, precision)["axis_error_bound"].max() if claims else np.nan
+        columns[BOUND].append(float(bound))
     return xr.Dataset({name: ("horizon", values) for name, values in columns.items()}, coords={"horizon": horizons})
 
 
@@ -51,6 +54,8 @@ def axes(scene: Scene, times: charts.Array, precision: str, chart: str) -> Any:
     """The axis at the given times by one source, in its own arithmetic, shape (times, 3)."""
     if precision == "closed-form":
         return closed_form(scene).axis(times)
+    if precision == "discrete-map":
+        return charts.axis_from_quaternion(iterated(scene, times)[0])
     states, _ = integrate(scene, times, precision, chart)
     return states[:, :3] if chart == "axis" else charts.axis_from_quaternion(states[:, :4])
 

@@ -11,7 +11,7 @@ from symtop.measure.timing import AGAIN, MISSED
 from symtop.measure.work import CAPPED, TARGETS, TOO_WIDE
 from symtop.runner.study import Table
 
-from . import energy
+from . import against_taylor, closed_form, energy, worth
 
 MOST_NAMES = 3  # of a list of names; the others are counted
 COMPARED = ("rk4[axis]", "takahashi-imada[axis]", "strang[axis]", "gauss-4[axis]")  # energies at equal steps
@@ -120,7 +120,15 @@ def sentences(data: xr.Dataset) -> list[str]:
         + ", ".join(f"{name} in {times}" for name, times in count.most_common())
         + f"; in {sum(not won.level for won in wins)} its lead is larger than the noise."
         + not_asked(data),
-        *filter(None, [beside(data), *(energy.sentence(data, chart) for chart in energy.CHARTS)]),
+        *filter(
+            None,
+            [
+                closed_form.headline(data),
+                against_taylor.headline(data, spans(data)),
+                beside(data),
+                *(energy.sentence(data, chart) for chart in energy.CHARTS),
+            ],
+        ),
         *filter(None, [energy.at_equal_steps(data, COMPARED, str(data["scene"].values[0]))]),
     ]
     if python := of_implementation(data, "python"):
@@ -208,7 +216,9 @@ def tables(data: xr.Dataset) -> list[Table]:
                 all_times,
             ),
         ]
-    return shown
+    return [
+        *shown, worth.table(data), against_taylor.table(data, spans(data)), closed_form.table(data, spans(data)),
+    ]  # fmt: skip
 
 
 def _winner(won: ranking.Win | None, cell: xr.Dataset, target: float, rows: Sequence[str]) -> str:

@@ -8,10 +8,13 @@ import contextlib
 import os
 import shutil
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 DAY = 86_400.0  # seconds
 UNUSED = 30  # days
+
+on_cold: list[Callable[[], object]] = []  # called when a kernel is not in the cache and has to be compiled
 
 
 def cache_root() -> Path:

@@ -11,6 +11,8 @@ saves a kernel it removes those that nobody used for 30 days, and the oldest one
 """
 
 import contextlib
+import hashlib
+import pickle
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -22,26 +24,31 @@ from numba import njit, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.typing.templates import builtin_registry
 from numba.cpython.unsafe.tuple import tuple_setitem
-from numba.extending import register_jitable as _register
+from numba.extending import overload, register_jitable as _register
+from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from symtop.base.cache import cache_root, prune, touch
-from symtop.base.fingerprint import digest
+from symtop.base.cache import cache_root, on_cold, prune, touch
+from symtop.base.fingerprint import digest, hashed
 from symtop.base.fused import fused
 from symtop.base.parts import inlined_parts, shared_parts
+from symtop.base.sines import polynomials, sincos
 from symtop.base.walk import Walk, by_name
 
-__all__ = ["code_of", "compile_kernel", "fused", "is_kept", "register_jitable", "set_item"]
+__all__ = ["code_of", "compile_kernel", "fused", "is_kept", "register_jitable", "set_item", "to_fixed_tuple"]
 
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
 
 MOST_BYTES = 200_000_000  # of kernels that are kept, about 2000 of them
-OPTIONS = {"error_model": "numpy"}  # division by zero gives infinity, as in C
+OPTIONS = {"error_model": "numpy", "nogil": True}  # division by zero gives infinity, as in C; threads run at once
+HASH = hashlib.sha256().digest_size  # bytes before the code in its file
 INLINED = {"forceinline": True}
 
 _stands_for: dict[int, list[object]] = {}  # id of a function: what numba compiles in its place
 _registered: set[Callable[..., Any]] = set()
 _known = [0]  # entries of numba's registry that `_stands_for` knows
 _pruned: list[Path] = []
+
+overload(sincos, jit_options=INLINED, strict=False)(lambda *_: polynomials)
 
 
 @by_name
@@ -81,7 +88,8 @@ def _overloads(function: FunctionType) -> Iterator[object]:
 
 
 def code_of(thing: object) -> Walk:
-    """What a kernel, or anything that holds kernels, is compiled from."""
+    """What a kernel, or anything that holds kernels, is compiled from; the same whatever a process has run before."""
+    _register_parts()
     walk = Walk("kernel", whole=False, also=_overloads)
     walk.add((thing, OPTIONS, sys.version_info[:2], numba.__version__))
     return walk
@@ -101,6 +109,41 @@ class _Folder:
         self.path.mkdir(parents=True, exist_ok=True)
 
 
+class _Index(IndexDataCacheFile):  # type: ignore[misc]
+    """The index of a kernel and its files, each named after the signature whose code it holds.
+
+    numba counts them: two processes that save at the same time give two signatures one file, and from then on each
+    process that asks for one of them gets the code of the other. And it runs what it finds: a single byte that has
+    flipped on the disk ended the process (SIGSEGV, SIGILL) in one trial out of five. Here the code follows its hash,
+    and an index that cannot be read is empty.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Write the code, then the index: a process that is killed in between leaves no name without a file."""
+        name = f"code.{hashed(repr(key))}.nbc"
+        self._save_data(name, data)
+        self._save_index(self._load_index() | {key: name})
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            index: dict[Any, str] = super()._load_index()
+        except Exception:  # noqa: BLE001  (a damaged pickle raises nearly anything)
+            return {}
+        return index
+
+    def _save_data(self, name: str, data: Any) -> None:
+        code = self._dump(data)
+        with self._open_for_write(self._data_path(name)) as file:
+            file.write(hashlib.sha256(code).digest() + code)
+
+    def _load_data(self, name: str) -> Any:
+        whole = Path(self._data_path(name)).read_bytes()
+        said, code = whole[:HASH], whole[HASH:]
+        if hashlib.sha256(code).digest() != said:
+            raise ValueError("the code on disk is damaged")
+        return pickle.loads(code)  # noqa: S301  (it has its hash)
+
+
 class _Cache(FunctionCache):  # type: ignore[misc]
     """numba's cache of one kernel, in a folder whose name says all there is to know of it.
 
@@ -113,19 +156,27 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         self._impl._locator = _Folder(folder, function)
         self._impl._lineno = function.__code__.co_firstlineno
         self._cache_path = str(folder)
-        self._cache_file = IndexDataCacheFile(self._cache_path, "kernel", "")
+        self._cache_file = _Index(self._cache_path, "code", "")
         self.enable()
 
     def _index_key(self, signature: Any, codegen: Any) -> Any:
         return signature, codegen.magic_tuple()
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
+        loaded = None
         try:
-            return super().load_overload(signature, target_context)
+            loaded = super().load_overload(signature, target_context)
+            sound = loaded is None or tuple(loaded.signature.args) == tuple(signature)
         except Exception:  # noqa: BLE001  (a truncated pickle raises nearly anything)
-            with contextlib.suppress(Exception):
-                self.flush()  # begin anew: what is damaged would stand in the way of saving, too
-            return None
+            sound = False
+        if loaded is None or not sound:
+            for tell in on_cold:
+                tell()
+        if sound:
+            return loaded
+        with contextlib.suppress(Exception):
+            self.flush()  # begin anew: what is damaged, or another signature's, would stand in the way of saving, too
+        return None
 
     def save_overload(self, signature: Any, data: Any) -> None:
         with contextlib.suppress(OSError):

@@ -15,15 +15,16 @@ import shutil
 import subprocess
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
 
 from symtop import __version__
 from symtop.base.fingerprint import version
+from symtop.base.strangers import words_of
 from symtop.base.validate import SymtopError
 
 _one_thread = threading.RLock()  # two threads inside the netCDF library at once end the process (segmentation fault)
@@ -31,9 +32,15 @@ _one_thread = threading.RLock()  # two threads inside the netCDF library at once
 # name: (long name, units in SI, where they differ: units of a problem without any)
 VARIABLES: dict[str, tuple[str, ...]] = {
     "time": ("elapsed time", "s", "1"),
+    "I1": ("moment of inertia across the axis", "kg m2", "1"),
+    "I3": ("moment of inertia along the axis", "kg m2", "1"),
+    "mgl": ("weight times distance of the centre of gravity", "kg m2 s-2", "1"),
     "theta": ("nutation angle", "rad"),
     "phi": ("precession angle, unwrapped", "rad"),
     "psi": ("spin angle, unwrapped", "rad"),
+    "theta_dot": ("rate of theta", "rad s-1", "rad"),
+    "phi_dot": ("rate of phi", "rad s-1", "rad"),
+    "psi_dot": ("rate of psi", "rad s-1", "rad"),
     "axis": ("unit vector along the axis of the top, space frame", "1"),
     "quaternion": ("attitude, body to space, (w, x, y, z)", "1"),
     "energy": ("total energy", "kg m2 s-2", "1"),
@@ -172,6 +179,19 @@ def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
     return Path(path)
 
 
+def alone() -> contextlib.AbstractContextManager[Any]:
+    """Hold the netCDF library, of which one thread at a time may make use."""
+    return _one_thread
+
+
+def array_hash(values: Any) -> str:
+    """Hash of an array of numbers or of text: its type, shape and bytes."""
+    row = np.ascontiguousarray(values)
+    digest = hashlib.sha256(f"{row.dtype}{row.shape}".encode())
+    digest.update(repr(row.tolist()).encode() if row.dtype == object else row.reshape(-1).view(np.uint8).data)
+    return digest.hexdigest()
+
+
 def content_hash(data: xr.Dataset) -> str:
     """Hash of all values and their dimensions, so that a damaged or foreign file cannot pass for a good one."""
     digest = hashlib.sha256()
@@ -186,20 +206,37 @@ def content_hash(data: xr.Dataset) -> str:
     return digest.hexdigest()
 
 
-def _read(opening: Callable[..., Tree], path: str | os.PathLike[str]) -> Tree:
+@contextlib.contextmanager
+def _netcdf(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Hold the netCDF library, and say in a sentence what it could not read."""
     try:
-        with _one_thread, opening(path, engine="netcdf4") as data:
-            return cast("Tree", data.load())
-    except (OSError, ValueError, RuntimeError) as error:
-        raise SymtopError(f"cannot read {path} as netCDF: {error}") from error
+        with _one_thread:
+            yield
+    except Exception as error:  # (a damaged file: HDF5's errors, and those of names and times that make no sense)
+        raise SymtopError(f"cannot read {path} as netCDF: {words_of(error)}") from error
 
 
 def read(path: str | os.PathLike[str]) -> xr.Dataset:
     """Load a netCDF file completely into memory and close it."""
-    return _read(xr.open_dataset, path)
+    with _netcdf(path), xr.open_dataset(path, engine="netcdf4") as data:
+        return data.load()
 
 
 def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:
-    """Load a netCDF file completely into memory and close it: a tree if it has groups, otherwise a dataset."""
-    tree = _read(xr.open_datatree, path)
-    return tree if tree.children else tree.to_dataset()
+    """Load a netCDF file completely into memory and close it: a tree if it has groups, otherwise a dataset.
+
+    The library is given the bytes, not the path: where a program has opened a tree of a file lazily, with text in it,
+    the next ``xr.open_datatree`` of the same path ends the process in HDF5 (xarray 2026.9, netCDF4 1.7.5).
+    """
+    import netCDF4
+
+    with _netcdf(path), contextlib.closing(netCDF4.Dataset(path, memory=Path(path).read_bytes())) as file:
+        parts = {group.path: xr.open_dataset(xr.backends.NetCDF4DataStore(group)).load() for group in _groups(file)}
+    return xr.DataTree.from_dict(parts) if len(parts) > 1 else parts["/"]
+
+
+def _groups(file: Any) -> Iterator[Any]:
+    """A group of a netCDF file and all below it."""
+    yield file
+    for child in file.groups.values():
+        yield from _groups(child)

@@ -8,12 +8,9 @@ product of two doubles has random digits below that grid; added before the one r
 from numba import types
 from numba.extending import intrinsic, overload
 
-from symtop.base.parts import two_product
+from symtop.base.parts import fused, two_product
 
-
-def fused(a: float, b: float, c: float) -> float:
-    """a b + c, rounded once in compiled code; outside of it, in whatever arithmetic the arguments bring, twice."""
-    return a * b + c
+__all__ = ["fused"]
 
 
 @intrinsic

@@ -11,6 +11,7 @@ function keeps the rules of `symtop.base.parts`.
 """
 
 import sys
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -25,6 +26,7 @@ class LazyKernel:
         self.compiled: Any = None
         self._kernel: Any = None
         self._spent = 0.0
+        self._lock = threading.Lock()  # a kernel half made is not for a second thread
 
     def ready(self, seconds: float) -> bool:
         """Is the compiled function the one to call, for work that takes `seconds` interpreted?"""
@@ -33,17 +35,19 @@ class LazyKernel:
         self._spent += seconds
         if self._spent < (LOADING if "numba" in sys.modules else LOADING + IMPORTING):
             return False
-        if self._spent < self.patience and not self._kept():
-            return False
+        with self._lock:
+            if self._spent < self.patience and not self._kept():
+                return False
         self.compile()
         return True
 
     def compile(self) -> None:
         """Compile now, or load from the cache."""
-        if self.compiled is None:
-            self._kept()
-            self._kernel.compile(self._signature)
-            self.compiled = self._kernel
+        with self._lock:
+            if self.compiled is None:
+                self._kept()
+                self._kernel.compile(self._signature)
+                self.compiled = self._kernel
 
     def _kept(self) -> bool:
         """Is the compiled function in the cache?"""

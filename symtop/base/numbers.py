@@ -1,14 +1,32 @@
-"""Numbers that many modules need, each defined once, and the search for the zeros of a function."""
+"""Numbers that many modules need, each defined once; arrays of real numbers; the zeros of a function."""
 
 import math
 import sys
 from collections.abc import Callable
+from reprlib import repr as short
 
 import numpy as np
+
+from symtop.base.validate import SymtopError, finite
 
 EPSILON = sys.float_info.epsilon  # 2.2e-16: the spacing of doubles at 1
 TINY = sys.float_info.min  # 2.2e-308: a divisor that is never zero
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # steps of this length, modulo 1, are commensurate with no period
+
+
+def real_numbers(name: str, values: object) -> np.ndarray:
+    """An array of doubles of any shape, C-ordered; SymtopError for anything else, complex numbers and text included."""
+    if type(values) is np.ndarray and values.dtype == np.float64:
+        return np.ascontiguousarray(values).reshape(values.shape)
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind == "O":  # whole numbers beyond 64 bits, fractions, decimals
+            array = np.array([finite(name, value) for value in array.ravel().tolist()]).reshape(array.shape)
+    except (TypeError, ValueError, OverflowError):  # ragged, or no number
+        array = np.empty(0, dtype=object)
+    if array.dtype.kind not in "fiu":
+        raise SymtopError(f"{name} must be real numbers, not {short(values)}")
+    return np.asarray(array, dtype=np.float64, order="C")
 
 
 def sign_changes(function: Callable[[float], float], grid: np.ndarray, tolerance: float = 1e-12) -> list[float]:

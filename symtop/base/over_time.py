@@ -35,7 +35,9 @@ def publicly(times: Any, columns: Mapping[str, Any]) -> xr.Dataset:
 
 
 def _parts(columns: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    return PARTS if "quaternion" in columns else {"component": PARTS["component"]}
+    """The labels of the second dimensions that there are."""
+    widths = {np.shape(values)[1] for values in columns.values() if np.ndim(values) == 2}
+    return {name: labels for name, labels in PARTS.items() if len(labels) in widths}
 
 
 def _is_plain(values: Any, count: int) -> bool:

@@ -7,11 +7,12 @@ function remains a plain function: interpreted, it returns the bits that it retu
     calls the C library for anything else (`math` and compiled code call the same one),
     never divides by zero and never overflows (compiled code goes on with infinities, the interpreter raises).
 
-`two_product` is the one operation with two implementations. Its result is exact and hence the same in both.
+Three operations have two implementations. The result of `two_product` is exact and hence the same in both; `fused` and
+`sincos` (`symtop.base.sines`) may differ from what the interpreter returns in the last place.
 """
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -29,6 +30,11 @@ def shared(function: Function) -> Function:
     """Let kernels call a plain function that is compiled once: for a larger one, called from several places."""
     shared_parts.append(function)
     return function
+
+
+def fused(a: Any, b: Any, c: Any) -> Any:
+    """a b + c, rounded once in compiled code; outside of it, in whatever arithmetic the arguments bring, twice."""
+    return a * b + c
 
 
 def two_product(a: float, b: float) -> tuple[float, float]:

@@ -1,10 +1,14 @@
-"""A request to end (SIGTERM) heard as an exception, so that partial files, workers and checkpoints are seen to."""
+"""Requests of the user, heard as exceptions of their own: to end (SIGTERM), and to interrupt (SIGINT).
+
+Partial files, workers and checkpoints are seen to. An exception of its own tells a request from what a plug-in raises.
+"""
 
 import contextlib
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
+from typing import Any
 
 INTERRUPTED, TERMINATED = 130, 143  # exit codes: 128 and the number of the signal, as shells have it
 
@@ -16,18 +20,43 @@ class TerminatedError(SystemExit):
         super().__init__(TERMINATED)
 
 
+class InterruptedByUser(KeyboardInterrupt):
+    """Somebody has pressed Ctrl-C; only this is raised for it while `told_apart`."""
+
+
 def _end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
     raise TerminatedError
 
 
+def _interrupt(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+    raise InterruptedByUser
+
+
 @contextlib.contextmanager
-def ending_on_sigterm() -> Iterator[None]:
-    """Raise TerminatedError on SIGTERM, in the main thread; a handler that is there already is left in place."""
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
+def _handling(number: int, usual: Any, handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """Handle a signal in the main thread; a handler that is there already, other than the usual one, stays."""
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(number) != usual:
         yield
         return
-    signal.signal(signal.SIGTERM, _end)
+    signal.signal(number, handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.signal(number, usual)
+
+
+def ending_on_sigterm() -> contextlib.AbstractContextManager[None]:
+    """Raise TerminatedError on SIGTERM, in the main thread; a handler that is there already is left in place."""
+    return _handling(signal.SIGTERM, signal.SIG_DFL, _end)
+
+
+def told_apart() -> contextlib.AbstractContextManager[None]:
+    """Raise InterruptedByUser on SIGINT, in the main thread: no KeyboardInterrupt of a plug-in passes for it."""
+    return _handling(signal.SIGINT, signal.default_int_handler, _interrupt)
+
+
+def is_of_user(error: BaseException) -> bool:
+    """Is it a request of the user? Without `told_apart` every KeyboardInterrupt counts as one."""
+    if isinstance(error, KeyboardInterrupt):
+        return isinstance(error, InterruptedByUser) or signal.getsignal(signal.SIGINT) is not _interrupt
+    return isinstance(error, TerminatedError)

@@ -1,14 +1,20 @@
-"""What the commands share: options, shell completion, plug-ins, errors without a traceback, and text in columns."""
+"""What the commands share: options, plug-ins, files to write, errors without a traceback, text that fits."""
 
 import re
 import shutil
+import sys
 import textwrap
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TextIO
 
 import click
 
+from symtop.base import cache
+from symtop.base.signals import told_apart
 from symtop.base.validate import SymtopError
+
+FIGURES = (".png", ".svg", ".pdf")
 
 
 def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]) -> None:
@@ -29,23 +35,6 @@ results_option = click.option(
     help="The folder of the datasets, figures and findings.",
 )  # fmt: skip
 
-Completion = Callable[[click.Context, click.Parameter, str], list[str]]
-
-
-def completing(kind: str) -> Completion:
-    """Shell completion of the names of all scenes, integrators or studies; after a bracket, of rows like rk4[axis]."""
-
-    def complete(_: click.Context, __: click.Parameter, prefix: str) -> list[str]:
-        from symtop.methods.registry import integrators, rows
-        from symtop.model.scenes import scenes
-        from symtop.runner import scripts
-
-        methods = [row.name for row in rows()] if "[" in prefix else list(integrators())
-        names = {"scenes": list(scenes()), "integrators": methods, "studies": scripts.names()}[kind]
-        return [name for name in names if name.startswith(prefix)]
-
-    return complete
-
 
 class Group(click.Group):
     """Prints a SymtopError as one sentence and exits with code 2; arguments are named as the options are."""
@@ -53,16 +42,68 @@ class Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
         try:
-            return super().invoke(ctx)
+            with told_apart():
+                return super().invoke(ctx)
         except SymtopError as error:
-            sentence = re.sub(r"(?<![\w'-])step_size(?![\w'])", "--step-size", str(error))
-            click.echo(f"symtop: {sentence}", err=True)
+            warn(self._spoken(str(error)))
             ctx.exit(2)
+
+    def _spoken(self, sentence: str) -> str:
+        """A sentence about arguments as one about options, which ends with the command that lists what there is."""
+        parameters = [option for command in self.commands.values() for option in command.params]
+        options = {
+            str(option.name): max(option.opts, key=len) for option in parameters if isinstance(option, click.Option)
+        }
+        sentence = re.sub(r"(?<![\w'-])(step_size|per_nutation)(?![\w'])", lambda m: options[m[1]], sentence)
+        argued = rf"(?<![\w'-])((?:give|or|not|see) |^)({'|'.join(options)})(?= must|\)|,| = |$)"
+        sentence = re.sub(argued, lambda match: match[1] + options[match[2]], sentence)
+        kind = re.match(r"(scene|integrator) .* is unknown; did you mean ", sentence)
+        return f"{sentence} (symtop {kind[1]}s lists all)" if kind else sentence
+
+
+def tell_of_compiling() -> None:
+    """Say once, on a terminal, that kernels are being compiled, as it takes from one second to half a minute."""
+
+    def tell() -> None:
+        cache.on_cold.clear()
+        warn("compiling what runs for the first time; the next time it is found on disk")
+
+    cache.on_cold[:] = [tell] if sys.stderr.isatty() else []
 
 
 def warn(sentence: str) -> None:
     """Print a warning to the standard error."""
-    click.echo(f"symtop: {sentence}", err=True)
+    clear = "\r\x1b[K" if sys.stderr.isatty() else ""  # of a clock that stands in the line
+    click.echo(clear + fitted(f"symtop: {sentence}", sys.stderr), err=True)
+
+
+def say(sentence: str) -> None:
+    """Print a sentence to the standard output."""
+    click.echo(fitted(sentence, sys.stdout))
+
+
+def fitted(text: str, stream: TextIO) -> str:
+    """The text in lines that fit the terminal, if a terminal is what the stream goes to."""
+    if not stream.isatty():
+        return text
+    width = terminal_width()
+    return "\n".join(
+        textwrap.fill(line, width, break_on_hyphens=False, break_long_words=False, subsequent_indent="  ")
+        for line in text.splitlines()
+    )
+
+
+def figure_file(option: str, file: str | None) -> None:
+    """Refuse the name of a figure that has no known ending, or no folder to stand in."""
+    if file is not None and Path(file).suffix.lower() not in FIGURES:
+        raise SymtopError(f"{option} must be a file that ends in {' or '.join(FIGURES)}, not {file!r}")
+    standing(option, file)
+
+
+def standing(option: str, file: str | None) -> None:
+    """Refuse a file whose folder is not there: a run should not end before its result has a place."""
+    if file is not None and not Path(file).absolute().parent.is_dir():
+        raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
 
 
 def terminal_width() -> int:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from tqdm import tqdm
 
 LEAST_SPACE = 500_000_000  # free bytes below which a full run of the studies may not fit on the disk
 LARGE_CACHE = 5_000_000_000  # bytes of a cache that the doctor advises to delete
@@ -41,7 +42,7 @@ def examine(results: Path) -> list[Finding]:
         _python, _packages, _heyoka, _caches, lambda: _results(results), _tools, _self_check,
     ]  # fmt: skip
     findings = []
-    for check in checks:
+    for check in tqdm(checks, desc="checking", unit="check", disable=None, leave=False):
         try:
             findings += check()
         except Exception as error:  # noqa: BLE001  (one check that fails must not hide the others)

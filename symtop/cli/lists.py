@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from symtop.base.validate import SymtopError
-from symtop.cli.common import completing, facts, json_option, plugin_option, table, terminal_width
+from symtop.cli.common import facts, json_option, plugin_option, table, terminal_width
+from symtop.cli.completion import completing
 from symtop.report import markdown as tables
 
 if TYPE_CHECKING:
@@ -41,8 +42,9 @@ def _show(records: list[Record], short: list[Record], chosen: Record | None, pag
 @wide_option
 @json_option
 @click.option("--markdown", is_flag=True, help="Print a Markdown table of every column.")
+@click.option("--engines", is_flag=True, help="List the maps of physics engines instead.")
 @plugin_option
-def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool) -> None:
+def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, engines: bool) -> None:
     """List every integrator with what it claims about itself, or show the one called NAME in full.
 
     A NAME with a chart, rk4[axis], is the method in that chart alone. The column charts of --wide lists them.
@@ -51,10 +53,12 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool) -> 
     symtop integrators
     symtop integrators midpoint
     symtop integrators "rk4[axis]"
+    symtop integrators --engines
     """
     from symtop.methods import registry
 
-    methods = [registry.integrator(name)] if name is not None else list(registry.integrators().values())
+    listed = registry.engines() if engines else registry.methods()
+    methods = [registry.integrator(name)] if name is not None else list(listed.values())
     records: list[Record] = [method.record() for method in methods]
     if markdown and not as_json:
         click.echo(tables.table(*tables.columns(records)))

@@ -1,4 +1,4 @@
-"""The command line: ``symtop integrators | scenes | run | long | study | claims | report | recommend | doctor | ...``.
+"""The command line: ``symtop integrators | scenes | run | long | ensemble | study | judge | report | ...``.
 
 Exit codes: 0 fine; 1 a case or a check failed; 2 bad input, or a place that cannot be written; 3 a run ended early by
 its outcome (its dataset was written); 130 and 143 a study was interrupted or terminated (what was computed is kept).
@@ -14,8 +14,9 @@ import click
 
 from symtop import __version__
 from symtop.base.validate import SymtopError, positive
-from symtop.cli import lists, runs, tools
-from symtop.cli.common import Group, completing, json_option, plugin_option, results_option, warn
+from symtop.cli import cite, ensembles, judge, lists, runs, tools
+from symtop.cli.common import Group, json_option, plugin_option, results_option, tell_of_compiling, warn
+from symtop.cli.completion import completing
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -28,10 +29,12 @@ def main() -> None:
     symtop study convergence --quick
     symtop report
     """
+    tell_of_compiling()
 
 
 for command in (
-    lists.integrators, lists.scenes, runs.run, runs.long, runs.claims, tools.recommend, tools.doctor, tools.explore,
+    lists.integrators, lists.scenes, runs.run, runs.long, ensembles.ensemble, runs.claims, judge.judge,
+    tools.recommend, tools.doctor, tools.explore, cite.cite,
 ):  # fmt: skip
     main.add_command(command)
 
@@ -47,6 +50,7 @@ for command in (
 @click.option("--status", is_flag=True, help="Print the state of every case; compute nothing.")
 @click.option("--why", is_flag=True, help="With --status: what has changed, one line for all cases with that reason.")
 @click.option("--check", is_flag=True, help="Compute some stored cases again, in another folder, and compare.")
+@click.option("--only", metavar="METHOD,...", help="Cases of these methods alone, into the folder only of the results.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes for cases that are not timed; one a core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute cases that are not timed on this dask cluster.")
 @click.option("--limit", type=float, metavar="SECONDS", help="Longest time of one case; an hour by default.")
@@ -55,7 +59,7 @@ for command in (
 @plugin_option
 def study(
     names: tuple[str, ...], every: bool, quick: bool, full: bool, fresh: bool, status: bool, why: bool, check: bool,
-    jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool,
+    only: str | None, jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool,
 ) -> None:  # fmt: skip
     """Run studies by NAME: datasets, figures and findings into the results folder.
 
@@ -67,20 +71,21 @@ def study(
     \b
     symtop study convergence drift
     symtop study --all --quick
-    symtop study stability --plugin my_methods.py
+    symtop study convergence --quick --only my-rk --plugin my_methods.py
     symtop study --all --status --why
     symtop study convergence --scheduler tcp://10.0.0.1:8786
     """
     from symtop.cli import study as command
 
     if why and not status:
-        raise SymtopError("why must be given together with status")
+        raise SymtopError("--why must be given together with --status")
     if quick and full:
-        raise SymtopError("quick and full must not be given together")
+        raise SymtopError("--quick and --full must not be given together")
     if limit is not None:
         positive("limit", limit)
-    folder = Path(results) / "quick" if quick else Path(results)
-    shared: Any = {"studies": command.choose(names, every=every), "results": folder, "as_json": as_json}
+    chosen = only.split(",") if only is not None else []
+    folder = Path(results, *filter(None, ("quick" * quick, "only" * bool(chosen))))
+    shared: Any = {"studies": command.choose(names, every=every, only=chosen), "results": folder, "as_json": as_json}
     shared |= {"quick": quick, "full": full}
     if status:
         sys.exit(command.show_status(why=why, **shared))

@@ -2,12 +2,11 @@
 
 import json
 import sys
-from pathlib import Path
 
 import click
 
-from symtop.base.validate import SymtopError
-from symtop.cli.common import completing, json_option, plugin_option, warn
+from symtop.cli.common import figure_file, json_option, plugin_option, say, standing, table, warn
+from symtop.cli.completion import completing
 
 
 @click.command(short_help="Run one integrator on one scene; show its errors.")
@@ -17,11 +16,11 @@ from symtop.cli.common import completing, json_option, plugin_option, warn
 @click.option("--tolerance", type=float, help="Tolerance of an adaptive method.")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
 @click.option("--samples", type=int, default=501, show_default=True, help="Number of samples in the output.")
-@click.option("--observe", help="nutation, axis or attitude; what the scene names by default.")
+@click.option("--observe", help="nutation, axis or attitude; by default what the scene names and the method shows.")
 @click.option("--budget", type=float, help="Most steps, or force evaluations of an adaptive method.")
 @click.option("--guard/--no-guard", default=True, help="Warn before the run if a large error is expected.")
 @click.option("--output", type=click.Path(), help="Write the run to this netCDF file.")
-@click.option("--figure", type=click.Path(), help="Draw the run and its errors into this PNG file.")
+@click.option("--figure", type=click.Path(), help="Draw the run and its errors: .png, .svg or .pdf.")
 @plugin_option
 @json_option
 def run(
@@ -39,18 +38,20 @@ def run(
     symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
     """
     from symtop.base import datasets
+    from symtop.base.progress import ticking
     from symtop.measure.errors import QUANTITIES, errors_against
     from symtop.measure.verdicts import judgement
     from symtop.model import scenes
     from symtop.run.reference import reference
     from symtop.run.simulation import simulate
 
-    if figure is not None and Path(figure).suffix != ".png":
-        raise SymtopError(f"figure must be a file that ends in .png, not {figure!r}")
-    data = simulate(
-        scene, integrator, step_size=step_size, tolerance=tolerance, horizon=horizon, samples=samples, observe=observe,
-        guard=warn if guard else False, budget=budget,
-    )  # fmt: skip
+    figure_file("--figure", figure)
+    standing("--output", output)
+    with ticking("running"):
+        data = simulate(
+            scene, integrator, step_size=step_size, tolerance=tolerance, horizon=horizon, samples=samples,
+            observe=observe, guard=warn if guard else False, budget=budget,
+        )  # fmt: skip
     if output is not None:
         datasets.write(data, output)
     chosen = scenes.scene(scene)
@@ -72,11 +73,9 @@ def run(
         findings = {**{name: data.attrs[name] for name in names}, "judgement": verdict._asdict(), "errors": largest}
         click.echo(json.dumps(findings, indent=1))
     else:
-        click.echo(
-            "{title}: {outcome_message}\n{steps} steps, {force_evaluations} force evaluations".format(**data.attrs)
-        )
+        say("{title}: {outcome_message}\n{steps} steps, {force_evaluations} force evaluations".format(**data.attrs))
         if data.attrs["outcome"] == "ok":
-            click.echo(f"judged against the truth: {verdict.verdict}, {verdict.sentence}")
+            say(f"judged against the truth: {verdict.words()}")
         for name, values in largest.items():
             click.echo(f"  {QUANTITIES[name]:<30} largest {values['largest']:.3e}   last {values['last']:.3e}")
     for file in () if as_json else (output, figure):
@@ -110,6 +109,7 @@ def long(
     from symtop.model import scenes
     from symtop.run.long_run import PER_NUTATION, long_run
 
+    standing("--output", output)
     h = scenes.scene(scene).nutation_period / PER_NUTATION if step_size is None else step_size
     count = whole("steps", steps, 1)
     try:
@@ -117,12 +117,18 @@ def long(
     except KeyboardInterrupt:
         warn("interrupted; the steps that were run are kept, and the same command resumes after them")
         sys.exit(130)
-    click.echo(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
+    say(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
     if data.sizes["window"]:
-        for name in ("energy", "modified_energy", "p_phi", "p_psi"):
-            low, high = float(data[f"{name}_least"].min()), float(data[f"{name}_largest"].max())
-            end = float(data[f"{name}_mean"][-1])
-            click.echo(f"  {name:<16} change from {low:+.3e} to {high:+.3e}   mean of the last window {end:+.3e}")
+        rows = [
+            [
+                name,
+                *(f"{float(value):+.3e}" for value in (
+                    data[f"{name}_least"].min(), data[f"{name}_largest"].max(), data[f"{name}_mean"][-1],
+                )),
+            ]
+            for name in ("energy", "modified_energy", "p_phi", "p_psi")
+        ]  # fmt: skip
+        click.echo(table(["change since the start", "least", "largest", "last window's mean"], rows))
     if output is not None:
         datasets.write(data, output)
         click.echo(f"written to {output}")
@@ -145,7 +151,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     symtop claims midpoint rk4
     symtop claims --plugin my_methods.py
     """
-    from symtop.judge.claims import judge
+    from symtop.judging.claims import judge
     from symtop.methods import registry
     from symtop.model import scenes
 
@@ -161,7 +167,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
             about = {"integrator": ledger.integrator, "scene": chosen.name}
             entries += [{**about, **finding.plain()} for finding in ledger.findings]
         else:
-            click.echo("\n".join(ledger.sentences()))
+            say("\n".join(ledger.sentences()))
     if as_json:
         click.echo(json.dumps(entries, indent=1))
     if refuted:

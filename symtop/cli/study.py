@@ -1,6 +1,7 @@
 """The command ``symtop study``: run several studies, show their status, or check them; ends with an exit code."""
 
 import json
+import textwrap
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,20 +11,25 @@ import click
 
 from symtop.base.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
 from symtop.base.validate import SymtopError
-from symtop.cli.common import warn
+from symtop.cli.common import terminal_width, warn
+from symtop.methods.registry import integrator
 from symtop.runner import check, run, scripts, status
 from symtop.runner.pools import Workers
 from symtop.runner.study import Study
 
+MOST_TOLD = 3  # sentences of a study that has run
 MOST_NAMED = 8  # integrators and scenes in a line of the status
 
 
-def choose(names: Sequence[str], *, every: bool) -> list[Study]:
-    """The studies of those names, each once, or all of them."""
+def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = ()) -> list[Study]:
+    """The studies of those names, each once, or all of them; of some integrators alone if `only` names them."""
     chosen = scripts.names() if every else list(dict.fromkeys(names))
     if not chosen:
         raise SymtopError(f"name a study or use --all; known: {', '.join(scripts.names())}")
-    return [scripts.load(name) for name in chosen]
+    for name in only:
+        integrator(name)  # refused with the nearest names if there is none
+    studies = [scripts.load(name) for name in chosen]
+    return [study.only(only) for study in studies] if only else studies
 
 
 def conduct(task: Callable[[Workers], int], jobs: int | None, scheduler: str | None) -> int:
@@ -51,11 +57,33 @@ def run_all(
         summaries.append(summary)
         if not as_json:
             click.echo("{study}: {computed} of {cases} cases computed, {figures} figures".format(**summary))
+            _tell(study, findings, results)
         for failure in findings["failures"]:
             click.echo(f"  {failure}", err=True)
     if as_json:
         click.echo(json.dumps(summaries, indent=1))
+    elif summaries:
+        click.echo(f"next: symtop report --results {results}, one page of all findings")
     return 1 if any(summary["failures"] for summary in summaries) else 0
+
+
+def _tell(study: Study, findings: dict[str, Any], results: Path) -> None:
+    """The first sentences of what a study found, and where the rest is."""
+    sentences = findings["verdict"]
+    for sentence in sentences[:MOST_TOLD]:
+        click.echo(_indented(sentence, "  - "))
+    more = f", {len(sentences) - MOST_TOLD} more findings in {study.name}.json" if len(sentences) > MOST_TOLD else ""
+    pictures = f"figures {results / 'figures' / study.name}-*{more}" if findings["pictures"] else more.lstrip(", ")
+    for line in filter(None, (f"dataset {results / study.name}.nc", pictures)):
+        click.echo(_indented(line, "  "))
+
+
+def _indented(line: str, first: str) -> str:
+    """A line in as many as fit the terminal."""
+    return textwrap.fill(
+        line, terminal_width(), initial_indent=first, subsequent_indent="    ", break_on_hyphens=False,
+        break_long_words=False,
+    )  # fmt: skip
 
 
 def show_status(studies: list[Study], results: Path, why: bool, as_json: bool, **grid: bool) -> int:
@@ -67,16 +95,22 @@ def show_status(studies: list[Study], results: Path, why: bool, as_json: bool, *
         counts = Counter(row["state"] for row in rows)
         click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in status.STATES if counts[state]))
         open_rows = [row for row in rows if row["state"] != status.DONE]
-        for line in _grouped(open_rows) if why else _one_by_one(open_rows):
-            click.echo(f"  {line}")
+        for line in _grouped(open_rows) if why else _counted(open_rows):
+            click.echo(_indented(line, "  "))
     return 1 if any(row["state"] == status.FAILED for rows in states.values() for row in rows) else 0
 
 
-def _one_by_one(rows: list[dict[str, Any]]) -> list[str]:
+def _counted(rows: list[dict[str, Any]]) -> list[str]:
+    """A line for each case that failed, and one for the stale and one for the missing ones of all scenes."""
+    failed = [row for row in rows if row["state"] == status.FAILED]
+    others = [[row for row in rows if row["state"] == state] for state in (status.STALE, status.MISSING)]
     return [
-        f"{row['state']:<8} {row['integrator']} on {row['scene']}" + (f": {row['message']}" if row["message"] else "")
-        for row in rows
-    ]
+        *(f"failed: {row['integrator']} on {row['scene']}: {row['message']}" for row in failed),
+        *(
+            f"{group[0]['state']}: {_names(group, 'integrator')} on {_names(group, 'scene')}"
+            for group in others if group
+        ),
+    ]  # fmt: skip
 
 
 def _grouped(rows: list[dict[str, Any]]) -> list[str]:

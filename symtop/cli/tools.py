@@ -6,20 +6,24 @@ from pathlib import Path
 
 import click
 
-from symtop.cli.common import completing, json_option, plugin_option, results_option
+from symtop.cli.common import json_option, plugin_option, results_option, say
+from symtop.cli.completion import completing
 
 
 @click.command(short_help="Find the cheapest integrator for an accuracy.")
 @click.argument("scene", shell_complete=completing("scenes"))
-@click.option("--accuracy", type=float, required=True, help="The largest error you accept, for example 1e-6.")
+@click.option("--accuracy", type=float, help="The largest error you accept, for example 1e-6.")
+@click.option("--i-use", "engine", help="A physics engine, for example mujoco: what its settings make of the scene.")
+@click.option("--step-size", type=float, help="Of the engine; 1/240 by default.")
 @click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
 @click.option("--results", type=click.Path(file_okay=False), help="Folder of a stored study; results by default.")
 @plugin_option
 @json_option
 def recommend(
-    scene: str, accuracy: float, quantity: str, horizon: float | None, results: str | None, as_json: bool
-) -> None:
+    scene: str, accuracy: float | None, engine: str | None, step_size: float | None, quantity: str,
+    horizon: float | None, results: str | None, as_json: bool,
+) -> None:  # fmt: skip
     """Find the cheapest integrator and step that meet an accuracy on a SCENE.
 
     The exit code is 1 if none does.
@@ -28,15 +32,28 @@ def recommend(
     symtop recommend spheroid --accuracy 1e-6
     symtop recommend goldstein --accuracy 1e-3 --quantity attitude --horizon 1e4
     symtop recommend mine --plugin my_scene.py --accuracy 1e-9
+    symtop recommend goldstein --i-use mujoco --step-size 0.002
     """
     import dataclasses
 
     from symtop import advise
+    from symtop.base.progress import ticking
 
+    if (accuracy is None) is (engine is None):
+        raise click.UsageError("say either --accuracy or --i-use")
+    if engine is not None:
+        from symtop.cli.engine_advice import STEP, i_use
+
+        said = i_use(engine, scene, step_size=STEP if step_size is None else step_size, horizon=horizon)
+        click.echo(json.dumps(dataclasses.asdict(said), indent=1) if as_json else str(said))
+        return
+    if step_size is not None:
+        raise click.UsageError("--step-size belongs to --i-use; with --accuracy the step is what is found")
     if results is None and (Path("results") / advise.STORED_STUDY).is_file():
         results = "results"
-    advice = advise.recommend(scene, accuracy=accuracy, quantity=quantity, horizon=horizon, results=results)
-    click.echo(json.dumps(dataclasses.asdict(advice), indent=1) if as_json else str(advice))
+    with ticking("trying methods"):
+        advice = advise.recommend(scene, accuracy=accuracy or 0.0, quantity=quantity, horizon=horizon, results=results)
+    click.echo(json.dumps(dataclasses.asdict(advice), indent=1)) if as_json else say(str(advice))
     if advice.integrator is None:
         sys.exit(1)
 

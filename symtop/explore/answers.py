@@ -1,7 +1,8 @@
 """The explorer's answers: one run beside the exact motion, the same run as a dataset, and as a script.
 
-The page sends a flat mapping of numbers and names, which `setup` reads. The run is made by the public functions
-(`Scene`, `simulate`, the closed form), so that the script gives the same numbers to the last bit.
+The page sends a flat mapping of numbers and names, which `setup` reads; ``scene`` names the run in its sentences. The
+run is made by the public functions (`Scene`, `simulate`, the closed form), so that the script gives the same numbers to
+the last bit.
 """
 
 import base64
@@ -18,7 +19,7 @@ from symtop.base.validate import SymtopError, finite, positive
 from symtop.measure.conservation import CONSTANTS, residuals
 from symtop.methods.registry import Integrator, integrator, integrators
 from symtop.model import charts
-from symtop.model.scenes import Scene, closed_form, scenes
+from symtop.model.scenes import Scene, closed_form, horizon_of, scenes
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.simulation import simulate
 
@@ -63,7 +64,7 @@ def setup(fields: Mapping[str, Any]) -> Setup:
     start = Angles(*(finite(name, fields[name]) for name in START))
     method = integrator(str(fields["integrator"]))
     method.chart_for("attitude")  # refuses a row such as rk4[axis]: the page shows the whole attitude
-    scene = Scene("explored", top, start, positive("horizon", fields["horizon"]))
+    scene = Scene(str(fields.get("scene", "explored")), top, start, horizon_of(fields["horizon"]))
     if method.control is None:
         return Setup(scene, method, None)
     setting = positive(method.control, fields.get(method.control))

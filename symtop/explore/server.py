@@ -10,13 +10,19 @@ send JSON, so that a page of another origin cannot use it.
 
 import contextlib
 import json
+import select
+import socket
+import sys
 import tempfile
+import threading
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 from symtop.base import datasets
+from symtop.base.strangers import words_of
+from symtop.base.threads import cores
 from symtop.base.validate import SymtopError, whole
 from symtop.explore import answers
 
@@ -27,6 +33,8 @@ PAGES = {
     "/draw.js": ("draw.js", "text/javascript; charset=utf-8"),
     "/style.css": ("style.css", "text/css; charset=utf-8"),
 }
+PATIENCE = 60.0  # seconds to wait for the rest of a request, or for the next one of a connection
+MOST_WAITING = 256  # connections that the system holds until a thread takes them
 LONGEST_BODY = 65_536  # bytes of a POST request
 POLICY = "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
@@ -43,11 +51,28 @@ ACTIONS: dict[str, tuple[Callable[[answers.Setup], bytes], str]] = {
 }
 
 
+_at_work = threading.BoundedSemaphore(cores())  # of 200 runs that take turns in the interpreter 42 took over a minute
+
+
+class Server(ThreadingHTTPServer):
+    """A thread for each connection; what a connection fails of is nobody else's business."""
+
+    request_queue_size = MOST_WAITING
+    daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002
+        """Say in one line what went wrong, unless the browser has only left."""
+        error = sys.exception()
+        if error is not None and not isinstance(error, (ConnectionError, TimeoutError)):
+            sys.stderr.write(f"symtop: a request failed: {words_of(error)}\n")
+
+
 class Handler(BaseHTTPRequestHandler):
     """Answers one request."""
 
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True
+    timeout = PATIENCE
 
     def handle(self) -> None:
         """Answer the requests of one connection, until the browser closes it, even in the middle of one."""
@@ -83,7 +108,12 @@ class Handler(BaseHTTPRequestHandler):
                 self._refuse(413, f"a question must be at most {LONGEST_BODY} bytes, not {length}")
                 return
             action, kind = ACTIONS[self.path]
-            body = action(answers.setup(_parsed(self.rfile.read(length))))
+            chosen = answers.setup(_parsed(self.rfile.read(length)))
+            with _at_work:
+                if self._has_left():
+                    self.close_connection = True
+                    return
+                body = action(chosen)
         except SymtopError as error:
             # The page shows the sentence in place of a run, as an ordinary answer; a file cannot be replaced by it.
             self._refuse(200 if self.path == "/run" else 400, str(error))
@@ -91,6 +121,14 @@ class Handler(BaseHTTPRequestHandler):
             self._refuse(500, f"the run failed: {type(error).__name__}: {' '.join(str(error).split())}")
         else:
             self._reply(200, body, kind)
+
+    def _has_left(self) -> bool:
+        """Has the browser closed the connection while its question waited?"""
+        try:
+            readable, _, _ = select.select([self.connection], [], [], 0.0)
+            return bool(readable) and not self.connection.recv(1, socket.MSG_PEEK)
+        except (OSError, ValueError):
+            return True
 
     def _is_local(self) -> bool:
         """Does the request name this machine? The check refuses a foreign name that resolves to 127.0.0.1."""
@@ -130,11 +168,9 @@ def _parsed(body: bytes) -> Any:
 def serve(port: int = 0) -> ThreadingHTTPServer:
     """A server on this machine, not yet running; port 0 takes a free one. SymtopError if the port is taken."""
     try:
-        server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        return Server(("127.0.0.1", port), Handler)
     except (OSError, OverflowError) as error:
         raise SymtopError(f"port must be a free one between 0 and 65535, not {port!r}: {error}") from error
-    server.daemon_threads = True
-    return server
 
 
 def address(server: ThreadingHTTPServer) -> str:

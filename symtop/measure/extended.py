@@ -16,11 +16,12 @@ import numpy as np
 import xarray as xr
 
 from symtop.methods.registry import Integrator
+from symtop.methods.rotor import ROTATIONS
 from symtop.methods.splitting_loop import Stages
-from symtop.methods.splitting_space import ROTATIONS
 from symtop.model import charts
 from symtop.model.scenes import Scene
-from symtop.run.reference import have_heyoka, reference
+from symtop.run.reference import reference
+from symtop.run.witnesses import have_heyoka
 
 Wide = np.longdouble
 NUTATIONS = 1.37  # length of a run

@@ -47,7 +47,7 @@ def _simo_wong() -> Published:
 
 
 def _bruls_cardona_arnold() -> list[Published]:
-    moved = reference("bruls-cardona-arnold", [1.0])["axis"].values[0] - np.array([0.0, 1.0, 0.0])
+    moved = reference("bruls-cardona-arnold", [1.0], "longdouble")["axis"].values[0] - np.array([0.0, 1.0, 0.0])
     printed = (0.17334, -0.35991, -0.74849)
     return [
         Published(

@@ -5,6 +5,7 @@ that anybody's plug-in can be judged. What it shows is a vector Y(z) in the char
 known at any point:
 
     angles      (theta, phi, psi, p_theta, p_phi, p_psi)    {q_i, p_j} = delta_ij
+    nutation    (theta, p_theta)                             likewise, of z = (theta, p_theta)
     axis        (e, L)                                       {L_i, L_j} = eps_ijk L_k,  {e_i, L_j} = eps_ijk e_k
     attitude    (q, L)                                       the same L,  {q, L_i} = i-th unit vector times q, halved
 
@@ -22,19 +23,20 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1, VI.2, VII
 """
 
 import math
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from symtop.base.validate import SymtopError
+from symtop.methods.calling import solve
 from symtop.methods.plan import Plan, Run
 from symtop.methods.registry import Integrator
 from symtop.model import charts
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.simulation import solve_plan
 
 WIDEST = 0.04  # the first differencing width, in radians and units of the momenta
 WIDTHS = 5
@@ -42,7 +44,6 @@ COARSE = 3e-3  # a step is coarse enough to show its structure if two halves of 
 LOOSE = 1e-3  # tolerance at which an adaptive method shows its structure
 UNIT = 1e-12  # |e| = 1 and |q| = 1 within this
 SHARE = 0.37  # of a nutation: what an adaptive method is run for
-CANONICAL = np.block([[np.zeros((3, 3)), np.eye(3)], [-np.eye(3), np.zeros((3, 3))]])
 
 
 @dataclass(frozen=True)
@@ -62,18 +63,36 @@ class StepMap:
         else:
             loose = max(LOOSE, self.method.least_tolerance) if self.method.adaptive else math.nan
             plan = Plan.until([steps * h], loose)
-        done = solve_plan(self.method, self.chart, self.top, start, plan)
+        done = solve(self.method, self.chart, self.top, start, plan)
         if done.outcome != "ok" or not np.isfinite(done.states).all():
             raise SymtopError(f"a step of {h:.3g} in the {self.chart} chart ended as {done.outcome}")
         return done
 
     def shown(self, done: Run) -> Array:
         """The last sample as Y."""
-        state = done.states[-1]
+        return self.scaled(done.states[-1], done.p_phi[-1], done.p_psi[-1])
+
+    def scaled(self, state: Array, p_phi: float, p_psi: float) -> Array:
+        """A state of the chart as Y; the momenta are needed in angles alone."""
         if self.chart == "angles":
             theta, p_theta, phi, psi = state
-            return np.array([theta, phi, psi, *(np.array([p_theta, done.p_phi[-1], done.p_psi[-1]]) / self.unit)])
+            return np.array([theta, phi, psi, *(np.array([p_theta, p_phi, p_psi]) / self.unit)])
         return np.concatenate([state[:-3], state[-3:] / self.unit])
+
+    @property
+    def onward(self) -> Callable[[SymmetricTop, Angles, Sequence[float]], Run] | None:
+        """A run of steps of given lengths, each from the state where the last one ended, where a solver can do that.
+
+        A start has |e| = 1 and |q| = 1, and cannot take up a state that has lost its length.
+        """
+        run: Any = getattr(self.method.solvers[self.chart], "onward", None)
+        return cast("Callable[[SymmetricTop, Angles, Sequence[float]], Run] | None", run)
+
+    @property
+    def there_and_back(self) -> Callable[[SymmetricTop, Angles, float], Run] | None:
+        """A step, and one from its end with all rates reversed, where a solver can do that."""
+        run: Any = getattr(self.method.solvers[self.chart], "there_and_back", None)
+        return cast("Callable[[SymmetricTop, Angles, float], Run] | None", run)
 
     def image(self, z: Array, h: float | None = None) -> Array:
         """Y after one step from z."""
@@ -150,23 +169,34 @@ def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Ang
     trial = one_step(method, chart, scene, SHARE * scene.time_scale())
     if not method.fixed_step:
         return trial, start
-    refusal = SymtopError(f"{method.name} makes no step in the {chart} chart")
+    return coarsest(trial, start), start
+
+
+def coarsest(trial: StepMap, start: Angles) -> StepMap:
+    """The map of the largest step, from that of `trial` downwards, whose halves differ from it by less than COARSE."""
+    refusal = SymtopError(f"{trial.method.name} makes no step in the {trial.chart} chart")
     h = trial.h
     for _ in range(40):
         try:
             halves = trial.shown(trial.run(start, 0.5 * h, 2))
             if trial.gap(trial.image(trial.point(start), h), halves) < COARSE:
-                return one_step(method, chart, scene, h), start
+                return replace(trial, h=h)
         except SymtopError as error:
             refusal = error
         h *= 0.7
     raise refusal
 
 
+def canonical(size: int) -> Array:
+    """The brackets of so many angles and momenta, angles first."""
+    none, one = np.zeros((size // 2, size // 2)), np.eye(size // 2)
+    return np.block([[none, one], [-one, none]])
+
+
 def bracket(chart: str, y: Array) -> Array:
     """B(Y): the brackets of all pairs of the chart's variables, momenta in the map's unit."""
-    if chart == "angles":
-        return CANONICAL
+    if chart in ("angles", "nutation"):
+        return canonical(y.size)
     place, momentum = y[:-3], y[-3:]
     units = np.eye(3)
     spun = [np.cross(unit, momentum) for unit in units]
@@ -206,17 +236,17 @@ def symplectic_defect(step: StepMap, start: Angles) -> Defect:
                 best, doubt = table[k][j], change
     noise = 4.0 * _largest(best) * doubt + 1e-13
     raw = np.array([_largest(_miss(step.chart, row[0], middle)) for row in table])
-    rest = float(np.linalg.svd(_miss(step.chart, best, middle), compute_uv=False)[2])
+    rest = float(np.linalg.svd(_miss(step.chart, best, middle), compute_uv=False)[2:3].sum())
     return Defect(_largest(_miss(step.chart, best, middle)), rest, noise, widths, raw)
 
 
 def _differences(step: StepMap, z: Array, middle: Array, width: float) -> Array:
     columns = []
-    for k in range(6):
+    for k in range(z.size):
         if step.chart == "axis" and k == 2:  # nothing on the axis depends on psi
             columns.append(np.zeros_like(middle))
             continue
-        aside = width * np.eye(6)[k]
+        aside = width * np.eye(z.size)[k]
         ahead, behind = (_aligned(step.chart, step.image(z + sign * aside), middle) for sign in (1.0, -1.0))
         columns.append((ahead - behind) / (2.0 * width))
     return np.stack(columns, axis=1)
@@ -229,7 +259,7 @@ def _aligned(chart: str, y: Array, middle: Array) -> Array:
 
 
 def _miss(chart: str, slopes: Array, y: Array) -> Array:
-    wrong: Array = slopes @ CANONICAL @ slopes.T - bracket(chart, y)
+    wrong: Array = slopes @ canonical(slopes.shape[1]) @ slopes.T - bracket(chart, y)
     return wrong
 
 
@@ -239,7 +269,15 @@ def _largest(matrix: Any) -> float:
 
 def return_miss(step: StepMap, start: Angles) -> float:
     """Distance from the start after a step forth and back; a solver that takes no negative step runs reversed."""
-    before = step.at(start)
+    before, onward = step.at(start), step.onward
+    if step.method.fixed_step and onward is not None:
+        try:
+            return step.gap(step.shown(onward(step.top, start, (step.h, -step.h))), before)
+        except SymtopError:
+            if step.there_and_back is not None:
+                return step.gap(step.shown(step.there_and_back(step.top, start, step.h)), before)
+            if abs(step.length(step.image(step.point(start))) - 1.0) > UNIT:
+                raise
     arrived = step.restart(step.image(step.point(start)))
     if step.method.fixed_step:
         try:
@@ -260,6 +298,10 @@ def restart_gap(step: StepMap, start: Angles) -> float:
 
     A step that does not keep |e| or |q| at one cannot be taken up again by a start: that is no evidence, and zero.
     """
+    onward = step.onward
+    if step.method.fixed_step and onward is not None:
+        twice = step.shown(onward(step.top, start, (step.h, step.h)))
+        return step.gap(step.shown(step.run(start, step.h, 2)), twice)
     after = step.image(step.point(start))
     if not step.method.fixed_step or abs(step.length(after) - 1.0) > UNIT:
         return 0.0

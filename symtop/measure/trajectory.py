@@ -129,15 +129,32 @@ def _inclined(theta: charts.Array, time: charts.Array) -> None:
 
 
 def refuse_other_order(data: xr.Dataset, truth: xr.Dataset) -> None:
-    """Refuse quaternions whose first sample is the true attitude only when it is read as x, y, z, w."""
+    """Refuse quaternions whose first sample is the true attitude only when it is read in another convention."""
     finite = np.flatnonzero(np.isfinite(data["quaternion"].values).all(axis=1))
     if not finite.size:
         return
     first, true = data["quaternion"].values[finite[0]], truth["quaternion"].values[finite[0]]
-    moved = np.roll(first, 1)
-    as_given, as_moved = (float(charts.attitude_distance(q, true)) for q in (first, moved))
-    if as_given > FAR and as_moved < NEAR:
-        raise SymtopError(
-            f"quaternion must be in the order w, x, y, z: its first sample is {as_given:.2g} rad from the true "
-            f"attitude, and {as_moved:.1g} rad if it is read as x, y, z, w"
+    as_given = float(charts.attitude_distance(first, true))
+    for other, moved in (("x, y, z, w", np.roll(first, 1)), ("from space to body", first * [1.0, -1.0, -1.0, -1.0])):
+        if as_given > FAR and float(charts.attitude_distance(moved, true)) < NEAR:
+            raise SymtopError(
+                "quaternion must be in the order w, x, y, z and from body to space, but its first sample is the true "
+                f"one if it is read as {other}"
+            )
+
+
+def doubts(data: xr.Dataset, errors: Mapping[str, charts.Array]) -> list[str]:
+    """What is wrong with a foreign trajectory as a whole: a start that is another one, samples that are not numbers."""
+    said, time = [], data["time"].values
+    name = "attitude" if "attitude" in errors else "axis" if "axis" in errors else "theta"
+    if errors[name][0] > FAR:
+        said.append(
+            f"the first sample, at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}: is this the "
+            "start of the scene, and is its time counted from there?"
         )
+    for name, values in errors.items():
+        if np.isnan(values).any():
+            since = time[int(np.argmax(np.isnan(values)))]
+            said.append(f"{name} is not a number from t = {since:.6g}; a largest error leaves these samples out")
+            break
+    return said

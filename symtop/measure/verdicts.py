@@ -20,8 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from symtop.methods.outcomes import OUTCOMES
 from symtop.model.scenes import Scene
+from symtop.run.guard import EXPECTED
 
-ACCURATE = 1e-2  # rad
+ACCURATE = EXPECTED  # rad: what is wrong afterwards is what the guard warns of before
 OUTSIDE = 0.1  # of the nutation's width, or rad if it has none
 STEADY = 1e-6  # rad; a nutation narrower than this is a steady precession, known to rounding only
 DRIFT = 0.01  # of the energy of the nutation, `Scene.energy_scale`
@@ -115,6 +116,10 @@ class Judgement(NamedTuple):
     verdict: str
     time: float
     sentence: str
+
+    def words(self) -> str:
+        """The verdict and its cause, as a line of text."""
+        return self.sentence if self.verdict == "accurate" else f"{self.verdict.replace('_', ' ')}, {self.sentence}"
 
 
 def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgement:

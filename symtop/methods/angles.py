@@ -9,10 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.base.compiled import register_jitable
-from symtop.base.validate import SymtopError
 from symtop.methods.outcomes import LEFT_CHART, NOT_FINITE, OK
-from symtop.methods.preparation import Preparation, conserved
-from symtop.model.top import Angles
+from symtop.methods.preparation import Preparation, Requirement, conserved
 
 
 class ReducedTop(NamedTuple):
@@ -44,10 +42,16 @@ def chart_outcome(theta: float) -> int:
     return NOT_FINITE
 
 
-def require_chart(at: Angles) -> None:
-    """Refuse a start at a pole, where phi and psi have no meaning of their own."""
-    if not 0.0 < at.theta < np.pi:
-        raise SymtopError(f"theta must lie inside (0, pi) for an integrator in the angles chart, not {at.theta!r}")
+def _in_chart(at: Any) -> Any:
+    """Is theta no pole, where phi and psi have no meaning of their own?"""
+    return (at.theta > 0.0) & (at.theta < np.pi)
+
+
+def _outside(at: Any) -> str:
+    return f"theta must lie inside (0, pi) for an integrator in the angles chart, not {at.theta!r}"
+
+
+require_chart = Requirement(_in_chart, _outside)
 
 
 def _reduced(top: Any, at: Any) -> Any:

@@ -18,15 +18,20 @@ def entries() -> dict[str, str]:
     }
 
 
+def keys(method: Integrator) -> list[str]:
+    """The entries that an integrator's `reference` names; a reference may also be plain words."""
+    return [key for key in method.reference.replace(",", " ").split() if key in entries()]
+
+
 def citation(name: "str | Integrator") -> str:
     """BibTeX of the source of an integrator, by its name.
 
     Raises SymtopError for an unknown name, or if the integrator names no source that is known here.
     """
     method = integrator(name)
-    keys = [key for key in method.reference.replace(",", " ").split() if key in entries()]
-    if not keys:
+    named = keys(method)
+    if not named:
         raise SymtopError(
             f"integrator {method.name!r} names no source that is known here (its reference is {method.reference!r})"
         )
-    return "\n\n".join(entries()[key] for key in keys)
+    return "\n\n".join(entries()[key] for key in named)

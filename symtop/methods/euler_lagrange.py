@@ -14,9 +14,8 @@ be seen. The chart ends at theta = 0 and pi. Source: Goldstein, Classical Mechan
 import math
 from typing import Any
 
-import numpy as np
-
 from symtop.base.compiled import register_jitable
+from symtop.base.sines import sincos
 from symtop.methods.angles import BareTop, chart_outcome, require_chart
 from symtop.methods.plan import Array
 from symtop.methods.preparation import Preparation, Shown
@@ -27,9 +26,9 @@ LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws t
 @register_jitable
 def accelerations(I1: Any, I3: Any, mgl: Any, theta: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any) -> Any:
     """theta'', phi'' and psi'' on floats; NaN exactly at a pole. Plain Python as it stands, and compiles."""
-    s, c = math.sin(theta), math.cos(theta)
-    if s == 0.0:  # compiled code would raise where it divides, and lose the run
-        return math.nan, math.nan, math.nan
+    s, c = sincos(theta)
+    if s == 0.0:  # the interpreter would raise where it divides, and lose the run
+        s = math.nan
     spin = I3 * (psi_dot + phi_dot * c)
     theta_ddot = s * (phi_dot * (I1 * phi_dot * c - spin) + mgl) / I1
     phi_ddot = theta_dot * (spin - 2.0 * I1 * phi_dot * c) / (I1 * s)
@@ -55,7 +54,7 @@ with_rates = Preparation(_with_rates, 6, require_chart)
 @register_jitable
 def momenta(par: Any, theta: Any, phi_dot: Any, psi_dot: Any) -> Any:
     """p_phi and p_psi of angles and rates, floats or arrays."""
-    s, c = np.sin(theta), np.cos(theta)
+    s, c = sincos(theta)
     p_psi = par.I3 * (psi_dot + phi_dot * c)
     return par.I1 * phi_dot * s * s + p_psi * c, p_psi
 

@@ -21,7 +21,6 @@ from typing import Any, NamedTuple
 from symtop.methods import euler_lagrange, space
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.plan import Array, Run
-from symtop.methods.preparation import Shown
 from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import space_momenta
 
@@ -33,7 +32,9 @@ class Formulation(NamedTuple):
     ended: Callable[[Any], int]  # outcome of a state: OK, or how the chart was left
     observe: Callable[..., Any]  # (par, rule, before, dstate, h) -> p_phi and p_psi after a step
     prepare: Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]  # parameters and state of a start
-    present: Shown | None  # (par, times, states) -> states of the chart that `simulate` shows, where they differ
+    present: (
+        Callable[[Any, Array, Array], Array] | None
+    )  # (par, times, states) -> states of the chart that `simulate` shows, where they differ
     momenta: Callable[[Any, Array], tuple[Array, Array]]  # (par, states) -> p_phi and p_psi of samples
 
 

@@ -30,15 +30,17 @@ inertia depends on theta, the two differ by O(h^4), and Lobatto IIIA-IIIB is wha
 Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357, on Galerkin methods.
 """
 
+import functools
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from symtop.base.compiled import register_jitable
-from symtop.methods.angles import chart_outcome, reduced
+from symtop.base.sines import sincos
+from symtop.methods.angles import ReducedTop, chart_outcome, reduced
 from symtop.methods.fixed_step import FixedStep, inside
+from symtop.methods.lanes import Lanes
 from symtop.methods.loop import driver
 from symtop.methods.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton
+from symtop.methods.newton_lanes import iterated
 from symtop.methods.outcomes import NOT_CONVERGED
 from symtop.methods.registry import Integrator
 
@@ -71,7 +73,7 @@ class _Pull(NamedTuple):
 
 @register_jitable
 def _node(par: Any, theta: float) -> Any:
-    sin_x, cos_x = np.sin(0.5 * theta), np.cos(0.5 * theta)
+    sin_x, cos_x = sincos(0.5 * theta)
     low, high = sin_x * sin_x, cos_x * cos_x
     return _Node(0.25 / (par.I1 * high), 0.25 / (par.I1 * low), sin_x / cos_x, 2.0 * sin_x * cos_x, high - low)
 
@@ -153,8 +155,28 @@ class _Step(NamedTuple):
     rule: Any
     theta: float
     start: _Node
+    h: float
     flight: float  # h p / I1, what d is without any force
     scale: float  # h^2 / I1
+
+
+@register_jitable
+def _steady(par: Any, h: float) -> Any:
+    """What no step changes."""
+    return h, h * h / par.I1
+
+
+@register_jitable
+def _open(par: Any, rule: Any, theta: float) -> Any:
+    """What no iteration changes: the trigonometry of the start."""
+    return _node(par, theta)
+
+
+@register_jitable
+def _equations(par: Any, rule: Any, state: Any, steady: Any, opened: Any) -> Any:
+    h, scale = steady
+    d, a, tangent, sine, cosine = opened
+    return _Step(par, rule, state[0], _Node(d, a, tangent, sine, cosine), h, h * state[1] / par.I1, scale)
 
 
 @register_jitable
@@ -188,32 +210,54 @@ def _free_flight(step: Any) -> Any:
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     """V' at the start, as a history of V0 and Vm for the predictor."""
     V = _pull(par, _node(par, state[0]), par.south, par.north).slope
-    return ((V, V), (V, V), (V, V), (V, V))
+    return (V, V, V, V, V, V, V, V)
 
 
 @register_jitable
-def _predict(carry: Any, flight: float, scale: float) -> Any:
+def _predict(step: Any, carry: Any) -> Any:
     """thetam - theta0 and theta1 - theta0, from the cubic through the last four values of V0 and of Vm."""
-    one, two, three, four = carry
-    V0 = 4.0 * (one[0] + three[0]) - 6.0 * two[0] - four[0]
-    Vm = 4.0 * (one[1] + three[1]) - 6.0 * two[1] - four[1]
-    d = flight - scale * (V0 + 2.0 * Vm) / 6.0
-    return 0.5 * d + scale * Vm / 8.0, d
+    V0 = 4.0 * (carry[0] + carry[4]) - 6.0 * carry[2] - carry[6]
+    Vm = 4.0 * (carry[1] + carry[5]) - 6.0 * carry[3] - carry[7]
+    d = step.flight - step.scale * (V0 + 2.0 * Vm) / 6.0
+    return 0.5 * d + step.scale * Vm / 8.0, d
+
+
+class _End(NamedTuple):
+    """What the increment is made of, once the iteration has ended."""
+
+    V0: float
+    Vm: float
+    V1: float
+    plus: float
+    minus: float
+    d: float
+
+
+@register_jitable
+def _keep(trial: Any, correction: Any) -> Any:
+    """What was evaluated before the last correction follows it to first order; the remainder is its square."""
+    fix = correction.change
+    return _End(
+        _follow(trial.V0, fix), _follow(trial.Vm, fix), _follow(trial.V1, fix),
+        _follow(trial.plus, fix), _follow(trial.minus, fix), correction.after[1],
+    )  # fmt: skip
+
+
+@register_jitable
+def _close(step: Any, end: Any) -> Any:
+    """The increment, the slopes to predict with and the outcome."""
+    V0, Vm, V1, plus, minus, d = end
+    h = step.h
+    dstate = (d, -h * (V0 + 4.0 * Vm + V1) / 6.0, 0.5 * h * (plus + minus), 0.5 * h * (plus - minus))
+    return dstate, (V0, Vm), chart_outcome(step.theta + d)
 
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
-    flight = h * state[1] / par.I1
-    scale = h * h / par.I1
-    equations = _Step(par, rule, state[0], _node(par, state[0]), flight, scale)
-    solution = newton(_at, _correct, _free_flight, equations, _predict(carry, flight, scale), rule.iterations)
-    trial, fix, d = solution.trial, solution.correction.change, solution.correction.after[1]
-    outcome = chart_outcome(state[0] + d) if solution.converged else NOT_CONVERGED
-    # what was evaluated before the last correction follows it to first order; the remainder is its square
-    V0, Vm, V1 = _follow(trial.V0, fix), _follow(trial.Vm, fix), _follow(trial.V1, fix)
-    plus, minus = _follow(trial.plus, fix), _follow(trial.minus, fix)
-    step = (d, -h * (V0 + 4.0 * Vm + V1) / 6.0, 0.5 * h * (plus + minus), 0.5 * h * (plus - minus))
-    return step, ((V0, Vm), carry[0], carry[1], carry[2]), solution.evaluations, outcome
+    equations = _equations(par, rule, state, _steady(par, h), _open(par, rule, state[0]))
+    solution = newton(_at, _correct, _free_flight, equations, _predict(equations, carry), rule.iterations)
+    step, newest, outcome = _close(equations, _keep(solution.trial, solution.correction))
+    return step, newest + carry[:-2], solution.evaluations, outcome if solution.converged else NOT_CONVERGED
 
 
 @register_jitable
@@ -242,7 +286,15 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     return 0.5 * (south + north), 0.5 * (south - north)
 
 
-march = driver(begin, increment, observe)
+@functools.cache
+def _in_lanes(rule: Iteration) -> Lanes:
+    return iterated(
+        rule, _steady, _open, _equations, _predict, _at, _correct, _keep, _close,
+        top=ReducedTop, end=_End, dimension=4, steady=2, opened=5, unknowns=2, newest=2, carry=8,
+    )  # fmt: skip
+
+
+march = driver(begin, increment, observe, lanes=_in_lanes)
 
 
 def built_in() -> list[Integrator]:

@@ -36,17 +36,20 @@ import numpy as np
 from symtop.base.compiled import register_jitable, set_item
 from symtop.base.multiprecision import context
 from symtop.methods.fixed_step import FixedStep
+from symtop.methods.gauss_lanes import swept
+from symtop.methods.lanes import Lanes
 from symtop.methods.loop import Loop, driver
 from symtop.methods.outcomes import NOT_CONVERGED, OK
 from symtop.methods.preparation import Later
 from symtop.methods.registry import Array, Integrator
-from symtop.methods.space import field_axis, field_frame, frame_to_attitude, observe_axis, on_axis, on_frame
+from symtop.methods.space import SpaceTop, field_axis, field_frame, frame_to_attitude, observe_axis, on_axis, on_frame
 from symtop.methods.stage_newton import solve_stages
 
 STAGES = (1, 2, 3, 4, 5, 6)
 DIGITS = 40  # of the multiprecision that coefficients are computed in
 SWEEPS = 100  # most of them in a step; 14 are the most that a step of sensible size takes
 FARTHEST, PACE = 1e3, 0.68  # correction k that does not fall and is above FARTHEST PACE^k: sweeps will not converge
+IN_LANES = {6: 4, 9: 2}  # most stages, by numbers of a state, that lanes gain from (3.2 times); more stay scalar
 STILL = 5  # L_z has no slope, so its increments stay zero: left out, they save a sixth of the sums on (e, L)
 ROUND_OFF = 1e-14  # a correction that stopped falling above this, in units of |e| = 1 and |L|, has not converged
 
@@ -99,6 +102,22 @@ def gauss_rule(stages: int) -> GaussRule:
 
 
 @register_jitable
+def stage_weights(rule: Any, h: float) -> Any:
+    """h b_i, an array."""
+    weights = h * rule.b
+    if len(weights) > 2:  # the two ends take the rounding of the inner weights, so that the sum is h
+        weights[0] = weights[-1] = 0.5 * (h - np.sum(weights[1:-1]))
+    return weights
+
+
+@register_jitable
+def momentum_unit(par: Any, state: Any) -> float:
+    """1/|L|, the unit in which corrections of L are judged."""
+    momentum = np.sqrt(state[3] ** 2 + state[4] ** 2 + state[5] ** 2) + np.sqrt(par.I1 * abs(par.mgl))
+    return 1.0 / momentum if momentum > 0.0 else 1.0
+
+
+@register_jitable
 def working_space(field: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
     """One array for all that a step reads and writes, because numba counts references to each: 10 ns an array.
 
@@ -108,11 +127,8 @@ def working_space(field: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
     """
     stages, dimension = len(rule.b), len(state)
     work = np.zeros((7 * stages + 1, max(dimension + 1, 3 * stages + 1)))
-    weights = h * rule.b
-    if stages > 2:  # the two ends take the rounding of the inner weights, so that the sum is h
-        weights[0] = weights[-1] = 0.5 * (h - np.sum(weights[1:-1]))
-    momentum = np.sqrt(state[3] ** 2 + state[4] ** 2 + state[5] ** 2) + np.sqrt(par.I1 * abs(par.mgl))
-    work[4 * stages, 0] = 1.0 / momentum if momentum > 0.0 else 1.0
+    weights = stage_weights(rule, h)
+    work[4 * stages, 0] = momentum_unit(par, state)
     slope = field(par, state)
     for i in range(stages):
         work[i, dimension] = weights[i]
@@ -124,6 +140,12 @@ def working_space(field: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
             for k in range(stages):
                 work[2 * stages + i, stages + j] += rule.mu[i, k] * weights[k] * rule.mu[k, j]
     return work
+
+
+@register_jitable
+def farthest(sweeps: int) -> float:
+    """A correction beyond this, after so many sweeps, that does not fall will not converge."""
+    return FARTHEST * PACE**sweeps
 
 
 @register_jitable
@@ -179,7 +201,7 @@ def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C90
             if correction < ROUND_OFF:
                 outcome = OK
                 break
-            if not correction <= FARTHEST * PACE**effort:
+            if not correction <= farthest(effort):
                 break
         last = correction
     if outcome != OK:
@@ -194,7 +216,7 @@ def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C90
     return step, effort, outcome if np.isfinite(step[0]) else NOT_CONVERGED
 
 
-def _loop(field: Any) -> Loop:
+def _loop(field: Any, dimension: int) -> Loop:
     """The loop on states that move by `field`, with L in the components 3 to 5; it counts sweeps and iterations."""
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
@@ -204,10 +226,22 @@ def _loop(field: Any) -> Loop:
         step, effort, outcome = gauss_step(field, par, state, carry)
         return step, carry, effort, outcome
 
-    return driver(begin, increment, observe_axis)
+    @functools.cache
+    def of_rows(mu: Any, predict: Any) -> Lanes:
+        return swept(
+            field, stage_weights, momentum_unit, farthest, mu, predict,
+            top=SpaceTop, dimension=dimension, still=STILL, most=SWEEPS, round_off=ROUND_OFF,
+        )  # fmt: skip
+
+    def in_lanes(rule: GaussRule) -> Lanes | None:
+        if len(rule.b) > IN_LANES[dimension]:
+            return None
+        return of_rows(*(tuple(map(tuple, rows.tolist())) for rows in (rule.mu, rule.predict)))
+
+    return driver(begin, increment, observe_axis, lanes=in_lanes)
 
 
-march_axis, march_frame = _loop(field_axis), _loop(field_frame)
+march_axis, march_frame = _loop(field_axis, 6), _loop(field_frame, 9)
 
 
 def gauss(stages: int) -> Integrator:

@@ -34,6 +34,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.base.compiled import compile_kernel, register_jitable, set_item
+from symtop.methods.blocks import Blocks
+from symtop.methods.lanes import Lanes, marching as marching_lanes, preparing
+from symtop.methods.many import over_members
 from symtop.methods.outcomes import OK
 from symtop.methods.preparation import Body, Start, as_it_steps, conserved
 
@@ -92,6 +95,10 @@ def _as_given(par: Any, rule: Any, state: Any, h: float) -> Any:
     return state
 
 
+def _no_lanes(rule: Any) -> None:
+    return None
+
+
 @register_jitable
 def _as_stepped(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     return state
@@ -105,13 +112,18 @@ class Loop:
     start). `begun` and `advance` do the same in stretches, and the bits do not depend on where a stretch ends.
     ``whole(kind, prepare, scale, sample)`` is a run in one compiled call, from the plain numbers of
     `symtop.methods.preparation` to filled arrays: ``run(numbers, rule, h, marks, states, momenta)`` returns steps, work
-    and outcome.
+    and outcome. `many` takes the same parts and is the loop over members around that run (`many.over_members`).
+    `lanes` is what the family has for a rule to run many members in lanes, if it has it, and ``blocks(lanes, ...)`` the
+    kernels of that, from the same parts again.
     """
 
     begin: Callable[..., Any]
     prepare: Callable[..., Any]
     march: Callable[..., Any]
     whole: Callable[..., Callable[..., tuple[int, int, int]]]
+    many: Callable[..., Callable[..., None]]
+    lanes: Callable[[Any], Lanes | None]
+    blocks: Callable[..., Blocks]
     plain: Callable[[], "Loop"]  # the same kernel with sums that are not compensated
 
     def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Marks) -> March:
@@ -144,9 +156,9 @@ class Loop:
 def driver(  # noqa: C901  (one loop, read in one piece)
     begin: Callable[..., Any], increment: Callable[..., Any], observe: Callable[..., Any],
     enter: Callable[..., Any] = _as_given, present: Callable[..., Any] = _as_stepped,
-    add: Callable[..., Any] = accumulate,
+    add: Callable[..., Any] = accumulate, lanes: Callable[[Any], Lanes | None] = _no_lanes,
 ) -> Loop:  # fmt: skip
-    """The loop around one kernel family; `add` is how increments are summed."""
+    """The loop around one kernel family; `add` is how increments are summed, `lanes` how it steps many, by its rule."""
     for part in (begin, increment, observe, enter, present):
         register_jitable(part)
 
@@ -182,7 +194,7 @@ def driver(  # noqa: C901  (one loop, read in one piece)
         return march
 
     @functools.cache
-    def whole(
+    def running(
         kind: Callable[..., Any], numbers: Callable[..., Any], scale: Callable[..., Any], sample: Callable[..., Any]
     ) -> Callable[..., tuple[int, int, int]]:
         march = register_jitable(marching(sample))
@@ -190,7 +202,7 @@ def driver(  # noqa: C901  (one loop, read in one piece)
         def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
             top, at = Body(*plain[:3]), Start(*plain[3:])
             par, state = numbers(top, at)
-            rule = scale(kind(*coefficients), top, h)
+            rule = scale(kind(*coefficients), top, at, h)
             state = enter(par, rule, state, h)
             low = state
             for i in range(len(state)):
@@ -204,11 +216,27 @@ def driver(  # noqa: C901  (one loop, read in one piece)
             momenta[max(j, int(marks[0] == 0)) :] = np.nan
             return k, work, outcome
 
-        compiled: Callable[..., tuple[int, int, int]] = compile_kernel(run)
+        running_once: Callable[..., tuple[int, int, int]] = register_jitable(run)
+        return running_once
+
+    @functools.cache
+    def whole(*parts: Callable[..., Any]) -> Callable[..., tuple[int, int, int]]:
+        compiled: Callable[..., tuple[int, int, int]] = compile_kernel(running(*parts))
         return compiled
+
+    @functools.cache
+    def many(*parts: Callable[..., Any]) -> Callable[..., None]:
+        compiled: Callable[..., None] = compile_kernel(over_members(running(*parts)))
+        return compiled
+
+    @functools.cache
+    def blocks(family: Lanes, kind: Any, numbers: Any, scale: Any, sample: Any) -> Blocks:
+        prepare = preparing(family, begin, enter, kind, numbers, scale)
+        return Blocks(family, prepare, marching_lanes(family, observe, present, sample))
 
     @functools.cache
     def plain() -> Loop:
         return driver(begin, increment, observe, enter, present, accumulate_plainly)
 
-    return Loop(begin, compile_kernel(prepare), compile_kernel(marching(as_it_steps)), whole, plain)
+    alone = compile_kernel(prepare), compile_kernel(marching(as_it_steps))
+    return Loop(begin, *alone, whole, many, lanes, blocks, plain)

@@ -50,6 +50,13 @@ class Solution(NamedTuple):
 
 
 @register_jitable
+def settled(correction: Any, last: float) -> Any:
+    """Is this correction the last one, after one of size `last`?"""
+    size: float = correction.size
+    return size <= correction.enough or 0.5 * last <= size <= correction.grain
+
+
+@register_jitable
 def newton(evaluate: Any, correct: Any, restart: Any, problem: Any, guess: Any, most: int) -> Any:
     """Solve from a first guess with at most so many evaluations."""
     x = guess
@@ -59,7 +66,7 @@ def newton(evaluate: Any, correct: Any, restart: Any, problem: Any, guess: Any, 
     while True:
         correction = correct(problem, trial, x)
         last, size = size, correction.size
-        converged = size <= correction.enough or 0.5 * last <= size <= correction.grain
+        converged = settled(correction, last)
         if converged or evaluations >= most:
             return Solution(x, trial, correction, evaluations, converged)
         x = restart(problem) if evaluations == most // 2 else correction.after

@@ -1,7 +1,7 @@
 """From a top and a start to the numbers that a kernel steps, by functions that are Python and compile as they stand.
 
     prepare(top, at) -> (par, state)         the numbers of the top, and the start as the kernel steps it
-    scale(rule, top, h) -> rule              the coefficients of a method times the step
+    scale(rule, top, at, h) -> rule          the coefficients of a method times the step
     sample(par, t, state) -> state           a sample at the time t, in the chart that a user sees
 
 A `Preparation`, a `Scaled` rule and a `Shown` chart each hold one such function. Called, they are what a function of
@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.base.compiled import compile_kernel, register_jitable
+from symtop.base.validate import SymtopError
 from symtop.model import top as model
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, SymmetricTop, flat
 
 Array = NDArray[np.float64]
 Numbers = tuple[float, ...]  # I1, I3, mgl, theta, phi, psi, theta', phi', psi'
@@ -47,9 +48,20 @@ class Start(NamedTuple):
     psi_dot: float
 
 
-def flat(top: SymmetricTop, at: Angles) -> Numbers:
-    """A top and a start as nine plain numbers."""
-    return top.I1, top.I3, top.mgl, at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot
+@dataclass(frozen=True)
+class Requirement:
+    """What a start must meet so that a kernel can step it: `holds(at)`, of numbers or of arrays; `refusal(at)` if not.
+
+    A call refuses one start. Of many, arrays are asked: 3 ns each, and half a microsecond by a call of Python.
+    """
+
+    holds: Callable[[Any], Any]
+    refusal: Callable[[Any], str]
+
+    def __call__(self, at: Any) -> None:
+        """Raise SymtopError for a start that does not meet it."""
+        if not self.holds(at):
+            raise SymtopError(self.refusal(at))
 
 
 @dataclass(frozen=True)
@@ -58,7 +70,7 @@ class Preparation:
 
     numbers: Callable[..., tuple[Any, Numbers]]
     size: int  # of the state
-    check: Callable[[Angles], None] | None = None
+    check: Requirement | None = None
 
     def __post_init__(self) -> None:
         register_jitable(self.numbers)  # at once: what a kernel is made of must not hang on what has run
@@ -74,19 +86,24 @@ class Preparation:
 def _on_numbers(scale: Callable[..., Any], kind: Any) -> Any:
     """`scale` by itself, compiled: between plain numbers and a rule."""
 
-    def scaled(body, rule, h):  # type: ignore[no-untyped-def]
-        return scale(kind(*rule), Body(*body), h)
+    def scaled(body, start, rule, h):  # type: ignore[no-untyped-def]
+        return scale(kind(*rule), Body(*body), Start(*start), h)
 
     return compile_kernel(scaled)
 
 
 @dataclass(frozen=True)
 class Scaled:
-    """A rule whose numbers hang on the top and the step; `fit(rule, top, start, h)` adds what hangs on the start."""
+    """A rule whose numbers hang on the run; `fit(rule, top, start, h)` adds what Python alone can compute.
+
+    ``pack(rule)`` is a function that compiled code makes the rule with, and its arguments: by default its type and its
+    fields.
+    """
 
     rule: Any  # a NamedTuple
     scale: Callable[..., Any]
     fit: Callable[..., Any] | None = None
+    pack: Callable[..., tuple[Callable[..., Any], tuple[Any, ...]]] | None = None
 
     def __post_init__(self) -> None:
         register_jitable(self.scale)
@@ -95,7 +112,8 @@ class Scaled:
         """The rule of one run."""
         kind: Any = type(self.rule)
         compiled = _on_numbers(self.scale, kind)
-        return compiled((top.I1, top.I3, top.mgl), tuple(self.fitted(top, at, h)), h)
+        numbers = flat(top, at)
+        return compiled(numbers[:3], numbers[3:], tuple(self.fitted(top, at, h)), h)
 
     def fitted(self, top: SymmetricTop, at: Angles, h: float) -> Any:
         """The rule before it is scaled."""
@@ -153,8 +171,8 @@ def plain(*values: Any) -> Any:
 
 
 @register_jitable
-def as_it_is(rule: Any, top: Any, h: float) -> Any:
-    """The numbers of a method that hang on neither the top nor the step."""
+def as_it_is(rule: Any, top: Any, at: Any, h: float) -> Any:
+    """The numbers of a method that hang on nothing of the run."""
     return rule
 
 

@@ -7,6 +7,10 @@ know of a method is a field of its record.
 
 A method in one of its charts is a *row* of a comparison, ``rk4[axis]``: method and chart are two factors, and a
 comparison of ``rk4[angles]`` with ``strang[axis]`` changes both. `rows` lists them; `integrator` knows them by name.
+
+The maps of physics engines, family ``engine``, are registered as every integrator is, judged by the claims table and
+run by name. They are what people are given, not what one would choose: `methods`, and so `rows` and every comparison
+and recommendation, leaves them out.
 """
 
 import importlib
@@ -22,10 +26,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from symtop.base.signals import is_of_user
+from symtop.base.strangers import words_of
 from symtop.base.validate import SymtopError, SymtopWarning, finite, label, one_of, positive, whole
 from symtop.base.walk import by_name
 from symtop.methods.about import paragraphs
 from symtop.methods.plan import Plan, Run
+from symtop.model.charts import DIMENSIONS
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View
 
@@ -33,7 +40,10 @@ Array = NDArray[np.float64]
 Solver = Callable[[SymmetricTop, Angles, Plan], Run]
 ModifiedEnergy = Callable[[View, Momenta, float], Array]  # of states (n, dimension), momenta of the start and h: (n,)
 
-FAMILIES = ("discrete-lagrangian", "splitting", "runge-kutta", "taylor", "library", "exact", "other")
+ENGINE = "engine"  # the family of maps that physics engines ship
+FAMILIES = (
+    "discrete-lagrangian", "splitting", "runge-kutta", "lie-group", "taylor", "library", "exact", ENGINE, "other",
+)  # fmt: skip
 IMPLEMENTATIONS = ("compiled", "python")
 CONTROLS = ("step_size", "tolerance", None)
 ENERGY_ERRORS = ("kept", "bounded", None)
@@ -96,6 +106,7 @@ class Integrator:
     energy_error: str | None = None  # "kept" or "bounded"; None says what follows from the other claims
     modified_energy: ModifiedEnergy | None = None  # what it conserves to O(h^4) less the energy, in closed form
     sleeps_from: Callable[[float], float] | None = None  # spin of the sleeping top (I1 = I3 = mgl = 1) at a step h
+    exact_steps: bool = False  # a step of any size is the motion itself but for rounding: there is no order
     same_steps_as: str | None = None  # a compiled integrator that takes the same steps
     speed: float = 1.0  # of a step, in units of others of its implementation: 0.002 for arithmetic in software
     about: str = field(default="", repr=False, compare=False, metadata={"words": True})  # a paragraph: what it is, when
@@ -118,6 +129,8 @@ class Integrator:
             raise SymtopError(f"solvers must map one of angles, axis, attitude to a function, not {self.solvers!r}")
         object.__setattr__(self, "solvers", MappingProxyType(dict(self.solvers)))
         positive("speed", self.speed)
+        if self.exact_steps and (self.order is not None or not self.fixed_step):
+            raise SymtopError("exact_steps must be False for a method that has an order or no step_size")
         if self.conserves is not None:
             if isinstance(self.conserves, str) or not isinstance(self.conserves, Collection):
                 raise SymtopError(f"conserves must be a set of names, not {self.conserves!r}")
@@ -128,7 +141,7 @@ class Integrator:
         """The tolerance to use, refused where the arithmetic cannot reach it."""
         value = self.default_tolerance if tolerance is None else positive("tolerance", tolerance)
         if value is None:
-            raise SymtopError(f"{self.name} is adaptive and needs a tolerance")
+            raise SymtopError(f"{self.name} is adaptive and needs a tolerance, for example 1e-6")
         if value < self.least_tolerance or value >= 1.0:
             raise SymtopError(
                 f"tolerance of {self.name} must be at least {self.least_tolerance:.3g} and below 1, not {value!r}"
@@ -161,7 +174,7 @@ class Integrator:
         for chart in SMALLEST_FIRST[observe]:
             if chart in self.solvers and (among is None or chart in among):
                 return chart
-        raise SymtopError(f"{self.name} works in {', '.join(self.solvers)} and cannot show the {observe}")
+        raise SymtopError(f"{self.name} works in {', '.join(self.solvers)} and cannot show the {observe}: observe axis")
 
     @property
     def method(self) -> str:
@@ -188,29 +201,17 @@ class Integrator:
         }
 
 
-def solve(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-    """Run a method in one of its charts. A run that blows up is data: NumPy says nothing of overflow or NaN."""
-    with np.errstate(all="ignore"):
-        return method.solvers[chart](top, start, plan)
-
-
 _BUILT_IN = (
-    "discrete_lagrangian",
-    "unreduced",
-    "galerkin",
-    "splitting",
-    "runge_kutta",
-    "dormand_prince",
-    "gauss",
-    "scipy_ivp",
-    "taylor",
-    "exact",
-)
+    "discrete_lagrangian", "unreduced", "galerkin", "exact_discrete", "lie_variational", "splitting", "runge_kutta",
+    "dormand_prince", "gauss", "kahan", "lie_runge_kutta", "energy_momentum", "generalised_alpha", "collective_gauss",
+    "scipy_ivp", "taylor", "series", "exact", "engines",
+)  # fmt: skip
 ENTRY_POINTS = "symtop.integrators"  # an Integrator, or a function that returns several
 
 _registry: dict[str, Integrator] = {}
 _loaded: list[str] = []
 _announced: list[str] = []
+_missing: dict[str, str] = {}  # names that cannot be had on this machine, with the reason
 _shipped: set[str] = set()  # by symtop or an installed package: every process has them
 _loading = threading.RLock()  # the first call of one thread loads; a package that is being loaded may register
 
@@ -224,6 +225,8 @@ def _load() -> None:
                 told = replace(entry, about=entry.about or paragraphs().get(entry.name, ""))
                 _registry.setdefault(entry.name, told)
                 _shipped.add(entry.name)
+            if hasattr(module, "missing"):
+                _missing.update(module.missing())
         if not _announced:
             _announced.append(ENTRY_POINTS)
             _load_packages()
@@ -236,8 +239,10 @@ def _load_packages() -> None:
             announced = point.load()
             for entry in [announced] if isinstance(announced, Integrator) else announced():
                 _shipped.add(register(entry).name)
-        except Exception as error:  # noqa: BLE001  (a stranger's package must not take the registry down)
-            sentence = f"the integrators of {point.value} are left out: {type(error).__name__}: {error}"
+        except BaseException as error:  # (a stranger's package must not take the registry down)
+            if is_of_user(error):
+                raise
+            sentence = f"the integrators of {point.value} are left out: {words_of(error)}"
             warnings.warn(sentence, SymtopWarning, stacklevel=4)
 
 
@@ -261,7 +266,13 @@ def is_built_in(name: str) -> bool:
 
 
 class _Integrators(dict[str, Integrator]):
-    """The registry as a dict; a notebook shows it as a table."""
+    """The registry as a dict; a notebook shows it as a table. A row is found under its name, too, but not listed."""
+
+    def __missing__(self, name: str) -> Integrator:
+        method, chart = _method_and_chart(name, self)
+        if not chart or method not in self:
+            raise KeyError(name)
+        return self[method].row(chart)
 
     def _repr_html_(self) -> str:
         import pandas as pd  # 0.2 s
@@ -269,6 +280,15 @@ class _Integrators(dict[str, Integrator]):
         with pd.option_context("display.max_colwidth", None):
             html: str = pd.DataFrame([entry.record() for entry in self.values()]).to_html(index=False)
         return html
+
+
+def _method_and_chart(name: str, registered: Collection[str]) -> tuple[str, str]:
+    """`split_name`, and the same of ``series-axis``, which stands for ``series[axis]`` where a shell reads brackets."""
+    method, chart = split_name(name)
+    head, _, tail = name.rpartition("-") if isinstance(name, str) else ("", "", "")
+    if head in registered and not chart and name not in registered and tail in DIMENSIONS:
+        return head, tail
+    return method, chart
 
 
 @by_name
@@ -279,26 +299,42 @@ def integrators() -> dict[str, Integrator]:
 
 
 @by_name
+def methods() -> dict[str, Integrator]:
+    """The integrators that comparisons and recommendations choose from: all but the maps of physics engines."""
+    return {name: entry for name, entry in integrators().items() if entry.family != ENGINE}
+
+
+@by_name
+def engines() -> dict[str, Integrator]:
+    """The maps of physics engines."""
+    return {name: entry for name, entry in integrators().items() if entry.family == ENGINE}
+
+
+@by_name
 def integrator(name: "str | Integrator") -> Integrator:
-    """The integrator of that name, or the row: ``rk4[axis]`` works in no other chart. An Integrator is returned as is.
+    """The integrator of that name, or the row: ``rk4[axis]`` works in no other chart, nor does ``rk4-axis``, the same.
+
+    An Integrator is returned as is.
 
     Raises SymtopError for an unknown name, with the nearest ones, and for a chart that the method does not have.
     """
     if isinstance(name, Integrator):
         return name
     _load()
-    method, chart = split_name(name)
+    method, chart = _method_and_chart(name, _registry)
+    if isinstance(method, str) and method in _missing:
+        raise SymtopError(_missing[method])
     entry = _registry[one_of("integrator", method, _registry)]
     return entry.row(chart) if chart else entry
 
 
 @by_name
 def rows(observe: str | None = None) -> list[Integrator]:
-    """Every method in each of its charts, or in those that show the "nutation", the "axis" or the "attitude"."""
+    """Each of `methods` in each of its charts, or in those that show the "nutation", the "axis" or the "attitude"."""
     showing = None if observe is None else SMALLEST_FIRST[one_of("observe", observe, SMALLEST_FIRST)]
     return [
         entry.row(chart)
-        for entry in integrators().values()
+        for entry in methods().values()
         for chart in entry.charts()
         if showing is None or chart in showing
     ]

@@ -83,8 +83,8 @@ def compiled_field(chart: str) -> Any:
 PARAMETERS: dict[str, type] = {"angles": BareTop, "axis": SpaceTop, "attitude": SpaceTop}
 
 
-def solver(method: str, chart: str, *, compiled: bool = False) -> Solver:
-    """A solver of the registry around one method of ``scipy.integrate``; `compiled` is the right-hand side.
+def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solver:
+    """A solver of the registry around a method of ``scipy.integrate`` or a class like it; `compiled`: the field.
 
     This is the loop of ``solve_ivp`` with ``t_eval``, to the same bits, kept open so that a run that fails
     returns what it had and a run that would never end is stopped.
@@ -102,7 +102,7 @@ def solver(method: str, chart: str, *, compiled: bool = False) -> Solver:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             # LSODA's failures, which are in its status as well. Nothing else is silenced: filters belong to all threads
             warnings.filterwarnings("ignore", "lsoda: ", UserWarning)
-            make: Callable[..., Any] = getattr(integrate, method)
+            make: Callable[..., Any] = getattr(integrate, method) if isinstance(method, str) else method
             stepper = make(rhs, 0.0, y0, plan.horizon, rtol=plan.tolerance, atol=plan.tolerance)
             while stepper.status == "running" and outcome == OK:
                 try:

@@ -161,6 +161,15 @@ def axis_of(w: float, x: float, y: float, z: float) -> Any:
     return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z
 
 
+@register_jitable
+def with_spin(par: Any, state: Any, t: float) -> Any:
+    """An attitude state (q, L) that was stepped without the body's own spin, with the spin of a time t."""
+    w, x, y, z, Lx, Ly, Lz = state
+    half = 0.5 * par.twist * t
+    c, s = np.cos(half), np.sin(half)
+    return w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s, Lx, Ly, Lz
+
+
 def observe_attitude(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     """p_phi = L_z and p_psi = L.e(q) after the step."""
     axis = axis_of(before[0] + dstate[0], before[1] + dstate[1], before[2] + dstate[2], before[3] + dstate[3])

@@ -23,9 +23,9 @@ from symtop.methods.fixed_step import FixedStep, Prepare
 from symtop.methods.loop import Loop
 from symtop.methods.preparation import Scaled
 from symtop.methods.registry import Integrator, ModifiedEnergy
+from symtop.methods.rotor import ROTATIONS, TUNED
 from symtop.methods.space import on_attitude, on_axis
-from symtop.methods.splitting_loop import Composition, closed
-from symtop.methods.splitting_space import ROTATIONS
+from symtop.methods.splitting_loop import Composition, closed, packed
 
 _KERNELS: dict[str, dict[str, tuple[Loop, Prepare]]] = {
     "angles": {"angles": (splitting_angles.march, reduced)},
@@ -67,10 +67,10 @@ def composition(
         )
     table = rule._replace(turn=ROTATIONS.index(rotation), processor=boost)
     if chart == "angles":
-        stages = Scaled(table, splitting_angles.scale)
+        stages = Scaled(table, splitting_angles.scale, pack=packed)
     else:
-        fit = splitting_space.tuned if table.turn == splitting_space.TUNED else None
-        stages = Scaled(table, splitting_space.scale, fit)
+        fit = splitting_space.tuned if table.turn == TUNED else None
+        stages = Scaled(table, splitting_space.scale, fit, packed)
     one_drift = bare and rule.drift == (1.0,)
     closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if one_drift and rule.kick == (0.5, 0.5) else None
     modified, sleeps = closed_forms or (None, None)

@@ -16,21 +16,23 @@ from typing import Any
 import numpy as np
 
 from symtop.base.compiled import register_jitable
-from symtop.methods.angles import chart_outcome
+from symtop.base.sines import sincos
+from symtop.methods.angles import ReducedTop, chart_outcome
+from symtop.methods.lanes import Lanes
 from symtop.methods.loop import driver
 from symtop.methods.registry import Array
-from symtop.methods.splitting_loop import compose, stages
-from symtop.model import top as model
+from symtop.methods.splitting_lanes import composed
+from symtop.methods.splitting_loop import Composition, compose, stages
+from symtop.model.effective import half_angle_force
 from symtop.model.top import Momenta
 from symtop.model.view import View
-
-effective_force = register_jitable(model.effective_force)
 
 
 @register_jitable
 def force_angles(par: Any, state: Any, step: Any) -> Any:
     """V', phi' and phi' cos(theta) at the present theta."""
-    slope, precession, cosine = effective_force(state[0] + step[0], par.north, par.south, par.I1, par.mgl)
+    sin_x, cos_x = sincos(0.5 * (state[0] + step[0]))
+    slope, precession, cosine = half_angle_force(sin_x, cos_x, par.north, par.south, par.I1, par.mgl)
     return slope, precession, precession * cosine
 
 
@@ -47,7 +49,7 @@ def drift_angles(rule: Any, state: Any, step: Any, tau: float) -> Any:
     return (step[0] + tau * (state[1] + step[1]), step[1], step[2], step[3])
 
 
-def scale(rule: Any, top: Any, h: float) -> Any:
+def scale(rule: Any, top: Any, at: Any, h: float) -> Any:
     """Kicks in time, drifts in time over I1."""
     return stages(rule, h / top.I1, h, 0.0, 0.0)
 
@@ -74,7 +76,7 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     n = len(rule.drift)
     for i in range(n + 1):
         theta = before[0] + step[0]
-        sin_x, cos_x = np.sin(0.5 * theta), np.cos(0.5 * theta)
+        sin_x, cos_x = sincos(0.5 * theta)
         a += rule.kick[i] / (4.0 * par.I1 * sin_x * sin_x)
         d += rule.kick[i] / (4.0 * par.I1 * cos_x * cos_x)
         if i < n:
@@ -88,7 +90,27 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     return 0.5 * (north + south), 0.5 * (south - north)
 
 
-march = driver(begin, increment, observe)
+@register_jitable
+def _drift_in_lanes(state: Any, step: Any, tau: float) -> Any:
+    """Free flight, which has no branch."""
+    return drift_angles(None, state, step, tau), True
+
+
+@register_jitable
+def _ended(state: Any, step: Any) -> int:
+    """Is theta still a point of the chart?"""
+    outcome: int = chart_outcome(state[0] + step[0])
+    return outcome
+
+
+_LANES = composed(force_angles, kick_angles, _drift_in_lanes, _ended, top=ReducedTop, dimension=4, carry=3)
+
+
+def _in_lanes(rule: Composition) -> Lanes:
+    return _LANES
+
+
+march = driver(begin, increment, observe, lanes=_in_lanes)
 
 
 def verlet_energy(seen: View, momenta: Momenta, h: float) -> Array:

@@ -12,10 +12,13 @@ The kernels see no h: `stages` multiplies the tables out before a run, each row 
 stands for. A sum that is wrong by one rounding is a clock that runs fast by 1e-16 in every step.
 """
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from symtop.base.compiled import register_jitable, set_item
+import numpy as np
+
+from symtop.base.compiled import register_jitable, set_item, to_fixed_tuple
 from symtop.methods.coefficients import exact_sum
 
 
@@ -29,6 +32,35 @@ class Composition(NamedTuple):
     turn: int = 0  # which rotation a drift is
     processor: float = 0.0
     stretch: float = 1.0  # of a drift whose angle is tuned
+
+
+MANY = 16  # numbers of a composition from which on they travel in an array
+
+
+@functools.cache
+def _opened(n: int) -> Callable[[Any], Composition]:
+    """From the numbers of a composition with n drifts, in a row, to the composition, in compiled code."""
+    m, end = n + 1, 3 * n + 2
+
+    @register_jitable
+    def opened(row: Any) -> Composition:
+        drift, kick = to_fixed_tuple(row[:n], n), to_fixed_tuple(row[n : n + m], m)
+        gradient = to_fixed_tuple(row[n + m : end], m)
+        return Composition(drift, kick, gradient, int(row[end]), int(row[end + 1]), row[end + 2], row[end + 3])
+
+    making: Callable[[Any], Composition] = opened
+    return making
+
+
+def packed(rule: tuple[Any, ...]) -> tuple[Callable[..., Composition], tuple[Any, ...]]:
+    """What compiled code makes a composition from, of its fields: a function and its arguments.
+
+    numba looks at every number of a tuple, 20 ns each, and at an array as a whole.
+    """
+    drift, kick, gradient = rule[:3]
+    if 3 * len(drift) + 2 < MANY:
+        return Composition, tuple(rule)
+    return _opened(len(drift)), (np.array([*drift, *kick, *gradient, *rule[3:]], dtype=float),)
 
 
 class Stages(NamedTuple):

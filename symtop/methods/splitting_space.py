@@ -37,36 +37,33 @@ Sources: Touma, Wisdom, Astron. J. 107 (1994) 1189 (splitting); Bobenko, Suris, 
 
 import functools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from symtop.base.compiled import register_jitable
 from symtop.base.numbers import sign_changes
+from symtop.methods.lanes import Lanes
 from symtop.methods.loop import driver
 from symtop.methods.registry import Array
-from symtop.methods.space import axis_of, finite_outcome, observe_attitude, observe_axis
+from symtop.methods.rotor import EXACT, half_square, rotor, without_branch
+from symtop.methods.space import SpaceTop, axis_of, finite_outcome, observe_attitude, observe_axis, with_spin
+from symtop.methods.splitting_lanes import composed
 from symtop.methods.splitting_loop import Composition, compose, stages
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View, space_energy
 
-# sin(x)/x and (1 - cos(x))/x^2 in powers of -x^2; nine terms leave 1e-17 for |x| < 1
-SINE = tuple(1.0 / math.factorial(2 * k + 1) for k in range(9))
-COSINE = tuple(1.0 / math.factorial(2 * k + 2) for k in range(9))
 
-EXACT, CAYLEY, TUNED = range(3)
-ROTATIONS = ("exact", "cayley", "cayley-tuned")
-
-
-def scale(rule: Any, top: Any, h: float) -> Any:
+def scale(rule: Any, top: Any, at: Any, h: float) -> Any:
     """Drifts in half angles over |L|, kicks in angular momentum."""
     half, kick = 0.5 * h / top.I1 * rule.stretch, h * top.mgl
     return stages(rule, half, kick, 2.0 * h * kick * kick / top.I1, rule.processor * h * kick / top.I1)
 
 
-def tuned(rule: Composition, top: SymmetricTop, start: Angles, h: float) -> Composition:
-    """The rule of a Cayley drift that turns by the right mean angle."""
-    return rule._replace(stretch=tangent_scale(top, start, h))
+def tuned(rule: Composition, top: SymmetricTop, start: Angles, h: float) -> tuple[Any, ...]:
+    """The fields of the rule of a Cayley drift that turns by the right mean angle."""
+    return (*rule[:-1], tangent_scale(top, start, h))
 
 
 def tangent_scale(top: SymmetricTop, start: Angles, h: float) -> float:
@@ -93,30 +90,6 @@ def cayley_energy(top: SymmetricTop, h: float, tau: float, axis: Array, momentum
 
 
 @register_jitable
-def series(x: float, c: Any) -> Any:
-    """c_0 - c_1 x + c_2 x^2 - ..., nine terms by pairs: half the latency of Horner's rule."""
-    y = x * x
-    z = y * y
-    low = (c[0] - c[1] * x) + y * (c[2] - c[3] * x)
-    high = (c[4] - c[5] * x) + y * (c[6] - c[7] * x)
-    return low + z * (high + z * c[8])
-
-
-@register_jitable
-def rotor(rule: Any, Lx: float, Ly: float, Lz: float, half: float) -> Any:
-    """s and m: the rotation about L by the angle 2 half |L| has the quaternion (1 + m, s L)."""
-    square = half * half * (Lx * Lx + Ly * Ly + Lz * Lz)
-    if rule.turn != EXACT:
-        root = np.sqrt(1.0 + square)
-        return half / root, -square / (root * (1.0 + root))
-    if square < 1.0:  # no root, no division, no pole at L = 0, and 1.6 times the speed of sine and cosine
-        return half * series(square, SINE), -square * series(square, COSINE)
-    x = np.sqrt(square)
-    sin, cos = np.sin(0.5 * x), np.cos(0.5 * x)
-    return half * (2.0 * sin * cos / x), -2.0 * sin * sin
-
-
-@register_jitable
 def kick_space(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:
     """Flow of gravity: L_x and L_y, the last components but one."""
     x, y, z = force
@@ -131,11 +104,10 @@ def force_axis(par: Any, state: Any, step: Any) -> Any:
 
 
 @register_jitable
-def drift_axis(rule: Any, state: Any, step: Any, half: float) -> Any:
-    """Free rotation."""
+def turn_axis(state: Any, step: Any, s: float, m: float) -> Any:
+    """Rotation about L by the angle of s and m."""
     x, y, z = state[0] + step[0], state[1] + step[1], state[2] + step[2]
     Lx, Ly, Lz = state[3] + step[3], state[4] + step[4], state[5] + step[5]
-    s, m = rotor(rule, Lx, Ly, Lz, half)
     w = 1.0 + m
     cx, cy, cz = Ly * z - Lz * y, Lz * x - Lx * z, Lx * y - Ly * x
     twice = 2.0 * s
@@ -148,6 +120,20 @@ def drift_axis(rule: Any, state: Any, step: Any, half: float) -> Any:
     )  # fmt: skip
 
 
+@register_jitable
+def drift_axis(rule: Any, state: Any, step: Any, half: float) -> Any:
+    """Free rotation."""
+    s, m = rotor(rule, half_square(state, step, half), half)
+    return turn_axis(state, step, s, m)
+
+
+@register_jitable
+def ended_axis(state: Any, step: Any) -> int:
+    """Is the step finite?"""
+    outcome: int = finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4])
+    return outcome
+
+
 def begin_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
     """The axis at the start."""
     return force_axis(par, state, (0.0, 0.0, 0.0))
@@ -156,7 +142,7 @@ def begin_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
 def increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (e, L); the work counted is the number of kicks with a new axis."""
     step, axis = compose(force_axis, kick_space, drift_axis, par, rule, state, carry)
-    return step, axis, rule.forces, finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4])
+    return step, axis, rule.forces, ended_axis(state, step)
 
 
 @register_jitable
@@ -184,11 +170,10 @@ def force_attitude(par: Any, state: Any, step: Any) -> Any:
 
 
 @register_jitable
-def drift_attitude(rule: Any, state: Any, step: Any, half: float) -> Any:
-    """Free rotation, without the spin about the body's axis."""
+def turn_attitude(state: Any, step: Any, s: float, m: float) -> Any:
+    """Rotation about L by the angle of s and m, without the spin about the body's axis."""
     w, x, y, z = state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3]
     Lx, Ly, Lz = state[4] + step[4], state[5] + step[5], state[6] + step[6]
-    s, m = rotor(rule, Lx, Ly, Lz, half)
     m += 0.5 * (1.0 + m) * (1.0 - (w * w + x * x + y * y + z * z))
     return (
         step[0] + (m * w - s * (Lx * x + Ly * y + Lz * z)),
@@ -199,6 +184,20 @@ def drift_attitude(rule: Any, state: Any, step: Any, half: float) -> Any:
     )  # fmt: skip
 
 
+@register_jitable
+def drift_attitude(rule: Any, state: Any, step: Any, half: float) -> Any:
+    """Free rotation, without the spin about the body's axis."""
+    s, m = rotor(rule, half_square(state, step, half), half)
+    return turn_attitude(state, step, s, m)
+
+
+@register_jitable
+def ended_attitude(state: Any, step: Any) -> int:
+    """Is the step finite?"""
+    outcome: int = finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5])
+    return outcome
+
+
 def begin_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:
     """The axis at the start."""
     return force_attitude(par, state, (0.0, 0.0, 0.0, 0.0))
@@ -207,7 +206,7 @@ def begin_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:
 def increment_attitude(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (q, L); the work counted is the number of kicks with a new axis."""
     step, axis = compose(force_attitude, kick_space, drift_attitude, par, rule, state, carry)
-    return step, axis, rule.forces, finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5])
+    return step, axis, rule.forces, ended_attitude(state, step)
 
 
 @register_jitable
@@ -230,14 +229,26 @@ def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """The spin since the start, and back from the variables of a processed method."""
     if rule.boost != 0.0:
         state = process_attitude(-rule.boost, *state)
-    w, x, y, z, Lx, Ly, Lz = state
-    half = 0.5 * par.twist * (k * h)
-    c, s = np.cos(half), np.sin(half)
-    return w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s, Lx, Ly, Lz
+    return with_spin(par, state, k * h)
 
 
-march_axis = driver(begin_axis, increment_axis, observe_axis, enter_axis, present_axis)
-march_attitude = driver(begin_attitude, increment_attitude, observe_attitude, enter_attitude, present_attitude)
+def _in_lanes(force: Any, turned: Any, ended: Any, dimension: int) -> Callable[[Composition], Lanes]:
+    """What runs a rule in lanes: one kernel for each rotation."""
+    exact, cayley = (
+        composed(force, kick_space, drift, ended, top=SpaceTop, dimension=dimension, carry=3, still=1)
+        for drift in without_branch(turned)
+    )
+    return lambda rule: exact if rule.turn == EXACT else cayley
+
+
+march_axis = driver(
+    begin_axis, increment_axis, observe_axis, enter_axis, present_axis,
+    lanes=_in_lanes(force_axis, turn_axis, ended_axis, 6),
+)  # fmt: skip
+march_attitude = driver(
+    begin_attitude, increment_attitude, observe_attitude, enter_attitude, present_attitude,
+    lanes=_in_lanes(force_attitude, turn_attitude, ended_attitude, 7),
+)  # fmt: skip
 
 
 def strang_energy(seen: View, momenta: Momenta, h: float) -> Array:

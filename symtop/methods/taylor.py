@@ -17,13 +17,13 @@ Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, 
 """
 
 import functools
+import importlib.util
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.base.multiprecision import context
-from symtop.base.validate import SymtopError
 from symtop.methods.plan import Plan, Run
 from symtop.methods.registry import Array, Integrator, Solver
 from symtop.model import charts
@@ -203,7 +203,7 @@ def built_in() -> list[Integrator]:
     try:
         import heyoka as hy
     except ImportError:
-        return [_absent()]
+        return []
     wide = ["longdouble"] if np.finfo(np.longdouble).eps < EPSILON else []
     quad = ["quad"] if hasattr(hy, "real128") else []
     return [
@@ -212,11 +212,13 @@ def built_in() -> list[Integrator]:
     ]
 
 
-def _absent() -> Integrator:
-    def refuse(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        raise SymtopError("taylor needs the package heyoka, which has wheels for Linux only (elsewhere: conda-forge)")
-
-    return _entry("double", {"attitude": refuse})
+def missing() -> dict[str, str]:
+    """Names that cannot be registered here, each with the reason."""
+    if importlib.util.find_spec("heyoka") is not None:
+        return {}
+    reason = "needs the package heyoka, which has wheels for Linux only (elsewhere: conda-forge)"
+    names = ["taylor", *(f"taylor-{precision}" for precision in _SUMMARIES if precision != "double")]
+    return {name: f"{name} {reason}" for name in names}
 
 
 def _entry(precision: str, solvers: dict[str, Solver]) -> Integrator:

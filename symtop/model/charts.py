@@ -118,22 +118,22 @@ def angles_from_quaternion(quaternion: Array) -> tuple[Array, Array, Array]:
 
 
 def unwrapped(angle: Array, guide: Array) -> Array:
-    """A continuous angle from samples of it modulo 2 pi; both shape (n,).
+    """Continuous angles from samples of them modulo 2 pi; both have the shape (..., n), a run along the last dimension.
 
     Between neighbouring samples the angle may turn many times: `guide`, the true motion, says how often, so that only
     the *error* has to change by less than half a turn from sample to sample. It may grow to any size over the run.
     """
     lag = angle - guide
-    step = lag[1:] - lag[:-1]
-    jumps = np.flatnonzero(~(np.abs(step) < np.pi))  # NaN is one, too
-    if jumps.size:  # the arithmetic of `np.unwrap`, for the few steps that jump: half the time
+    step = lag[..., 1:] - lag[..., :-1]
+    jumps = np.nonzero(~(np.abs(step) < np.pi))  # NaN is one, too
+    if jumps[0].size:  # the arithmetic of `np.unwrap`, for the few steps that jump: half the time
         jump = step[jumps]
         rest = np.mod(jump + np.pi, 2.0 * np.pi) - np.pi
         rest[(rest == -np.pi) & (jump > 0.0)] = np.pi
-        step[:] = 0.0
+        step[...] = 0.0
         step[jumps] = rest - jump
-        lag[1:] += step.cumsum()
-    whole: Array = guide + (lag - 2.0 * np.pi * np.rint(lag[0] / (2.0 * np.pi)))
+        lag[..., 1:] += step.cumsum(axis=-1)
+    whole: Array = guide + (lag - 2.0 * np.pi * np.rint(lag[..., :1] / (2.0 * np.pi)))
     return whole
 
 

@@ -31,14 +31,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symtop.base.lazy import LazyKernel
+from symtop.base.numbers import real_numbers
 from symtop.base.validate import SymtopError
-from symtop.model import motion_layout as at
+from symtop.model import charts, motion_layout as at
 from symtop.model.charts import Array
-from symtop.model.motion_constants import motion_constants
-from symtop.model.motion_samples import AXIS, LONGEST_TIME, MOMENTUM, MOTION, QUATERNION, STATE, WIDTHS, samples
+from symtop.model.motion_constants import all_constants
+from symtop.model.motion_samples import (
+    AXIS,
+    LONGEST_TIME,
+    MOMENTUM,
+    MOTION,
+    QUATERNION,
+    ROWS,
+    RUN,
+    STATE,
+    TURNS,
+    WIDTHS,
+    all_gaps,
+    all_samples,
+)
 from symtop.model.moving_axis import DONE, OUT_OF_RANGE, UNMET, UNRESOLVED
 from symtop.model.precise_form import Motion
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, SymmetricTop, flat
 
 ARITHMETIC = {
     at.EXACTLY: "double",
@@ -55,8 +69,9 @@ REASONS = {
 DIGITS_ERROR = 1e-40  # relative, of constants from 40 digits
 
 # seconds: interpreted, a form 5e-4 and a sample 1e-5; compiling 10 s and 2 s of processor time, loading 0.3 s
-_build = LazyKernel(motion_constants, "(" + 9 * "float64," + "float64[::1])", patience=10.0)
-_fill = LazyKernel(samples, "(float64[::1], float64[::1], int64, float64[:, ::1])", patience=2.0)
+_build = LazyKernel(all_constants, "(float64[:, ::1], float64[:, ::1])", patience=10.0)
+_fill = LazyKernel(all_samples, "(float64[:, ::1], float64[:, ::1], int64, float64[:, :, ::1])", patience=2.0)
+_compare = LazyKernel(all_gaps, "(float64[:, ::1], float64[:, ::1], float64[:, :, :], float64[:, ::1])", patience=2.0)
 FORM_SECONDS, SAMPLE_SECONDS = 5e-4, 1e-5
 
 
@@ -89,14 +104,32 @@ class ClosedForm:
 
     def __init__(self, top: SymmetricTop, start: Angles) -> None:
         self.top, self.start = top, start
-        self._constants, self._status = _constants(top, start)
+        self._all, failed = short_constants(np.array((flat(top, start),)))
+        self._constants = self._all[0]
+        if failed:
+            take_digits(self._constants, top, start)
 
     @property
     def provenance(self) -> Provenance:
         """The arithmetic that served for the constants, the bound that it left, and why it was not a shorter one."""
         kind = float(self._constants[at.ARITHMETIC])
         error = DIGITS_ERROR if kind == at.DIGITS else float(self._constants[at.RATE_ERROR])
-        return Provenance(ARITHMETIC[kind], error, REASONS[self._status])
+        return Provenance(ARITHMETIC[kind], error, REASONS[int(self._constants[at.STATUS])])
+
+    @property
+    def energy(self) -> float:
+        """Total energy, p_psi^2/2 I3 included."""
+        return float(self._constants[at.ENERGY])
+
+    @property
+    def p_phi(self) -> float:
+        """Momentum conjugate to phi."""
+        return float(self._constants[at.P_PHI])
+
+    @property
+    def p_psi(self) -> float:
+        """Momentum conjugate to psi."""
+        return float(self._constants[at.P_PSI])
 
     @property
     def nutation_period(self) -> float:
@@ -114,16 +147,25 @@ class ClosedForm:
         return float(self._constants[at.PSI_PER_PERIOD])
 
     @property
+    def precession_rate(self) -> float:
+        """Mean of phi' over a nutation, radians per unit time."""
+        return float(self._constants[at.PHI_LINE])
+
+    @property
     def theta_range(self) -> tuple[float, float]:
         """The turning points, radians."""
         return float(self._constants[at.THETA_LOW]), float(self._constants[at.THETA_HIGH])
 
     def __call__(self, times: ArrayLike) -> Motion[Array]:
         """Angles and rates at `times`; every field has their shape."""
-        flat, shape = _flat(times)
-        out = np.empty((WIDTHS[MOTION], flat.size))
-        self._fill(flat, MOTION, out)
-        return Motion(*out) if len(shape) == 1 else Motion(*(row.reshape(shape) for row in out))
+        flat_times, shape = _in_a_row(times)
+        motion = fill(self._all, flat_times, MOTION)[0]
+        return Motion(*motion) if len(shape) == 1 else Motion(*(row.reshape(shape) for row in motion))
+
+    def turns(self, times: Array) -> tuple[Array, Array]:
+        """phi and psi alone at a row of times, with the bits of a call, at two thirds of its cost."""
+        phi, psi = fill(self._all, _in_a_row(times)[0], TURNS)[0]
+        return phi, psi
 
     def quaternion(self, times: ArrayLike) -> Array:
         """Attitude (w, x, y, z), body to space, shape (..., 4); continuous in time, through poles as well."""
@@ -133,6 +175,11 @@ class ClosedForm:
         """Unit vector along the top's axis, shape (..., 3)."""
         return self._view(times, AXIS)
 
+    def axis_distance(self, times: Array, axes: Array) -> Array:
+        """Angles between axes (n, 3) and the top's at times (n,), rad, shape (n,)."""
+        apart: Array = distances(self._all, _in_a_row(times)[0], axes[None])[0]
+        return apart
+
     def momentum(self, times: ArrayLike) -> Array:
         """Angular momentum L in the space frame, shape (..., 3), in units of I1 times a rate."""
         return self._view(times, MOMENTUM)
@@ -141,49 +188,76 @@ class ClosedForm:
         """Quaternion and angular momentum, shape (..., 7): a state of the attitude chart."""
         return self._view(times, STATE)
 
-    def _view(self, times: ArrayLike, view: int) -> Array:
-        flat, shape = _flat(times)
-        out = np.empty((flat.size, WIDTHS[view]))
-        self._fill(flat, view, out)
-        return out.reshape(*shape, WIDTHS[view])
+    def run(self, times: Array) -> tuple[Array, Array, Array]:
+        """States (n, 7) at a row of times, with p_phi = L_z and p_psi = L.e read off them."""
+        seen = fill(self._all, _in_a_row(times)[0], RUN)[0]
+        return seen[:, :7], seen[:, 7], seen[:, 8]
 
-    def _fill(self, flat: Array, view: int, out: Array) -> None:
-        if _fill.ready(SAMPLE_SECONDS * flat.size):
-            bad = _fill.compiled(self._constants, flat, view, out)
-        else:
-            bad = samples(self._constants.tolist(), flat.tolist(), view, out)
-        if bad >= 0:
-            raise SymtopError(
-                f"times must be finite numbers of at most {LONGEST_TIME:g} in size, not {float(flat[bad])!r}"
-            )
+    def _view(self, times: ArrayLike, view: int) -> Array:
+        flat_times, shape = _in_a_row(times)
+        seen = fill(self._all, flat_times, view)
+        return seen[0] if len(shape) == 1 else seen.reshape(*shape, WIDTHS[view])
 
 
 def compile_now() -> None:
     """Load the compiled functions, or compile them: for whoever is about to time a closed form or to make many."""
-    _build.compile()
-    _fill.compile()
+    for kernel in (_build, _fill, _compare):
+        kernel.compile()
 
 
-def _constants(top: SymmetricTop, start: Angles) -> tuple[Array, int]:
-    """The array of constants, and what became of the short arithmetic."""
-    body, angles = (top.I1, top.I3, top.mgl), (start.theta, start.phi, start.psi)
-    rates = start.theta_dot, start.phi_dot, start.psi_dot
-    if _build.ready(FORM_SECONDS):
-        out = np.empty(at.SIZE)
-        status = _build.compiled(*body, *angles, *rates, out)
-    else:
-        plain = [0.0] * at.SIZE
-        status = motion_constants(*body, *angles, *rates, plain)
-        out = np.array(plain)
-    if status == DONE:
-        return out, status
+def short_constants(rows: Array) -> tuple[Array, int]:
+    """Constants of tops and starts (n, 9) in the short arithmetic, (n, SIZE), and how many it does not serve."""
+    if _build.ready(FORM_SECONDS * len(rows)):
+        out = np.empty((len(rows), at.SIZE))
+        return out, _build.compiled(rows, out)
+    plain = [[0.0] * at.SIZE for _ in rows]
+    failed = all_constants(rows.tolist(), plain)
+    return np.array(plain).reshape(len(rows), at.SIZE), failed
+
+
+def take_digits(constants: Array, top: SymmetricTop, start: Angles) -> None:
+    """Put the constants from 40 digits in the place of short ones that are not to be relied on."""
     from symtop.model.precise_constants import precise_constants
 
-    return precise_constants(top, start), status
+    status = constants[at.STATUS]
+    constants[:] = precise_constants(top, start)
+    constants[at.STATUS] = status
 
 
-def _flat(times: ArrayLike) -> tuple[Array, tuple[int, ...]]:
-    """Times in a row that compiled code takes, and their shape."""
-    array = np.asarray(times, dtype=np.float64)
-    flat = array.ravel()
-    return (flat if flat.flags.writeable else flat.copy()), array.shape
+def fill(constants: Array, times: Array, view: int) -> Array:
+    """One view of n tops at times (n, samples) or (1, samples): (n, samples, width), or (n, width, samples) of `ROWS`.
+
+    Raises `SymtopError` for a time that is not finite.
+    """
+    count, width = times.shape[1], WIDTHS[view]
+    out = np.empty((len(constants), width, count) if view in ROWS else (len(constants), count, width))
+    if _fill.ready(SAMPLE_SECONDS * len(constants) * count):
+        bad = _fill.compiled(constants, times, view, out)
+    else:
+        bad = all_samples(constants.tolist(), times.tolist(), view, out)
+    _within_range(times, bad)
+    return out
+
+
+def distances(constants: Array, times: Array, axes: Array) -> Array:
+    """Angles (n, samples) between axes (n, samples, 3) and those of n tops, rad; times as in `fill`."""
+    if not _compare.ready(SAMPLE_SECONDS * axes.size / 3):
+        return charts.axis_distance(axes, fill(constants, times, AXIS))
+    out = np.empty(axes.shape[:2])
+    _within_range(times, _compare.compiled(constants, times, axes, out))
+    return out
+
+
+def _within_range(times: Array, bad: int) -> None:
+    """Refuse the time at the place `bad`; -1 is none."""
+    if bad >= 0:
+        raise SymtopError(
+            f"times must be finite numbers of at most {LONGEST_TIME:g} in size, not {float(times.flat[bad])!r}"
+        )
+
+
+def _in_a_row(times: ArrayLike) -> tuple[Array, tuple[int, ...]]:
+    """Times in a row (1, n) that compiled code takes, and their shape."""
+    array = real_numbers("times", times)
+    row = array.reshape(1, -1)
+    return (row if row.flags.writeable else row.copy()), array.shape

@@ -66,6 +66,17 @@ def _per_period(rate: DoubleDouble, period: DoubleDouble) -> float:
 
 
 @shared
+def _conserved(data: Data, sums: Sums) -> tuple[float, float]:
+    """Energy and p_phi: I1 (theta'^2 + phi'^2 sin^2)/2 + p_psi^2/2 I3 + mgl cos theta, and I1 (b - a) + p_psi."""
+    moving = scaled(mul(sums.kinetic, (data.I1, 0.0)), 0.5)
+    spinning = div(scaled(mul(sums.p_psi, sums.p_psi), 0.5), (data.I3, 0.0))
+    lifted = mul(sub((1.0, 0.0), sums.up), (abs(data.mgl), 0.0))
+    leaning = mul(sums.twist_up, (data.I1, 0.0))
+    p_phi = add(leaning, sums.p_psi) if data.mgl >= 0.0 else sub(leaning, sums.p_psi)
+    return add(add(moving, spinning), lifted)[0], p_phi[0]
+
+
+@shared
 def _climb(data: Data, out: Any) -> None:
     """Constants of the separatrix: theta = 4 atan tanh(g t/2) from the lower pole, g = sqrt(abs(mgl)/I1)."""
     out[at.SCALE] = root(div((-data.mgl, 0.0), (data.I1, 0.0)))[0]
@@ -137,6 +148,7 @@ def _lines(data: Data, phi: float, psi: float, a: DoubleDouble, mean: Mean, out:
     put_turns(out, at.UP_TURNS, up_rate, up_start)
 
 
+@shared
 def motion_constants(
     I1: float,
     I3: float,
@@ -159,6 +171,7 @@ def motion_constants(
         out[place] = 0.0
     out[at.ARITHMETIC], out[at.UPRIGHT], out[at.I1] = arithmetic, 1.0 if mgl >= 0.0 else 0.0, I1
     out[at.P_PSI], out[at.W3] = sums.p_psi[0], div(sums.p_psi, (I3, 0.0))[0]
+    out[at.ENERGY], out[at.P_PHI] = _conserved(data, sums)
     status, mean = DONE, Mean((math.inf, 0.0), ZERO, ZERO, ZERO, ZERO)
     if exact.separatrix:
         out[at.KIND] = at.CLIMBS
@@ -175,3 +188,13 @@ def motion_constants(
     _lines(data, phi, psi, sums.a, mean, out)
     speed = math.sqrt(sums.lead[0]) + math.sqrt(sums.kinetic[0])
     return DONE if _meets(data, phi, psi, speed, out) else UNMET
+
+
+def all_constants(rows: Any, out: Any) -> int:
+    """The constants of n tops, of rows (n, 9) of their numbers, with statuses; how many are not to be relied on."""
+    failed = 0
+    for i in range(len(rows)):
+        one, c = rows[i], out[i]
+        c[at.STATUS] = motion_constants(one[0], one[1], one[2], one[3], one[4], one[5], one[6], one[7], one[8], c)
+        failed += 1 if c[at.STATUS] != DONE else 0
+    return failed

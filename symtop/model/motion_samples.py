@@ -18,8 +18,9 @@ from symtop.base.parts import inlined, shared, two_product
 from symtop.model import motion_layout as at
 from symtop.model.double_double import two_sum, whole_part
 
-MOTION, QUATERNION, AXIS, MOMENTUM, STATE = range(5)  # what `samples` fills in
-WIDTHS = (6, 4, 3, 3, 7)
+MOTION, QUATERNION, AXIS, MOMENTUM, STATE, TURNS, RUN = range(7)  # what `samples` fills in
+WIDTHS = (6, 4, 3, 3, 7, 2, 9)  # `RUN`: a state, and p_phi and p_psi read off it
+ROWS = (MOTION, TURNS)  # views of which each number is a row (width, n) and not a column
 LONGEST_TIME = 1e100
 TURN = 2.0 * math.pi
 
@@ -92,7 +93,7 @@ def _precession(c: Constants, down: float, up: float, lean: float, size: float) 
     return rate
 
 
-@shared
+@inlined
 def wave(c: Constants, t: float) -> Wave:
     """The bounded part of the motion, upright.
 
@@ -173,20 +174,31 @@ def halves(c: Constants, t: float) -> tuple[float, float, float, float, float, f
 
 
 @inlined
-def _motion(c: Constants, t: float) -> tuple[float, float, float, float, float, float]:
-    """Angles and rates."""
-    down, dx, dy, down_lag, up, ux, uy, up_lag, nod, rate = wave(c, t)
+def _turns(c: Constants, t: float, seen: Wave) -> tuple[float, float]:
+    """phi and psi, continuous but for the passage of a pole."""
+    down, dx, dy, down_lag, up, ux, uy, up_lag, _, _ = seen
     sum_lag, difference_lag = math.atan2(dy, dx) - down_lag, math.atan2(uy, ux) - up_lag
     upright = c[at.UPRIGHT] > 0.0
-    cosine, sine = (down, up) if upright else (up, down)
     high, low = line(c, at.PHI_LINE, t)
     phi = high + (low + (sum_lag + difference_lag))
     high, low = line(c, at.PSI_LINE, t)
     psi = high + (low + (sum_lag - difference_lag if upright else difference_lag - sum_lag))
-    theta_dot = nod if upright else -nod
-    if (cosine < 0.0) != (sine < 0.0):
-        theta_dot, phi = -theta_dot, phi + math.pi
-        psi = psi + math.pi if cosine < 0.0 else psi - math.pi
+    if (down < 0.0) != (up < 0.0):
+        phi, beneath = phi + math.pi, (down if upright else up) < 0.0
+        psi = psi + math.pi if beneath else psi - math.pi
+    return phi, psi
+
+
+@inlined
+def _motion(c: Constants, t: float) -> tuple[float, float, float, float, float, float]:
+    """Angles and rates."""
+    seen = wave(c, t)
+    phi, psi = _turns(c, t, seen)
+    upright = c[at.UPRIGHT] > 0.0
+    cosine, sine = (seen[0], seen[4]) if upright else (seen[4], seen[0])
+    theta_dot, rate = seen[8], seen[9]
+    if ((cosine < 0.0) != (sine < 0.0)) == upright:
+        theta_dot = -theta_dot
     theta = 2.0 * math.atan2(abs(sine), abs(cosine))
     return theta, phi, psi, theta_dot, rate, c[at.W3] - (cosine - sine) * (cosine + sine) * rate
 
@@ -195,16 +207,24 @@ def _motion(c: Constants, t: float) -> tuple[float, float, float, float, float, 
 def _axis(c: Constants, t: float) -> tuple[float, float, float]:
     """Unit vector along the axis."""
     down, dx, dy, down_lag, up, ux, uy, up_lag, _, _ = wave(c, t)
-    high, low = line(c, at.PHI_TURNS, t)
-    lag = (math.atan2(dy, dx) - down_lag) + (math.atan2(uy, ux) - up_lag)
-    phi = TURN * ((high - whole_part(high)) + low) + lag
+    x, y = _unit(c, at.PHI_TURNS, t, dx * ux - dy * uy, dx * uy + dy * ux, down_lag + up_lag)
     cosine, sine = (down, up) if c[at.UPRIGHT] > 0.0 else (up, down)
     across = 2.0 * cosine * sine
-    return across * math.sin(phi), -across * math.cos(phi), (cosine - sine) * (cosine + sine)
+    return across * y, -across * x, (cosine - sine) * (cosine + sine)
 
 
+@inlined
+def _along(state: Any) -> float:
+    """L.e of a state (q, L)."""
+    w, x, y, z = state[0], state[1], state[2], state[3]
+    right, back, up = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z
+    along: float = state[4] * right + state[5] * back + state[6] * up
+    return along
+
+
+@shared
 def samples(c: Constants, times: Sequence[float], view: int, out: Any) -> int:
-    """Fill in one view, shape (n, width), of the motion (6, n); the place of the first time beyond the range, or -1."""
+    """Fill in one view, (n, width), or (width, n) of `ROWS`; the place of the first time beyond the range, or -1."""
     for i in range(len(times)):
         if not abs(times[i]) <= LONGEST_TIME:
             return i
@@ -212,6 +232,8 @@ def samples(c: Constants, times: Sequence[float], view: int, out: Any) -> int:
         t = times[i]
         if view == MOTION:
             out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = _motion(c, t)
+        elif view == TURNS:
+            out[0, i], out[1, i] = _turns(c, t, wave(c, t))
         elif view == AXIS:
             out[i, 0], out[i, 1], out[i, 2] = _axis(c, t)
         else:
@@ -222,7 +244,38 @@ def samples(c: Constants, times: Sequence[float], view: int, out: Any) -> int:
                 x, y = ax * bx - ay * by, ax * by + ay * bx  # the line of nodes
                 across, along = 2.0 * cosine * sine, (cosine - sine) * (cosine + sine)
                 turning, spin, nutation = c[at.I1] * rate * across, c[at.P_PSI], c[at.I1] * nod
-                flat, first = spin * across - turning * along, 4 if view == STATE else 0
+                flat, first = spin * across - turning * along, 0 if view == MOMENTUM else 4
                 out[i, first], out[i, first + 1] = nutation * x + flat * y, nutation * y - flat * x
                 out[i, first + 2] = turning * across + spin * along
+            if view == RUN:
+                out[i, 7], out[i, 8] = out[i, 6], _along(out[i])
+    return -1
+
+
+def all_samples(constants: Any, times: Any, view: int, out: Any) -> int:
+    """The same for many tops, with one row of times for all of them or a row for each; the place counts all times."""
+    for i in range(len(constants)):
+        row = min(i, len(times) - 1)
+        bad = samples(constants[i], times[row], view, out[i])
+        if bad >= 0:
+            return row * len(times[row]) + bad
+    return -1
+
+
+def all_gaps(constants: Any, times: Any, axes: Any, out: Any) -> int:
+    """Angles between axes (n, samples, 3) and those of n tops, as `charts.axis_distance` takes them, in one pass.
+
+    Returns the place of the first time beyond the range, or -1, as `all_samples` does.
+    """
+    for i in range(len(constants)):
+        place = min(i, len(times) - 1)
+        c, row = constants[i], times[place]
+        for j in range(len(row)):
+            if not abs(row[j]) <= LONGEST_TIME:
+                return place * len(row) + j
+            x, y, z = _axis(c, row[j])
+            a, b, d = axes[i, j, 0], axes[i, j, 1], axes[i, j, 2]
+            u, v, w = a - x, b - y, d - z
+            left, back, lift = v * z - w * y, w * x - u * z, u * y - v * x
+            out[i, j] = math.atan2(math.sqrt(left * left + back * back + lift * lift), a * x + b * y + d * z)
     return -1

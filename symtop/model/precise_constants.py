@@ -24,12 +24,16 @@ _EVEN_COSINES = ((1, 0, 0, 0), (0, 1, 0, 0), (-1, 0, 2, 0), (0, -3, 0, 4))
 _EVEN_SINES = ((0, 0, 0, 0), (2, 0, 0, 0), (0, 4, 0, 0), (-2, 0, 8, 0))
 
 
-def precise_constants(top: SymmetricTop, start: Angles) -> Array:
-    """The array of constants; raises `SymtopError` if the axis comes within 1e-145 of a pole that it does not meet."""
-    form, out = PreciseForm(top, start, digits=DIGITS), np.zeros(at.SIZE)
+def precise_constants(top: SymmetricTop, start: Angles, form: PreciseForm | None = None) -> Array:
+    """The array of constants, from a form that there is or from one of `DIGITS` digits.
+
+    Raises `SymtopError` if the axis comes within 1e-145 of a pole that it does not meet.
+    """
+    form, out = form or PreciseForm(top, start, digits=DIGITS), np.zeros(at.SIZE)
     ctx, curve = form.ctx, form.curve
     out[at.ARITHMETIC], out[at.UPRIGHT], out[at.I1] = at.DIGITS, form.facing > 0, top.I1
     out[at.P_PSI], out[at.W3] = float(form.p_psi), float(form.p_psi / form.I3)
+    out[at.ENERGY], out[at.P_PHI] = float(form.energy), float(form.p_phi)
     out[at.PERIOD] = float(form.nutation_period)
     out[at.PHI_PER_PERIOD], out[at.PSI_PER_PERIOD] = float(form.phi_per_period), float(form.psi_per_period)
     out[at.THETA_LOW], out[at.THETA_HIGH] = float(form.theta_range[0]), float(form.theta_range[1])

@@ -20,7 +20,20 @@ if TYPE_CHECKING:
 OBSERVABLES = ("nutation", "axis", "attitude")
 UNITS = ("", "SI")
 STEADY = 1e4  # times its rounding: a nutation of less energy is a steady precession
+SHORTEST = 1e-100  # horizon
 NEXT_TO_POLE = 1e-9  # rad; V is not evaluated nearer to a pole, where it has a limit and 0/0
+
+
+def horizon_of(value: object) -> float:
+    """A horizon; SymtopError for one that is not positive, or so short that a step of it is lost in its last place.
+
+    No parameter or rate is beyond 1e40 (`symtop.model.top`), so that nothing moves in 1e-100. LSODA's own loop, which
+    nothing can interrupt, never ended below 1e-200.
+    """
+    horizon = positive("horizon", value)
+    if horizon < SHORTEST:
+        raise SymtopError(f"horizon must be at least {SHORTEST:g}, not {horizon!r}")
+    return horizon
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +58,7 @@ class Scene:
             raise SymtopError(f"top must be a SymmetricTop, not {self.top!r}")
         if not isinstance(self.start, Angles):
             raise SymtopError(f"start must be Angles, not {self.start!r}")
-        object.__setattr__(self, "horizon", positive("horizon", self.horizon))
+        object.__setattr__(self, "horizon", horizon_of(self.horizon))
         one_of("observes", self.observes, OBSERVABLES)
         one_of("units", self.units, UNITS)
 

@@ -24,15 +24,17 @@ is the partial-fraction split of ``(b - a u)/(1 - u^2)`` that Klein and Sommerfe
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-
+from symtop.base.parts import inlined, shared
 from symtop.base.validate import SymtopError, finite, positive
+from symtop.model import starts
+from symtop.model.effective import effective_force, effective_potential, effective_stiffness
 
 LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
+BISECTIONS = 60  # of an interval of cosines at most 2 wide: to the last place
 
 
 def bounded(name: str, value: object, least: float = 0.0) -> float:
@@ -69,12 +71,43 @@ class Angles:
         if not 0.0 <= self.theta <= math.pi:
             raise SymtopError(f"theta must lie in [0, pi], not {self.theta!r}")
 
+    @classmethod
+    def from_quaternion(
+        cls, quaternion: Sequence[float], *, omega_body: Sequence[float] | None = None,
+        omega_space: Sequence[float] | None = None,
+    ) -> "Angles":  # fmt: skip
+        """A start from a unit quaternion (w, x, y, z), body to space, the body's third axis along the top.
+
+        The angular velocity (3,), rad per unit time, is in the body frame or in the space frame; at rest without one.
+        """
+        if omega_body is not None and omega_space is not None:
+            raise SymtopError("give omega_body or omega_space, not both")
+        q, name = starts.unit("quaternion", quaternion, 4), "omega_body" if omega_space is None else "omega_space"
+        given = omega_body if omega_space is None else omega_space
+        omega = starts.vector(name, (0.0, 0.0, 0.0) if given is None else given, 3)
+        return cls(*starts.from_body_rates(q, omega if omega_space is None else starts.body_frame(q, omega)))
+
+    @classmethod
+    def from_axis(cls, top: "SymmetricTop", axis: Sequence[float], angular_momentum: Sequence[float]) -> "Angles":
+        """A start from the unit axis and the angular momentum about the fixed point, both (3,) in the space frame.
+
+        They leave the turn about the axis open: psi is zero, except at a pole.
+        """
+        e, L = starts.unit("axis", axis, 3), starts.vector("angular_momentum", angular_momentum, 3)
+        return cls(*starts.from_axis_and_momentum(e, L, top.I1, top.I3))
+
     @property
     def spin(self) -> float:
         """w3 = psi' + phi' cos theta, the angular velocity about the body's own axis."""
         return self.psi_dot + self.phi_dot * math.cos(self.theta)
 
 
+def flat(top: "SymmetricTop", at: Angles) -> tuple[float, ...]:
+    """A top and a start as nine plain numbers: I1, I3, mgl, theta, phi, psi, theta', phi', psi'."""
+    return top.I1, top.I3, top.mgl, at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot
+
+
+@inlined
 def conserved(top: Any, at: Any) -> Momenta:
     """The conserved momenta of a state; compiles as it stands.
 
@@ -87,40 +120,6 @@ def conserved(top: Any, at: Any) -> Momenta:
     swing = 4.0 * top.I1 * at.phi_dot * (tilt * tilt)  # I1 phi' sin^2 theta
     north, south = swing - 2.0 * p_psi * sin_x * sin_x, swing + 2.0 * p_psi * cos_x * cos_x
     return Momenta(swing + p_psi * math.cos(at.theta), p_psi, north, south)
-
-
-def effective_force(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
-    """Return ``V'(theta)``, ``phi'`` and ``cos theta``: all that one kick of the reduced top needs.
-
-    Works on floats and on arrays, and compiles as it stands. Costs one sine and one cosine.
-    """
-    sin_x = np.sin(0.5 * theta)
-    cos_x = np.cos(0.5 * theta)
-    up = north / (sin_x * sin_x)
-    down = south / (cos_x * cos_x)
-    tilt = sin_x * cos_x  # sin(theta)/2, and F = tilt (up + down)
-    slope = tilt * ((up + down) * (down - up) / (8.0 * I1) - 2.0 * mgl)
-    return slope, (up + down) / (4.0 * I1), cos_x * cos_x - sin_x * sin_x
-
-
-def effective_stiffness(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
-    """Return ``V''(theta)``; at a steady precession ``sqrt(V''/I1)`` is the nutation frequency."""
-    sin_x = np.sin(0.5 * theta)
-    cos_x = np.cos(0.5 * theta)
-    up = north / (sin_x * sin_x)
-    down = south / (cos_x * cos_x)
-    tilt = sin_x * cos_x
-    slope = 0.5 * (down - up)
-    bend = 0.5 * (down * sin_x / cos_x + up * cos_x / sin_x)
-    return (slope * slope + tilt * (up + down) * bend) / (4.0 * I1) - mgl * (cos_x * cos_x - sin_x * sin_x)
-
-
-def effective_potential(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
-    """Return ``V(theta)``, without the constant ``p_psi^2 / 2 I3``."""
-    sin_x = np.sin(0.5 * theta)
-    cos_x = np.cos(0.5 * theta)
-    lever = north * cos_x / sin_x + south * sin_x / cos_x
-    return lever * lever / (8.0 * I1) + mgl * (cos_x * cos_x - sin_x * sin_x)
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +166,21 @@ class SymmetricTop:
             return cls(across, along, mass * gravity * polar)
         arm = finite("pivot_distance", pivot_distance)
         return cls(across + mass * arm * arm, along, mass * gravity * arm)
+
+    @classmethod
+    def from_inertia(
+        cls, mass: float, at_centre: float, axial: float, distance: float, gravity: float = 9.81
+    ) -> "SymmetricTop":
+        """Any symmetric body, by what is measured: moments of inertia about its centre of gravity.
+
+        `at_centre` is across the axis, `axial` along it; the fixed point is on the axis at a `distance` below the
+        centre (negative: above, a hanging top). ``I1 = at_centre + mass distance^2`` (Huygens-Steiner).
+        """
+        mass, arm = positive("mass", mass), finite("distance", distance)
+        across, axial = positive("at_centre", at_centre), positive("axial", axial)
+        if axial > 2.0 * across:
+            raise SymtopError(f"axial must be at most 2 at_centre (no rigid body exceeds it), not {axial!r}")
+        return cls(across + mass * arm * arm, axial, mass * finite("gravity", gravity) * arm)
 
     def spheroid_radii(self, mass: float) -> tuple[float, float]:
         """Polar and equatorial radius of the solid spheroid that has this inertia about its centre.
@@ -240,57 +254,87 @@ class SymmetricTop:
         They are the roots in [-1, 1] of ``(1-u^2)(alpha - beta u) - (b - a u)^2`` to about 1e-14, or 1e-8 where
         the two coincide; `symtop.model.closed_form` has them to any precision.
         """
-        excess, beta, a, b = self._cubic(at)
-
-        def speed(u: float) -> float:
-            return (1.0 - u * u) * (excess + beta * (start - u)) - (b - a * u) ** 2
-
-        start = math.cos(at.theta)
-        return _bisect(speed, -1.0, start), _bisect(speed, 1.0, start)
+        return turning_cosines(self, at)
 
     def nutation_period(self, at: Angles) -> float:
         """Time of one nutation, ``2 pi / AGM(sqrt(beta (u3-u1)), sqrt(beta (u3-u2)))``; inf on a separatrix."""
-        low, high = self.turning_cosines(at)
-        frequency, _ = self._mean(at, low, high)
-        return 2.0 * math.pi / frequency if frequency > 0.0 else math.inf
+        return nutation_period(self, at)
 
     def mean_square_momentum(self, at: Angles) -> float:
         """The mean of ``|L|^2 = 2 I1 (E - mgl u) + p_psi^2 (1 - I1/I3)`` over a nutation, to 1e-14."""
-        low, high = self.turning_cosines(at)
-        excess, beta, a, _ = self._cubic(at)
-        _, gained = self._mean(at, low, high)
+        low, high = turning_cosines(self, at)
+        excess, beta, a, _ = nutation_cubic(self, at)
+        _, gained = mean_nutation(self, at, low, high)
         return self.I1**2 * (excess + beta * (math.cos(at.theta) - low) - gained + a * a)
 
-    def _mean(self, at: Angles, low: float, high: float) -> tuple[float, float]:
-        """The AGM of sqrt(beta (u3-u1)) and sqrt(beta (u3-u2)), and the mean of beta (u - u1), u the cosine.
 
-        The mean is ``sum 2^(n-1) c_n^2``, c_0^2 = x^2 - y^2 and c_(n+1) = (x - y)/2 along the AGM (DLMF 19.8.6).
-        """
-        excess, beta, a, _ = self._cubic(at)
-        # Vieta: beta (u1 + u2 + u3) = alpha + a^2, so that beta -> 0 (the free top) is not a special case
-        total = excess + beta * math.cos(at.theta) + a * a
-        x, y = total - beta * (2.0 * low + high), total - beta * (low + 2.0 * high)
-        x, y = math.sqrt(max(x, 0.0)), math.sqrt(max(y, 0.0))
-        gained, weight = 0.5 * beta * (high - low), 1.0
-        while abs(x - y) > 4e-16 * x and x > 0.0 and y > 0.0:
-            gained += weight * (0.5 * (x - y)) ** 2
-            weight *= 2.0
-            x, y = 0.5 * (x + y), math.sqrt(x * y)
-        return (y if x > 0.0 else 0.0), gained  # x = 0: a hanging top on its separatrix
-
-    def _cubic(self, at: Angles) -> tuple[float, float, float, float]:
-        """alpha - beta cos(theta), beta, a and b of Goldstein's nutation cubic."""
-        momenta = self.momenta(at)
-        excess = at.theta_dot**2 + (at.phi_dot * math.sin(at.theta)) ** 2
-        return excess, 2.0 * self.mgl / self.I1, momenta.p_psi / self.I1, momenta.p_phi / self.I1
+# the nutation of a state; all of it compiles as it stands
 
 
-def _bisect(function: Callable[[float], float], outside: float, inside: float) -> float:
-    """The sign change between `outside` (function <= 0) and `inside` (function >= 0)."""
-    for _ in range(60):
-        middle = 0.5 * (outside + inside)
-        if function(middle) < 0.0:
-            outside = middle
-        else:
-            inside = middle
-    return 0.5 * (outside + inside)
+@shared
+def nutation_cubic(top: Any, at: Any) -> tuple[float, float, float, float]:
+    """alpha - beta cos(theta), beta, a and b of Goldstein's nutation cubic."""
+    momenta, swing = conserved(top, at), at.phi_dot * math.sin(at.theta)
+    excess = at.theta_dot * at.theta_dot + swing * swing
+    return excess, 2.0 * top.mgl / top.I1, momenta.p_psi / top.I1, momenta.p_phi / top.I1
+
+
+@shared
+def turning_cosines(top: Any, at: Any) -> tuple[float, float]:
+    """`SymmetricTop.turning_cosines` of any records with these fields: bisections of both at a time."""
+    cubic, start = nutation_cubic(top, at), math.cos(at.theta)
+    low, high, below, above = -1.0, 1.0, start, start
+    for _ in range(BISECTIONS):
+        low, below, high, above = bisected(cubic, start, low, below, high, above)
+    return 0.5 * (low + below), 0.5 * (high + above)
+
+
+@inlined
+def bisected(
+    cubic: tuple[float, float, float, float], start: float, low: float, below: float, high: float, above: float
+) -> tuple[float, float, float, float]:
+    """Half of the two intervals that hold the turning cosines, `low` to `below` and `above` to `high`."""
+    u, v = 0.5 * (low + below), 0.5 * (high + above)
+    beyond, past = _climb(cubic, start, u) < 0.0, _climb(cubic, start, v) < 0.0
+    return (u if beyond else low), (below if beyond else u), (v if past else high), (above if past else v)
+
+
+@inlined
+def _climb(cubic: tuple[float, float, float, float], start: float, u: float) -> float:
+    """u'^2 at the cosine u: the nutation cubic, below zero where the axis does not get to."""
+    excess, beta, a, b = cubic
+    lever = b - a * u
+    return (1.0 - u * u) * (excess + beta * (start - u)) - lever * lever
+
+
+@shared
+def nutation_period(top: Any, at: Any) -> float:
+    """`SymmetricTop.nutation_period` of any records with these fields."""
+    return period_between(top, at, *turning_cosines(top, at))
+
+
+@shared
+def period_between(top: Any, at: Any, low: float, high: float) -> float:
+    """The period of a nutation between two turning cosines that are known."""
+    frequency, _ = mean_nutation(top, at, low, high)
+    return 2.0 * math.pi / frequency if frequency > 0.0 else math.inf
+
+
+@shared
+def mean_nutation(top: Any, at: Any, low: float, high: float) -> tuple[float, float]:
+    """The AGM of sqrt(beta (u3-u1)) and sqrt(beta (u3-u2)), and the mean of beta (u - u1), u the cosine.
+
+    The mean is ``sum 2^(n-1) c_n^2``, c_0^2 = x^2 - y^2 and c_(n+1) = (x - y)/2 along the AGM (DLMF 19.8.6).
+    """
+    excess, beta, a, _ = nutation_cubic(top, at)
+    # Vieta: beta (u1 + u2 + u3) = alpha + a^2, so that beta -> 0 (the free top) is not a special case
+    total = excess + beta * math.cos(at.theta) + a * a
+    x, y = total - beta * (2.0 * low + high), total - beta * (low + 2.0 * high)
+    x, y = math.sqrt(max(x, 0.0)), math.sqrt(max(y, 0.0))
+    gained, weight = 0.5 * beta * (high - low), 1.0
+    while abs(x - y) > 4e-16 * x and x > 0.0 and y > 0.0:
+        gap = 0.5 * (x - y)
+        gained += weight * gap * gap
+        weight *= 2.0
+        x, y = 0.5 * (x + y), math.sqrt(x * y)
+    return (y if x > 0.0 else 0.0), gained  # x = 0: a hanging top on its separatrix

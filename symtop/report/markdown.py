@@ -39,13 +39,28 @@ def section(study: Mapping[str, Any]) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def opening(study: Mapping[str, Any]) -> str:
-    """A study's answer on the first screen; empty if it has none."""
+def opening(study: Mapping[str, Any], titles: Mapping[str, str]) -> str:
+    """A study's answer on the first screen, with links to the studies that explain it; empty if it has none.
+
+    `titles` are those of the studies on the page.
+    """
     first = study["opening"]
     if not first:
         return ""
     answer = "\n".join(f"- {sentence}" for sentence in first["sentences"])
-    return f"## {first['question']}\n\n{answer}\n\n{table(first['table']['header'], first['table']['rows'])}"
+    parts = [f"## {first['question']}", answer, table(first["table"]["header"], first["table"]["rows"])]
+    links = [f"[{words}](#{_anchor(titles[name])})" for name, words in explanations(study, titles)]
+    return "\n\n".join([*parts, f"More: {'; '.join(links)}."] if links else parts)
+
+
+def explanations(study: Mapping[str, Any], titles: Mapping[str, str]) -> list[tuple[str, str]]:
+    """The studies on the page that explain a study's answer, and what the answer calls them."""
+    return [(name, words) for name, words in study["opening"].get("explained", {}).items() if name in titles]
+
+
+def _anchor(title: str) -> str:
+    """What a heading is called in a link to it."""
+    return title.lower().replace(" ", "-")
 
 
 def page(studies: Sequence[Mapping[str, Any]], opening: Sequence[str], provenance: Mapping[str, str]) -> str:

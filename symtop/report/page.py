@@ -89,6 +89,7 @@ def write(results: Path) -> Path:
         loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined
     )
     studies = gather(results)
+    titles = {study["study"]: study["title"] for study in studies}
     provenance = next((study for study in reversed(studies) if not study["measured"]), studies[-1])["provenance"]
     versions = json.loads(provenance["dependencies"])
     facts = {**provenance, "dependencies": ", ".join(f"{name} {version}" for name, version in versions.items())}
@@ -99,6 +100,7 @@ def write(results: Path) -> Path:
         css=(templates / "style.css").read_text(encoding="utf-8"),
         script=(templates / "chart.js").read_text(encoding="utf-8"),
         studies=studies,
+        explanations=lambda study: markdown.explanations(study, titles),
         integrators=markdown.columns([method.record() for method in integrators().values()]),
         scenes=markdown.columns([scene.record() for scene in scenes().values()]),
         provenance=facts,
@@ -107,6 +109,6 @@ def write(results: Path) -> Path:
     )
     target = results / "report.html"
     store.write_text(target, text)
-    opening = ["# " + TITLE, INTRODUCTION, *map(markdown.opening, studies)]
+    opening = ["# " + TITLE, INTRODUCTION, *(markdown.opening(study, titles) for study in studies)]
     store.write_text(results / "report.md", markdown.page(studies, opening, facts))
     return target

@@ -34,23 +34,28 @@ GREENS = (GREEN, "#7CC9A8", "#00563F")
 ORANGES = (ORANGE, "#B37400", "#F5C766")
 BLACKS = (BLACK, "#555555", "#999999")
 REDS = (VERMILLION, "#F09A66", "#8A3C00")
+YELLOWS = ("#B8A500", YELLOW, "#7A6F00")
 PURPLES = (PURPLE, "#8C4A73", "#E6B8D2")
+SKIES = (SKY, "#2B7BA8", "#A6D5F2")
 _SHADES = {
     "discrete-lagrangian": BLUES,
     "splitting": GREENS,
     "runge-kutta": ORANGES,
+    "lie-group": YELLOWS,
     "taylor": BLACKS,
     "library": REDS,
     "exact": (GREY,),
+    "engine": SKIES,
     "other": PURPLES,
 }
+UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
 # The looks of the integrators that ship with symtop. A new one gets a line here; the others keep theirs.
 _LOOKS = {
     "midpoint": Look(BLUE, "o", 8.0), "trapezoidal": Look(SKY, "s"), "simpson-linear": Look(PURPLE, "v"),
     "midpoint-unreduced": Look(BLUE, "^"), "trapezoidal-unreduced": Look(BLUES[1], "<"),
-    "galerkin-simpson": Look(BLUE, "P"),
+    "galerkin-simpson": Look(BLUE, "P"), "exact-discrete": Look(BLUES[2], "D"),
     "stormer-verlet": Look(GREEN, "^"), "stormer-verlet-yoshida-4": Look(GREEN, "o"),
     "stormer-verlet-suzuki-4": Look(GREENS[1], "s"), "stormer-verlet-blanes-moan-6": Look(GREENS[2], "v"),
     "strang": Look(GREEN, "<"), "cayley": Look(GREENS[1], ">"), "cayley-tuned": Look(GREENS[2], "D"),
@@ -63,10 +68,27 @@ _LOOKS = {
     "rk4": Look(ORANGE, "o"), "rk45-compiled": Look(ORANGES[1], "s"),
     "gauss-2": Look(ORANGES[2], "v"), "gauss-4": Look(ORANGE, "^"), "gauss-6": Look(ORANGES[1], "<"),
     "gauss-8": Look(ORANGES[2], ">"), "gauss-10": Look(ORANGE, "D"), "gauss-12": Look(ORANGES[1], "P"),
+    "kahan": Look(ORANGES[1], "h"),
+    "rkmk-se3-2": Look(YELLOWS[0], "o"), "rkmk-se3-4": Look(YELLOWS[2], "s"),
+    "crouch-grossman-3": Look(YELLOWS[0], "v"), "commutator-free-4": Look(YELLOWS[2], "^"),
+    "simo-wong": Look(YELLOWS[0], "D"), "collective-gauss-2": Look(YELLOWS[2], "<"),
+    "collective-gauss-4": Look(YELLOWS[0], ">"), "collective-gauss-6": Look(YELLOWS[2], "P"),
+    "generalised-alpha": Look(YELLOWS[0], "X"),
+    "lie-variational": Look(BLUES[1], "o"), "lie-variational-suzuki-4": Look(BLUES[2], "X"),
+    "euler-poincare": Look(BLUES[1], "s"),
     "rk45": Look(VERMILLION, "D"), "dop853": Look(VERMILLION, "o"), "lsoda": Look(REDS[1], "s"),
     "radau": Look(REDS[2], "v"),
     "taylor": Look(BLACK, "*", 8.0), "taylor-longdouble": Look(BLACK, "o"), "taylor-quad": Look(BLACKS[1], "s"),
+    "series": Look(BLACKS[1], "D"), "series-adaptive": Look(BLACKS[1], "^"),
     "exact": Look(GREY, "x"),
+    "no-gyro": Look(SKY, "o"), "no-gyro-float32": Look(SKIES[2], "o"), "no-gyro-linear": Look(SKIES[1], "o"),
+    "mujoco-euler": Look(SKIES[1], "s"), "mujoco-implicit": Look(SKIES[2], "s"), "bullet": Look(SKY, "v"),
+    "bullet-float32": Look(SKIES[2], "v"), "jolt": Look(SKY, "^"), "jolt-float32": Look(SKIES[2], "^"),
+    "physx": Look(SKY, "<"), "physx-float32": Look(SKIES[2], "<"), "rapier": Look(SKY, ">"),
+    "rapier-float32": Look(SKIES[2], ">"), "ode": Look(SKIES[1], "D"), "lammps-rigid": Look(SKIES[1], "P"),
+    "no-squish": Look(SKY, "P"), "yade": Look(SKIES[1], "X"), "fincham": Look(SKY, "X"),
+    "mujoco3-rk4": Look(SKIES[1], "p"), "rkmk4": Look(SKY, "p"), "jsbsim-default": Look(SKIES[1], "h"),
+    "jsbsim-buss2": Look(SKY, "h"),
 }  # fmt: skip
 
 OUTCOME_COLORS = {
@@ -150,10 +172,10 @@ def compact(path: str | Path) -> None:
 
 
 def save(figure: Any, target: Path) -> None:
-    """Write a figure as a compact PNG, or a film as it is, whole or not at all, and close it."""
+    """Write a figure as a compact PNG, an SVG or a PDF, or a film as it is, whole or not at all, and close it."""
     datasets.sweep(target)
     with datasets.replacing(target, target.suffix) as partial:
-        figure.savefig(partial, metadata={"Software": None})
+        figure.savefig(partial, metadata={UNDATED.get(target.suffix, "Software"): None})
         if target.suffix == ".png":
             compact(partial)
     plt.close(figure)

@@ -1,9 +1,12 @@
 """A dataset that is in a file of the cache, or is computed and put there.
 
-A file holds a hash of its values, so that a damaged one is noticed, said and computed again. Files that nobody used for
-30 days are removed, and those used longest ago beyond `MOST_BYTES` of a folder.
+A file is named after what its numbers are made of, and holds a hash of its values, so that a damaged one is noticed,
+said and computed again. Files that nobody used for 30 days are removed, and those used longest ago beyond `MOST_BYTES`
+of a folder.
 """
 
+import functools
+import hashlib
 import itertools
 import warnings
 from collections.abc import Callable
@@ -11,13 +14,26 @@ from pathlib import Path
 
 import xarray as xr
 
-from symtop.base import datasets
-from symtop.base.cache import prune, touch
+from symtop.base import datasets, fingerprint, imports
+from symtop.base.cache import cache_root, prune, touch
 from symtop.base.validate import SymtopError, SymtopWarning
 
 MOST_BYTES = 500_000_000  # of a folder; a reference at 1000 times takes 200 kB
 OFTEN = 50  # files that a process writes between two looks at the size of the folder
 _written = itertools.count()
+
+
+@functools.lru_cache(maxsize=8)
+def _sources(maker: str) -> str:
+    """Hash of the files that a module computes by, itself and all that it imports, and of the libraries."""
+    files = imports.closure(frozenset([Path(maker).resolve()]))
+    return fingerprint.digest(fingerprint.file_reasons(files) | fingerprint.packages("numpy", "heyoka", "mpmath"))
+
+
+def place(maker: str, *key: object, data: bytes = b"") -> Path:
+    """The file of a result, of the ``__file__`` of the module that makes it and of what it is made from."""
+    name = hashlib.sha256(repr([_sources(maker), *key]).encode() + data).hexdigest()[:32]
+    return cache_root() / "reference" / f"{name}.nc"
 
 
 def kept(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> xr.Dataset:

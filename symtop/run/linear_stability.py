@@ -27,8 +27,9 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.base.numbers import sign_changes
+from symtop.methods.calling import solve
 from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator, solve
+from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View

@@ -13,6 +13,7 @@ windows end is fixed by the number of steps alone, so that a resumed run has the
 import contextlib
 import json
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ from symtop.base.compiled import code_of
 from symtop.base.fingerprint import digest, file_reasons, hashed
 from symtop.base.numbers import GOLDEN
 from symtop.base.signals import ending_on_sigterm
-from symtop.base.validate import SymtopError, positive, whole
+from symtop.base.validate import SymtopError, SymtopWarning, positive, whole
 from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.loop import Loop, Position
 from symtop.methods.outcomes import OK, OUTCOMES, sentence
@@ -207,6 +208,7 @@ class _Book:
 
     def __init__(self, file: "str | Path | bool", identity: str) -> None:
         own = cache_root() / "runs" / f"{identity}.nc"
+        self.own = file is True
         self.file = own if file is True else Path(file) if file else None
         self.identity = identity
         self.saved = time.monotonic()
@@ -216,15 +218,32 @@ class _Book:
         """The position and the windows to go on from: those on disk, or the start."""
         if self.file is None or not self.file.is_file():
             return start, []
-        data = datasets.read(self.file)
+        data = self._read(self.file)
+        if data is None:
+            return start, []
         if data.attrs.get("identity") != self.identity:
             raise SymtopError(
                 f"checkpoint {self.file} belongs to another run or version; remove it or name another file"
             )
         values = iter([float(value) for value in data["position"].values])
         state, low = (tuple(next(values) for _ in start.state) for _ in range(2))
-        at = Position(state, low, regrown(start.carry, values), int(data.attrs["steps_done"]))
+        at = Position(state, low, regrown(start.carry, values), int(data["steps_done"]))
         return at, [[float(value) for value in row] for row in data["rows"].values]
+
+    def _read(self, file: Path) -> xr.Dataset | None:
+        """What is in the file; None of a damaged one of the cache, from which nothing can go on."""
+        try:
+            data = datasets.read(file)
+            known = not self.own or data.attrs.get("identity") == self.identity  # its name says whose it is
+            if known and data.attrs.get("content") == datasets.content_hash(data):
+                return data
+            raise SymtopError("its numbers are not those that were written")  # noqa: TRY301
+        except SymtopError as error:
+            sentence = f"checkpoint {file} is damaged ({error})"
+            if not self.own:
+                raise SymtopError(f"{sentence}; remove it or name another file") from error
+            warnings.warn(f"{sentence}; the run begins anew", SymtopWarning, stacklevel=4)
+            return None
 
     def note(self, at: Position, rows: list[list[float]]) -> None:
         """After a window: write it down if the last time was a while ago."""
@@ -238,8 +257,9 @@ class _Book:
             return
         at, rows = self.latest
         numbers = [*at.state, *at.low, *leaves(at.carry)]
-        data = xr.Dataset({"position": ("number", numbers), "rows": (("window", "part"), rows)})
-        data.attrs.update(steps_done=at.k, identity=self.identity)
+        columns: dict[str, Any] = {"position": ("number", numbers), "rows": (("window", "part"), rows)}
+        data = xr.Dataset({**columns, "steps_done": ((), at.k)})
+        data.attrs.update(content=datasets.content_hash(data), identity=self.identity)
         datasets.write(data, self.file)
         self.saved, self.latest = time.monotonic(), None
 

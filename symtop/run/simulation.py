@@ -18,11 +18,12 @@ from symtop.base import datasets
 from symtop.base.numbers import GOLDEN
 from symtop.base.over_time import over_time
 from symtop.base.validate import SymtopError, SymtopWarning, one_of, positive, whole
-from symtop.methods.outcomes import OUTCOMES, sentence
+from symtop.methods.calling import solve
+from symtop.methods.outcomes import sentence
 from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator, integrator, solve
+from symtop.methods.registry import Integrator, integrator
 from symtop.model import charts
-from symtop.model.scenes import OBSERVABLES, Scene, closed_form, scene
+from symtop.model.scenes import OBSERVABLES, Scene, closed_form, horizon_of, scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import View
 from symtop.run.guard import warning
@@ -30,6 +31,7 @@ from symtop.run.guard import warning
 MOST_STEPS = 20_000_000_000  # ten minutes of the fastest kernel
 MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
 WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
+USUAL = 1e-3  # rad, the accuracy of a step that is proposed where none was given
 STRETCHES = 17  # of a nutation: two of them are less than `WIDEST_GAP`
 
 
@@ -75,6 +77,22 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
     return times, marks, True
 
 
+def chart_of(method: Integrator, watched: str, observe: str | None = None) -> str:
+    """The chart of a run: the smallest that shows what is asked.
+
+    Where nothing is asked, it is what the scenes are `watched` for, or the axis if the method does not show that.
+    """
+    if observe is not None:
+        return method.chart_for(one_of("observe", observe, OBSERVABLES))
+    return method.chart_for(watched if watched != "attitude" or {"angles", "attitude"} & {*method.charts()} else "axis")
+
+
+def likely_step(scene: Scene, method: Integrator, horizon: float, accuracy: float) -> float:
+    """A step whose error may be about `accuracy`: that of a fifth of a nutation, cut by the method's order."""
+    power = float(method.order or 2)
+    return min(0.2 * scene.time_scale(horizon) * math.pow(accuracy, 1.0 / power), horizon)
+
+
 def make_plan(
     scene: Scene, method: Integrator, step_size: object = None, tolerance: object = None, *, horizon: float,
     samples: int, budget: float | None = None,
@@ -85,7 +103,8 @@ def make_plan(
         if tolerance is not None:
             raise SymtopError(f"{method.name} has a fixed step: give step_size, not tolerance = {tolerance!r}")
         if step_size is None:
-            raise SymtopError(f"{method.name} has a fixed step and needs step_size")
+            proposal = likely_step(scene, method, horizon, USUAL)
+            raise SymtopError(f"{method.name} has a fixed step and needs step_size, for example {proposal:.1g}")
         step = positive("step_size", step_size)
         if step > horizon:
             raise SymtopError(f"step_size must be at most the horizon {horizon!r}, not {step!r}")
@@ -134,14 +153,11 @@ def simulate(
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
     chosen, method = _scene(scene), _integrator(integrator)
-    end = chosen.horizon if horizon is None else positive("horizon", horizon)
+    end = chosen.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2)
     if count > MOST_SAMPLES:
         raise SymtopError(f"samples must be at most {MOST_SAMPLES}, not {count}")
-    if observe is None and method.name != method.method:
-        chart = method.charts()[0]
-    else:
-        chart = method.chart_for(chosen.observes if observe is None else one_of("observe", observe, OBSERVABLES))
+    chart = chart_of(method, chosen.observes, observe)
     limit = None if budget is None else positive("budget", budget)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, horizon=end, samples=count, budget=limit)
     caution = warning(chosen, method, chart, plan) if guard is not False else "off"
@@ -150,7 +166,7 @@ def simulate(
             guard(caution)
         else:
             warnings.warn(caution, SymtopWarning, stacklevel=2)
-    run = solve_plan(method, chart, chosen.top, chosen.start, plan, f" on {chosen.name}")
+    run = solve(method, chart, chosen.top, chosen.start, plan, f" on {chosen.name}")
     return datasets.describe(
         as_dataset(chosen, chart, plan, run), title=f"{method.name} on {chosen.name}", units=chosen.units,
         integrator=method.name, scene=chosen.name, chart=chart, implementation=method.implementation, horizon=end,
@@ -170,37 +186,6 @@ def _told(record: SymmetricTop | Angles) -> str:
 MOST_SAMPLES = 10_000_000
 
 
-def solve_plan(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan, context: str = "") -> Run:
-    """Run a solver and check what it returns; SymtopError if it raises or returns anything but a Run that fits."""
-    try:
-        return _checked(method, chart, plan, solve(method, chart, top, start, plan))
-    except SymtopError:
-        raise
-    except Exception as error:
-        reason = " ".join(str(error).split())
-        raise SymtopError(f"integrator {method.name} failed{context}: {type(error).__name__}: {reason}") from error
-
-
-def _checked(method: Integrator, chart: str, plan: Plan, run: object) -> Run:
-    """The run, if its shapes and its outcome are what they must be; states that are not finite become an outcome."""
-    shape = (plan.times.size, charts.DIMENSIONS[chart])
-    if not isinstance(run, Run) or np.shape(run.states) != shape or np.iscomplexobj(run.states):
-        returned = np.shape(run.states) if isinstance(run, Run) else type(run).__name__
-        raise SymtopError(
-            f"integrator {method.name} must return a Run with real states of shape {shape}, not {returned}"
-        )
-    if np.shape(run.p_phi) != shape[:1] or np.shape(run.p_psi) != shape[:1] or run.outcome not in OUTCOMES:
-        outcomes = ", ".join(OUTCOMES)
-        raise SymtopError(
-            f"integrator {method.name} must return p_phi and p_psi of shape {shape[:1]} and an outcome of {outcomes}"
-        )
-    if run.outcome == "ok" and not np.isfinite(run.states).all():
-        whole: Any = np.isfinite(run.states).all(axis=1)
-        reached = float(plan.times[int(np.argmin(whole)) - 1]) if whole[0] else 0.0
-        return run._replace(outcome="not_finite", reached=reached)
-    return run
-
-
 _scene, _integrator = scene, integrator  # the public argument names shadow these
 
 
@@ -210,8 +195,11 @@ def as_dataset(scene: Scene, chart: str, plan: Plan, run: Run) -> xr.Dataset:
         seen = View(chart, scene.top, run.states, run.p_phi, run.p_psi)
         angles = {"phi": seen.phi} if seen.psi is None else {"phi": seen.phi, "psi": seen.psi}
         if chart != "angles":
-            truth = closed_form(scene)(plan.times)
-            angles = {name: charts.unwrapped(values, getattr(truth, name)) for name, values in angles.items()}
+            guides = closed_form(scene).turns(plan.times)
+            angles = {
+                name: charts.unwrapped(values, guide)
+                for (name, values), guide in zip(angles.items(), guides, strict=False)
+            }
         columns = {
             "theta": seen.theta,
             **angles,

@@ -141,7 +141,7 @@ def reasons(study: Study, case: Case) -> Reasons:
     return {
         "settings": settings_key(study, case),
         **fingerprint.merged([base.values, walk.values(), *(values for values, _ in walked)]),
-        **_hashes(base.files.union(*(files for _, files in walked))),
+        **hashes(base.files.union(*(files for _, files in walked))),
         **plugins.reasons([case.scene, *names]),
         **fingerprint.packages(),
         **({"processor": datasets.provenance()["processor"]} if study.is_timed(case) else {}),
@@ -149,7 +149,8 @@ def reasons(study: Study, case: Case) -> Reasons:
 
 
 @functools.lru_cache(maxsize=1024)
-def _hashes(files: frozenset[Path]) -> Reasons:
+def hashes(files: frozenset[Path]) -> Reasons:
+    """Hashes of files, each read once."""
     return fingerprint.file_reasons(files)
 
 
@@ -162,4 +163,4 @@ def script_digest(script: Path, *drawing: object) -> str:
     """Hash of what makes a study's pictures, tables and verdict: its script, all that it imports, and `drawing`."""
     walk = Walk("drawing", files={script})
     walk.add(drawing)
-    return fingerprint.digest(fingerprint.packages("matplotlib") | walk.values() | _hashes(walk.closure()))
+    return fingerprint.digest(fingerprint.packages("matplotlib") | walk.values() | hashes(walk.closure()))

@@ -4,9 +4,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from symtop.base import fingerprint
+from symtop.base.python_files import execute, python_file
+from symtop.base.strangers import door
 from symtop.methods.registry import integrators, is_built_in, split_name
 from symtop.model.scenes import added_scenes, scenes
-from symtop.runner import scripts
 
 MOST_NEIGHBOURS = 100  # files beside a plug-in that count, because it may import them
 _loaded: dict[Path, str] = {}  # files of plug-ins in use, and their hashes
@@ -15,12 +16,12 @@ _owners: dict[str, tuple[str, str]] = {}  # of an integrator or a scene: the lab
 
 def load(path: str | Path) -> None:
     """Run a plug-in file once; what it registers is then known to every study and command."""
-    file = scripts.python_file(path, "plugin must be a Python file")
+    file = python_file(path, "plugin must be a Python file")
     if file in _loaded:
         return
     before = {*integrators(), *scenes()}
-    with scripts.loading(f"plugin {file.name}"):
-        scripts.execute(f"symtop_plugin_{file.stem}", file)
+    with door(f"plugin {file.name}"):
+        execute(f"symtop_plugin_{file.stem}", file)
     beside = [file, *sorted(file.parent.glob("*.py"))[:MOST_NEIGHBOURS]]
     _loaded[file] = fingerprint.hashed(*(fingerprint.file_hash(path) for path in beside))
     made_of = f"plug-in {file.name}", _loaded[file]

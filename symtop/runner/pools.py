@@ -5,18 +5,16 @@ cluster's workers need this version of symtop, the scripts of the studies, and t
 """
 
 import contextlib
-import gc
 import multiprocessing
 import os
-import warnings
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from typing import Any
 
-from symtop.base.validate import SymtopError
+from symtop.base import cluster
+from symtop.base.threads import cores
 from symtop.runner import work
 
-PATIENCE = 10  # seconds to wait for a scheduler's answer
 HERE, CLUSTER = 0, -1  # in place of a number of processes
 
 
@@ -37,32 +35,13 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
     """Pools of processes by their size, and the cluster if there is one; `jobs` is how many untimed cases may take."""
 
     def __init__(self, jobs: int | None = None, scheduler: str | None = None) -> None:
-        self.jobs = jobs or _cores()
+        self.jobs = jobs or cores()
         self.scheduler = scheduler
         self._client: Any = None
         self._pools: dict[int, Executor] = {HERE: InProcess()}
         if scheduler:
-            self._connect(scheduler)
-
-    def _connect(self, address: str) -> None:
-        try:
-            import distributed
-        except ImportError:
-            raise SymtopError("scheduler needs the package distributed: pip install 'symtop[distributed]'") from None
-        failure = ""
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # other versions there; the digest of every case is compared anyway
-                self._client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
-                self._client.wait_for_workers(1, timeout=PATIENCE)
-        except (OSError, ValueError, RuntimeError) as error:
-            failure = " ".join((str(error) or type(error).__name__).split())[:120]
-        if failure:  # out of the handler, so that nothing holds on to what was half made
-            self._leave()
-            gc.collect()  # a client that never connected closes itself here, and not under a lock of the next one
-            must = "the address of a dask scheduler that answers and has workers"
-            raise SymtopError(f"scheduler must be {must}, not {address!r} ({failure})")
-        self._pools[CLUSTER] = self._client.get_executor(pure=False)
+            self._client = cluster.connect(scheduler)
+            self._pools[CLUSTER] = self._client.get_executor(pure=False)
 
     def pool(self, size: int) -> Executor:
         """The executor of so many processes, of HERE or of the CLUSTER."""
@@ -78,7 +57,7 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
     def width(self, size: int) -> int:
         """How many cases to hand over at a time: enough that nobody waits, few enough to stop soon."""
         if size == CLUSTER:
-            return 4 * max(1, int(sum(self._client.ncores().values())))
+            return cluster.width(self._client)
         return 3 * size if size > 1 else 1
 
     def drop(self, size: int) -> None:
@@ -97,21 +76,11 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         self._leave()
 
     def _leave(self) -> None:
-        if self._client is not None:
-            with contextlib.suppress(Exception):
-                self._client.close(timeout=PATIENCE)
-            self._client = None
+        cluster.leave(self._client)
+        self._client = None
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _cores() -> int:
-    """Cores this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:
-        return os.cpu_count() or 1
 
 
 def _kill(pool: ProcessPoolExecutor) -> None:

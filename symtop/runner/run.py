@@ -18,7 +18,7 @@ import xarray as xr
 from tqdm import tqdm
 
 from symtop.base import datasets, fingerprint
-from symtop.base.validate import SymtopError, positive
+from symtop.base.validate import SymtopError, label, positive
 from symtop.runner import depends, plugins, store
 from symtop.runner.execute import execute
 from symtop.runner.pools import Workers
@@ -32,6 +32,13 @@ if TYPE_CHECKING:
 __all__ = ["Round", "Save", "findings_of", "folder", "load", "names", "run"]
 
 Save = Callable[["Figure", Path], object]  # writes a picture's figure to a file
+
+
+def _bar(words: str, *, quiet: bool, **options: Any) -> Any:
+    """A progress bar, or without a total the words alone, where somebody is watching."""
+    unseen = quiet or sys.stderr is None or not sys.stderr.isatty()
+    options = options or {"total": 1, "bar_format": "{desc}"}
+    return tqdm(desc=words, disable=unseen, leave=False, **options)
 
 
 @dataclass
@@ -73,8 +80,7 @@ class Round:
         """Have cases computed, with a progress bar where somebody is watching."""
         script = str(file_of(self.study.name))
         tasks = [Task(script, case, str(path), tuple(plugins.loaded()), limit, fresh) for path, case in missing.items()]
-        unseen = quiet or sys.stderr is None or not sys.stderr.isatty() or not tasks
-        with tqdm(total=len(tasks), desc=self.study.name, unit="case", disable=unseen, leave=False) as bar:
+        with _bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case") as bar:
 
             def on_result(_: Task, result: Result) -> None:
                 if result.state == "failed":
@@ -141,7 +147,10 @@ def run(study: Study, results: Path, *, quick: bool = False, full: bool = False,
             hired.close()  # before what its processes have left is removed
             store.tidy(results, study)
             raise
-    with store.locked(results / f"{study.name}.nc", wait=True):
+    with (
+        store.locked(results / f"{study.name}.nc", wait=True),
+        _bar(f"{study.name}: combining and drawing", quiet=quiet),
+    ):
         findings = _conclude(cases, stamp, save, quick=quick)
     return {**findings, "computed": cases.computed, "seconds": time.monotonic() - began}
 
@@ -167,14 +176,17 @@ def findings_of(
 ) -> dict[str, Any]:
     """Draw a dataset and say what it shows, as the report wants it."""
     pictures = [] if save is None else [_save(results, study, picture, save) for picture in study.pictures(data)]
-    opening = None if study.opening is None else study.opening(data)
+    first = None
+    if study.opening is not None:
+        opening = study.opening(data)
+        first = opening._asdict() | {"table": opening.table._asdict(), "explained": dict(opening.explained)}
     return {
         "study": study.name,
         **{name: getattr(study, name) for name in ("title", "question", "how_to_read")},
         "verdict": study.verdict(data),
         "tables": [table._asdict() for table in study.tables(data)],
         "charts": [chart._asdict() for chart in study.charts(data)],
-        "opening": None if opening is None else {**opening._asdict(), "table": opening.table._asdict()},
+        "opening": first,
         "pictures": pictures,
         "failures": failures,
         "cases": cases,
@@ -185,6 +197,6 @@ def findings_of(
 
 def _save(results: Path, study: Study, picture: Picture, save: Save) -> dict[str, str]:
     suffix = getattr(picture.figure, "suffix", "png")  # a film is a GIF
-    file = f"{study.name}-{picture.name}.{suffix}"
+    file = f"{study.name}-{label('name of a picture', picture.name)}.{suffix}"
     save(picture.figure, results / "figures" / file)
     return {"name": picture.name, "file": file, "caption": picture.caption, "alt": picture.alt}

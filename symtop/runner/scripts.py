@@ -7,16 +7,15 @@ package of its own (a folder with an ``__init__.py``), so that it may import wha
 of packages count as wholes in a fingerprint, but for the scripts: a new caption measures nothing again.
 """
 
-import contextlib
 import importlib
-import importlib.util
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
 from symtop.base import imports, walk
-from symtop.base.signals import TerminatedError
+from symtop.base.python_files import execute, python_file
+from symtop.base.strangers import door
 from symtop.base.validate import SymtopError, one_of
 from symtop.runner.study import Study
 
@@ -32,45 +31,6 @@ def folder() -> Path:
         if (place / "__init__.py").is_file():
             return place
     raise SymtopError(f"no studies lie beside the package in {beside}; install symtop again")
-
-
-def python_file(path: str | Path, wanted: str) -> Path:
-    """A file by its path; SymtopError with the sentence `wanted` if it is not there."""
-    try:
-        file = Path(path).resolve()
-        if file.is_file():
-            return file
-    except (OSError, ValueError):  # a name that is too long, or holds a null character
-        pass
-    raise SymtopError(f"{wanted}, not {str(path)!r}")
-
-
-@contextlib.contextmanager
-def loading(what: str) -> Iterator[None]:
-    """Whatever the code of a user's file raises becomes a SymtopError that names the file."""
-    try:
-        yield
-    except (SymtopError, TerminatedError):
-        raise
-    except (Exception, SystemExit) as error:
-        raise SymtopError(f"{what} failed: {type(error).__name__}: {error}") from error
-
-
-def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
-    """A module of that name from a file, or a package if its `places` are given."""
-    for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
-        del sys.modules[stale]  # of another folder with the same name
-    spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=places)
-    if spec is None or spec.loader is None:
-        raise SymtopError(f"{str(file)!r} cannot be loaded: its name must end in .py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # also because kernels are cached under the name of their module
-    try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        sys.modules.pop(name)
-        raise
-    return module
 
 
 def _once(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
@@ -115,7 +75,7 @@ def _module(file: Path) -> ModuleType:
 def load(name: str) -> Study:
     """The study of that name or in that file."""
     file = file_of(name)
-    with loading(f"study {file.name}"):
+    with door(f"study {file.name}"):
         study = getattr(_module(file), "STUDY", None)
     if not isinstance(study, Study):
         raise SymtopError(f"study {file.name} must define STUDY, a Study, not {study!r}")

@@ -4,15 +4,20 @@ A study is a question, a grid of cases, a function that measures one case, and f
 dataset into figures, tables and sentences. It holds no numerics of its own.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import xarray as xr
 
+from symtop.base.validate import SymtopError, label
+from symtop.methods.registry import split_name
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+REFERENCE = "exact"  # the integrator that is the closed form
 Combined = xr.Dataset | xr.DataTree  # what a study measured: a tree if its cases are in groups
 
 
@@ -54,11 +59,12 @@ class Table(NamedTuple):
 
 
 class Opening(NamedTuple):
-    """What the page says first: an answer in sentences, and the table they come from."""
+    """What the page says first: an answer in sentences, the table they come from, and the studies that explain it."""
 
     question: str
     sentences: Sequence[str]
     table: Table
+    explained: Mapping[str, str] = MappingProxyType({})  # by studies, with what they are called here
 
 
 @dataclass(frozen=True)
@@ -78,6 +84,11 @@ class Case:
     group: str = ""
 
     @property
+    def integrators(self) -> tuple[str, ...]:
+        """The integrators that it measures: its own, or those that its settings list."""
+        return self.integrator, *self.settings.get("integrators", ())
+
+    @property
     def label(self) -> str:
         """A name that is safe in a file: ``spheroid--rk4@axis`` for the row rk4[axis]."""
         parts = "--".join(filter(None, (self.scene, self.integrator, self.group)))
@@ -89,7 +100,8 @@ class Study:
     """A question and how it is answered.
 
     `pictures`, `verdict`, `tables`, `charts`, `opening` and `follow_up` get everything that was measured: an
-    `xarray.Dataset`, or an `xarray.DataTree` if the cases are in groups.
+    `xarray.Dataset`, or an `xarray.DataTree` if the cases are in groups. Each picture is saved and closed before the
+    next one is drawn, if `pictures` draws them one by one.
     """
 
     name: str
@@ -98,7 +110,7 @@ class Study:
     how_to_read: str
     cases: Callable[[bool], list[Case]]  # quick -> grid
     measure: Callable[[Case], xr.Dataset]
-    pictures: Callable[[Any], list[Picture]]
+    pictures: Callable[[Any], Iterable[Picture]]
     verdict: Callable[[Any], list[str]]
     tables: Callable[[Any], list[Table]] = lambda _: []
     charts: Callable[[Any], list[Chart]] = lambda _: []
@@ -109,9 +121,47 @@ class Study:
     uses: Callable[[Case], Sequence[str]] | None = None  # integrators a case runs; "*" for all; None: found out
     limit: float = 3600.0  # seconds after which a case counts as hanging
 
+    def __post_init__(self) -> None:
+        label("name of a study", self.name)  # its files are named after it
+
     def grid(self, *, quick: bool = False, full: bool = False) -> list[Case]:
         """The cases of the first round: the coarse grid, the ordinary one, or the longest there is."""
         return self.full() if full and self.full is not None else self.cases(quick)
+
+    def only(self, names: Collection[str]) -> "Study":
+        """The same study with the cases of some methods, or rows, alone; SymtopError if it has none of them.
+
+        A case that measures several integrators against each other stays whole if one of them is asked for, and one of
+        the closed form, which others are measured by, stays in any case.
+        """
+        wanted = {*names, REFERENCE}
+
+        def asked(cases: list[Case]) -> list[Case]:
+            return [case for case in cases if any({name, split_name(name)[0]} & wanted for name in case.integrators)]
+
+        def first(quick: bool) -> list[Case]:
+            kept = asked(self.cases(quick))
+            if all({*case.integrators} <= {REFERENCE} for case in kept) and REFERENCE not in names:
+                raise SymtopError(f"study {self.name} has no case of {', '.join(names)}")
+            return kept
+
+        def able(answer: Callable[[Any], Any]) -> Callable[[Any], Any]:
+            def answered(data: Any) -> Any:
+                try:
+                    return answer(data)
+                except Exception as error:
+                    sentence = f"study {self.name} compares methods and has no answer with {', '.join(names)} alone"
+                    raise SymtopError(f"{sentence}; name more of them") from error
+
+            return answered
+
+        full, later = self.full, self.follow_up
+        return replace(
+            self, cases=first, full=None if full is None else lambda: asked(full()),
+            follow_up=None if later is None else lambda data: asked(later(data)),
+            pictures=able(self.pictures), verdict=able(self.verdict), tables=able(self.tables),
+            charts=able(self.charts), opening=None if self.opening is None else able(self.opening),
+        )  # fmt: skip
 
     def is_timed(self, case: Case) -> bool:
         """Must the case run alone, on a machine that does nothing else?"""

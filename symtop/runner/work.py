@@ -20,6 +20,8 @@ import xarray as xr
 from tqdm import tqdm
 
 from symtop.base import datasets
+from symtop.base.signals import is_of_user
+from symtop.base.strangers import words_of
 from symtop.base.validate import SymtopError
 from symtop.runner import depends, plugins, scripts, store
 from symtop.runner.study import Case, Study
@@ -82,7 +84,9 @@ def _compute(study: Study, task: Task, path: Path) -> Result:
             data = study.measure(task.case)
         if not isinstance(data, xr.Dataset):
             raise SymtopError(f"the measure of a study must return a Dataset, not {type(data).__name__}")  # noqa: TRY301
-    except Exception as error:  # noqa: BLE001  (a failing case must not stop the others)
+    except BaseException as error:  # (a failing case must not stop the others)
+        if is_of_user(error):
+            raise
         message = sentence(task.case, error)
         store.save_failure(path, task.case, message, traceback.format_exc())
         return Result("failed", message)
@@ -93,7 +97,7 @@ def _compute(study: Study, task: Task, path: Path) -> Result:
 def sentence(case: Case, error: BaseException | str) -> str:
     """How a case failed, in one line."""
     if isinstance(error, BaseException) and not isinstance(error, SymtopError):
-        error = "".join(traceback.format_exception_only(error))
+        error = words_of(error)
     return f"{case.integrator} on {case.scene} failed: {' '.join(str(error).split())}"
 
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 import symtop
 from benchmarks import measured
-from benchmarks.peers import measure, study, summary
+from benchmarks.peers import measure, study, summary, together
 from symtop.base import datasets
 from symtop.report import page, style
 from symtop.runner import run as runner, store
@@ -139,7 +139,8 @@ def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_p
 
 
 def test_what_the_readme_cites_is_in_the_checkout():
-    cited = set(re.findall(r"results/[\w/-]+\.(?:nc|json|md|png)", (ROOT / "README.md").read_text()))
+    pages = "".join(page.read_text() for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))))
+    cited = set(re.findall(r"results/[\w/-]+\.(?:nc|json|md|png)", pages)) - {"results/NAME.nc"}
     assert {"results/bench.json", "results/peers.nc"} <= cited
     studies = {f"results/{name}.{kind}" for name in runner.names() for kind in ("nc", "json")}
     kept = subprocess.run(["git", "ls-files", "results"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
@@ -180,3 +181,33 @@ def test_the_stored_measurement_is_whole_and_its_inner_loops_did_the_work():
                     "arkode-sprk",
                 ):
                     assert summary.best_of(data, call, scene, summary.groups(data)[name], target) is not None
+
+
+# ---- many tops at once -----------------------------------------------------------------------------------------------
+
+
+def test_many_tops_at_once_are_told_by_their_cheapest_lanes_and_with_every_error():
+    rows = [
+        together.Row("heyoka, batch mode", 1000, 1e-6, 9e-7, 120.0, 6e-6),
+        together.Row("srkn-14-6[axis], lanes", 1000, 1e-6, 6e-7, 45.0, 2e-6),
+        together.Row("rk4[axis], lanes", 1000, 1e-6, 8e-7, 1400.0, 7e-6),
+        together.Row("diffrax Tsit5, vmap", 1000, 1e-6, 3e-5, 200.0, 60e-6),
+    ]
+    (said,) = together.verdict(rows)
+    assert "srkn-14-6[axis], lanes, takes 2.0 us a top and 44.4 ns a step to an error of 6e-07" in said
+    assert "heyoka, batch mode 3 times as long (error 9e-07)" in said
+    assert "diffrax Tsit5, vmap 30 times as long (error 3e-05)" in said
+    assert together.table(rows).rows[3] == ["1,000", "1e-06", "diffrax Tsit5, vmap", "3.0e-05", "200", "60.00", "300.0"]
+    assert together.verdict([]) == together.verdict(rows[:1]) == []
+
+
+def test_all_ways_of_running_many_tops_end_at_the_same_axes():
+    numbers = together.neighbours(11)  # no whole number of heyoka's batches
+    pytest.importorskip("heyoka")
+    batch = together.batched(numbers, 1e-9)
+    assert together.worst(batch, numbers) < 1e-8
+    assert batch()[1] > 10.0
+    assert together.worst(together.fixed("srkn-14-6", "axis", numbers, 400), numbers) < 1e-8
+    few, many = (together.coarsest("rk4", "axis", numbers, error) for error in (1e-2, 1e-4))
+    assert few < many
+    assert together.coarsest("rk4", "axis", numbers, 1e-15) is None

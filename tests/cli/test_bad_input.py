@@ -136,6 +136,7 @@ CALLS = {
             "c": [value for value in NOT_ROW if value is not None] + [(0.0, 0.5), (0.0,)],
         },
     ),
+    "series": (symtop.series, {"name": "mine", "order": 12}, {"name": NOT_LABEL, "order": [*NOT_WHOLE, 9, 24]}),
     "Integrator": (
         symtop.Integrator,
         {"name": "mine", "family": "other", "summary": "", "solvers": SOLVERS},

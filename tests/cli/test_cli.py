@@ -58,11 +58,11 @@ def test_tables_are_complete_and_json_is_json():
         (["run", "spheroid", "midpoint", "--step-size", "nan"], "--step-size must be a finite number"),
         (["run", "spheroid", "midpoint", "--step-size", "-1"], "--step-size must be above zero"),
         (["run", "spheroid", "midpoint", "--step-size", "1e-300"], "the limit is"),
-        (["study", "convergence", "--status", "--limit", "-5"], "limit must be"),
+        (["study", "convergence", "--status", "--limit", "-5"], "--limit must be"),
         (["run", "spheroid", "midpoint", "--step-size", "99"], "at most the horizon"),
         (["run", "spheroid", "midpoint", "--step-size", "x"], "not a valid float"),
-        (["run", "spheroid", "midpoint", "--step-size", "0.1", "--tolerance", "1e-3"], "not tolerance"),
-        (["run", "spheroid", "rk45", "--step-size", "0.1"], "give tolerance"),
+        (["run", "spheroid", "midpoint", "--step-size", "0.1", "--tolerance", "1e-3"], "not --tolerance"),
+        (["run", "spheroid", "rk45", "--step-size", "0.1"], "give --tolerance"),
         (["run", "spheroid", "rk45"], "needs a tolerance"),
         (["run", "spheroid", "rk45", "--tolerance", "1e-20"], "must be at least"),
         (["run", "spheroid", "rk45", "--tolerance", "inf"], "tolerance must be a finite number"),
@@ -108,11 +108,11 @@ def test_help_starts_fast():
 
 
 def test_a_run_is_drawn_and_printed_as_json(tmp_path):
-    picture = tmp_path / "deeper" / "run.png"
+    picture = tmp_path / "run.png"
     command = ["run", "spheroid", "midpoint", "--step-size", "0.01", "--figure", str(picture), "--json"]
     result = CliRunner().invoke(main, command)
     assert result.exit_code == 0
-    run = json.loads(result.output)
+    run = json.loads(result.stdout)
     assert run["steps"] == 800
     assert 1e-3 < run["errors"]["axis"]["largest"] < 2e-2
     assert run["errors"]["p_psi"]["largest"] < 1e-14

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 import symtop
 from symtop.cli.common import table
 from symtop.cli.main import main
+from symtop.methods.registry import engines, methods
 
 
 def printed(*words, columns=80):
@@ -18,13 +19,24 @@ def printed(*words, columns=80):
     return done.output
 
 
-@pytest.mark.parametrize(("command", "entries"), [("integrators", symtop.integrators), ("scenes", symtop.scenes)])
+@pytest.mark.parametrize(
+    ("command", "entries"),
+    [(["integrators"], methods), (["integrators", "--engines"], engines), (["scenes"], symtop.scenes)],
+)
 def test_a_list_fits_the_terminal_and_names_every_entry(command, entries):
     for columns in (80, 120):
-        lines = printed(command, columns=columns).splitlines()
+        lines = printed(*command, columns=columns).splitlines()
         assert max(map(len, lines)) <= columns
         assert {line.split(" ")[0] for line in lines} >= set(entries())
-    assert max(map(len, printed(command, "--wide").splitlines())) > 80
+    assert max(map(len, printed(*command, "--wide").splitlines())) > 80
+
+
+def test_the_maps_of_engines_have_a_list_of_their_own():
+    everyone, listed = printed("integrators"), printed("integrators", "--engines")
+    assert "mujoco-euler" in listed
+    assert "mujoco-euler" not in everyone
+    assert "strang" not in listed
+    assert printed("integrators", "mujoco-euler").startswith("mujoco-euler: MuJoCo Euler")
 
 
 def test_a_list_breaks_its_last_column_and_loses_no_word():

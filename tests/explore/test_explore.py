@@ -25,6 +25,7 @@ from symtop.base.validate import SymtopError, SymtopWarning
 from symtop.cli.main import main
 from symtop.explore import answers
 from symtop.explore.server import STATIC, address, serve
+from symtop.methods.registry import engines
 from symtop.model import charts
 from symtop.model.scenes import closed_form
 from tests.browser import Browser
@@ -64,6 +65,18 @@ def test_an_answer_is_the_run_beside_the_truth(method):
         np.max(np.abs(energy - energy[0])) / chosen.scene.energy_scale, rel=1e-5
     )
     assert answer["outcome"] == "ok"
+
+
+def test_the_map_of_an_engine_is_played_beside_the_truth_from_a_group_of_its_own():
+    families = [entry["family"] for entry in answers.catalogue()["integrators"]]
+    assert families.count("engine") == len(engines())
+    chosen = {"name": "goldstein", "horizon": 10.0, "step_size": 0.025}
+    off = {
+        name: answers.answer(answers.setup(fields(integrator=name, **chosen)))["largest"]["axis_error"]
+        for name in ("no-gyro", "strang")
+    }
+    assert off["no-gyro"] > 1.5
+    assert off["strang"] < 1e-3
 
 
 def test_a_failing_run_is_an_answer_with_its_sentence():
@@ -262,6 +275,8 @@ def test_a_person_can_use_it(site, tmp_path):
 
         answered(browser, lambda: browser.set("#theta-slider", 0.9))  # a slider moves, the plots change
         assert browser.evaluate("document.querySelector('#theta').value") == "0.9"
+        named = "document.querySelector('#scene').selectedOptions[0].text"
+        assert browser.evaluate(named) == "spheroid (edited)"  # and so does the name
         after = {name: browser.evaluate(PLOT.format(name)) for name in names}
         assert all(after[name] != before[name] for name in names)
 
@@ -286,6 +301,13 @@ def test_a_person_can_use_it(site, tmp_path):
         browser.wait_for("document.body.dataset.answer === 'refused'")
         assert "no rigid body" in browser.evaluate(status)
         assert browser.evaluate("document.querySelector('#netcdf').disabled")
+        browser.click("#reset")  # back to the scene as it is in the catalogue
+        browser.wait_for("document.body.dataset.answer === 'ok'")
+        assert browser.evaluate(named) == "spheroid"
+        assert [browser.evaluate(f"document.querySelector('#{name}').value") for name in ("I3", "theta")] == [
+            "1",
+            "0.4",
+        ]
 
         answered(browser, lambda: browser.set("#scene", "goldstein"))
         answered(browser, lambda: browser.set("#integrator", "rk45"))

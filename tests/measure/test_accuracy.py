@@ -12,7 +12,8 @@ from symtop.measure.order import LARGEST_ERROR, order
 from symtop.measure.order_table import asymptotic_steps
 from symtop.methods.registry import integrator
 from symtop.model.scenes import scene
-from symtop.run.reference import have_heyoka, reference
+from symtop.run.reference import reference
+from symtop.run.witnesses import have_heyoka
 
 DENSE, EVEN = 40_001, 331
 HORIZONS = (10.037, 100.37, 1003.7)  # nutations

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.work_precision import words as work_words
+from symtop_studies.work_precision import against_taylor, closed_form as work_closed_form, words as work_words, worth
 
 from symtop.measure import ranking
 from symtop.measure.timing import forecasts, met_again, timings
@@ -97,6 +97,38 @@ def test_the_closed_form_is_not_ranked_but_stands_beside_the_others():
     assert work_words.beside(data.sel(integrator=["b", "c"])) == ""
 
 
+def test_the_closed_form_is_compared_with_the_fastest_row():
+    data = cell([[0.1] * 3, [1.0] * 3, [2.0] * 3], errors=[1e-16, 1e-7, 1e-7])
+    data["control"][0] = ""
+    data = data.expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
+    pairs = work_closed_form.compared(data)
+    assert [(pair.row, pair.target, pair.ratio) for pair in pairs] == [("b", 1e-3, 10.0), ("b", 1e-6, 10.0)]
+    said = work_closed_form.headline(data)
+    assert said.startswith("For a free symmetric top under gravity the fastest method is no integrator. In 2 of 2")
+    assert "10 to 10 times less (median 10)" in said
+    (row,) = work_closed_form.table(data, ["ten"]).rows
+    assert row == ["x", "ten", "10 (1e+05 us; b)", "10 (1e+05 us; b)", "", ""]
+    slow = data.assign(seconds=data["seconds"].where(data["control"] != "", 5.0))
+    assert "slower than the fastest row in all 2" in work_closed_form.headline(slow)
+    assert work_closed_form.headline(data.sel(integrator=["b", "c"])) == ""
+
+
+def test_own_rows_are_compared_with_taylor():
+    """One is ahead at 1e-3 and alone at 1e-9; without taylor nothing is said, and a slower row is named as such."""
+    data = cell([[0.5] * 3, [1.0] * 3, [2.0] * 3], errors=[1e-4, 1e-7, 1e-10])
+    data = data.assign_coords(integrator=["series[axis]", "taylor[axis]", "rk4[axis]"])
+    data = data.expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
+    (row,) = against_taylor.table(data, ["over ten"]).rows
+    assert row == ["x", "over ten", "0.50 (series[axis])", "2.00 (rk4[axis])", "rk4[axis] alone", "neither"]
+    said = against_taylor.headline(data, ["over ten"])
+    assert said == (
+        "Own rows take at most taylor's time in 1 of 2 combinations, all but x over ten at 1e-06 (2.00), and 1 more "
+        "that it does not meet."
+    )
+    only = data.sel(integrator=["series[axis]", "rk4[axis]"])
+    assert (against_taylor.compared(only), against_taylor.headline(only, ["over ten"])) == ({}, "")
+
+
 def test_a_target_wider_than_the_nutation_has_no_winner_and_does_not_count():
     data = cell([[1.0] * 3, [2.0] * 3]).expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
     assert list(ranking.winners(data)) == [("x", 0, target) for target in TARGETS]
@@ -173,3 +205,23 @@ def test_costs_relative_to_the_best_keep_failures_visible():
     assert ratios.sel(target=1e-6).values.ravel().tolist() == [1.0, math.inf]
     assert np.isinf(ratios.sel(target=1e-12).values).all()
     assert ranking.leaders(ratios, 2) == ["a", "b"]
+
+
+def test_when_to_choose_a_row_is_said_from_its_times_alone():
+    fast, slow, level = [1.0, 1.1, 1.0], [3.0, 3.1, 3.2], [1.02, 1.0, 1.1]
+    errors = np.array([1e-7, 1e-7, 1e-7, 1e-2])
+    one = cell([fast, slow, level, fast], errors).expand_dims(scene=["here"], horizon=[10.0])
+    rows = {row[0]: row[1:] for row in worth.table(one).rows}
+    assert rows["a"][:3] == ["2", "0", "2 of 4"]  # 1e-3 and 1e-6
+    assert rows["a"][-1] == "for errors of 1e-03 (1), 1e-06 (1) on here (2)"
+    assert rows["c"][:2] == ["0", "2"]
+    assert rows["b"][-1] == "never: at its best it takes 3 times the fastest"
+    assert rows["d"][-1] == worth.NO_TARGET
+
+
+def test_a_row_far_behind_is_not_level_because_its_rounds_were_disturbed():
+    data = cell([[1.0, 1.1, 1.0], [3.0, 50.0, 70.0]], [1e-7, 1e-7]).expand_dims(scene=["here"], horizon=[10.0])
+    assert ranking.winners(data)["here", 0, 1e-6].level == ("b",)  # its least time was not met again
+    rows = {row[0]: row[1:] for row in worth.table(data).rows}
+    assert rows["b"][1] == "0"
+    assert rows["b"][-1] == "never: at its best it takes 3 times the fastest"

@@ -4,14 +4,25 @@ import os
 import subprocess
 import sys
 
+from symtop.base.compiled import compile_kernel
+
 NAMES = ("midpoint", "galerkin-simpson", "midpoint-unreduced", "stormer-verlet", "strang", "gauss-4", "rk4")
+IN_LANES = ("strang[axis]", "srkn-14-6[attitude]")
 SCRIPT = f"""
+IN_LANES = {IN_LANES!r}
 import gc
+import numpy as np
 import symtop
+from symtop.model.top import flat
 from numba.core.dispatcher import Dispatcher
 for name in {NAMES!r}:
     symtop.simulate("spheroid", name, step_size=0.01, guard=False)
 symtop.simulate("spheroid", "rk45-compiled", tolerance=1e-6, guard=False)
+scene = symtop.scene("spheroid")
+numbers, marks = np.tile(flat(scene.top, scene.start), (40, 1)), np.ones((40, 1), int)
+for name in IN_LANES:
+    method = symtop.integrator(name)
+    method.solvers[method.charts()[0]].many(numbers, np.full(40, 0.01), marks)
 ours = [one for one in gc.get_objects() if isinstance(one, Dispatcher) and one.py_func.__module__.startswith("symtop")]
 used = [one for one in ours if one.stats.cache_hits or one.stats.cache_misses or one.overloads]
 print(len(used), sum(sum(one.stats.cache_misses.values()) for one in used),
@@ -31,3 +42,39 @@ def test_a_second_process_finds_the_kernels_of_every_family_on_disk(tmp_path):
     assert compiled >= len(NAMES)  # the first process starts with an empty folder
     assert loaded >= len(NAMES)
     assert (missed, without_cache) == (0, 0)
+
+
+def _doubled(x):
+    return x + x
+
+
+def _kept_twice(monkeypatch, folder):
+    """A kernel with code on disk for whole and for real numbers, and the two files."""
+    monkeypatch.setenv("SYMTOP_CACHE", str(folder))
+    kernel = compile_kernel(_doubled)
+    assert (kernel(2), kernel(2.5)) == (4, 5.0)
+    files = sorted(folder.rglob("*.nbc"))
+    assert len(files) == 2
+    return kernel, files
+
+
+def test_a_file_is_named_after_the_signature_whose_code_it_holds(monkeypatch, tmp_path):
+    """Two processes that save at once, each with the index from before, give two signatures two files."""
+    kernel, files = _kept_twice(monkeypatch, tmp_path)
+    index, named = kernel._cache._cache_file, []
+    for signature in index._load_index():
+        index._save_index({})
+        index.save(signature, "code")
+        named.append(index._load_index()[signature])
+    assert len(set(named)) == 2
+    assert sorted(tmp_path.rglob("*.nbc")) == files
+
+
+def test_the_code_of_another_signature_is_not_run(monkeypatch, tmp_path):
+    _, (one, other) = _kept_twice(monkeypatch, tmp_path)
+    aside = one.read_bytes()
+    one.write_bytes(other.read_bytes())
+    other.write_bytes(aside)
+    again = compile_kernel(_doubled)
+    assert (again(2), again(2.5)) == (4, 5.0)
+    assert {signature[0].name for signature in again.signatures} == {"int64", "float64"}

@@ -9,11 +9,11 @@ import symtop
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
-from symtop.methods import discrete_lagrangian as family
 from symtop.methods.angles import reduced
 from symtop.methods.discrete_lagrangian import march
 from symtop.methods.fixed_step import FixedStep
 from symtop.methods.loop import driver
+from symtop.methods.node_sums import forces, node_sums, opening
 from symtop.methods.quadrature import Quadrature
 from symtop.methods.registry import Integrator
 from tests.conftest import random_scenes
@@ -55,8 +55,8 @@ def test_starting_from_q0_plus_h_v0_costs_an_order():
         h = begun_wrongly.h
         # p1 = D2 Ld(q0, q0 + h v0) moved back by a step is the momentum that this start amounts to
         d = h * start.theta_dot
-        sums = family._node_sums(rule, start.theta, d, 0.0, 0.0)
-        force = family._forces(par, sums)
+        sums = node_sums(rule, start.theta, d, opening(None, rule, start.theta))
+        force = forces(par, sums)
         return par, (state[0], par.I1 * d / h + h * force.W0, *state[2:])
 
     def solve(top, start, plan):
@@ -92,7 +92,7 @@ def explicit_euler(top, start, plan):
     """Order 1, not symplectic, not symmetric: what the structure tests must catch."""
     par, (theta, p, phi, psi) = reduced(top, start)
     from symtop.methods.plan import Run
-    from symtop.model.top import effective_force
+    from symtop.model.effective import effective_force
 
     h = plan.step_size
     for _ in range(int(plan.marks[-1])):

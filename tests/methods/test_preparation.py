@@ -1,5 +1,6 @@
 """What surrounds a kernel compiles to the bits of its Python, and a run at once is a run in stretches."""
 
+import contextlib
 import dataclasses
 import math
 import random
@@ -9,17 +10,18 @@ import pytest
 
 import symtop
 from symtop.base.compiled import compile_kernel
-from symtop.methods import loop as loops, splitting_angles, splitting_space
-from symtop.methods.angles import reduced
+from symtop.methods import fixed_step, loop as loops, splitting_angles, splitting_space
+from symtop.methods.angles import reduced, require_chart
 from symtop.methods.coefficients import METHODS, exact_sum
 from symtop.methods.euler_lagrange import with_rates
 from symtop.methods.fixed_step import FixedStep, inside
+from symtop.methods.many import refused
 from symtop.methods.plan import Plan
-from symtop.methods.preparation import Body, Start, flat
+from symtop.methods.preparation import Body, Start
 from symtop.methods.space import on_attitude, on_axis, on_frame
 from symtop.methods.splitting import composition
 from symtop.methods.unreduced import with_momenta
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, SymmetricTop, flat
 
 PREPARATIONS = [reduced, with_rates, with_momenta, on_axis, on_attitude, on_frame]
 
@@ -91,7 +93,8 @@ def assert_the_same_run(solver, top, start, plan):
 @pytest.mark.parametrize(
     ("name", "chart"),
     [("midpoint", "angles"), ("midpoint-unreduced", "angles"), ("takahashi-imada", "attitude"), ("rk4", "angles"),
-     ("cayley-tuned", "axis"), ("gauss-4", "attitude"), ("stormer-verlet", "angles")],
+     ("cayley-tuned", "axis"), ("gauss-4", "attitude"), ("stormer-verlet", "angles"), ("kahan-li-8", "attitude"),
+     ("sofroniou-spaletta-10", "axis"), ("stormer-verlet-blanes-moan-6", "angles")],
 )  # fmt: skip
 def test_a_run_at_once_is_a_run_in_stretches(name, chart):
     scene = symtop.scene("spheroid")
@@ -129,7 +132,7 @@ def test_long_runs_return_to_python(monkeypatch):
     plan = Plan.steps(0.01, [0, 50, 100])
     whole = solver(scene.top, scene.start, plan)
     monkeypatch.setattr(loops, "BLOCK", 7)
-    monkeypatch.setattr(type(solver), "_at_once", None)
+    monkeypatch.setattr(fixed_step, "flat", None)  # what a run in one call begins with
     np.testing.assert_array_equal(solver(scene.top, scene.start, plan).states, whole.states)
 
 
@@ -140,6 +143,22 @@ def test_a_start_on_a_pole_is_refused_as_before():
             prepare(top, Angles(0.0))
     with pytest.raises(symtop.SymtopError, match="inside"):
         symtop.integrator("midpoint").solvers["angles"](top, Angles(0.0), Plan.steps(0.1, [1]))
+
+
+def test_many_starts_are_refused_as_each_of_them_is():
+    theta = [0.0, 1e-300, 1.0, np.pi, 3.2, -0.1, np.nan, np.inf]
+    numbers = np.zeros((len(theta), 9))
+    numbers[:, 3] = theta
+
+    def refuses(value):
+        with contextlib.suppress(symtop.SymtopError):
+            require_chart(Start(value, 0.0, 0.0, 0.0, 0.0, 0.0))
+            return False
+        return True
+
+    assert refused(require_chart, numbers).tolist() == [refuses(value) for value in theta]
+    assert refused(require_chart, numbers).sum() == 6
+    assert not refused(None, numbers).any()
 
 
 def test_functions_of_python_still_make_a_solver():
@@ -184,3 +203,17 @@ def test_a_tuned_drift_hangs_on_the_start():
     assert half == 0.5 * 0.1 / 2.0 * splitting_space.tangent_scale(top, at, 0.1)
     assert not math.isclose(half, 0.5 * 0.1 / 2.0, rel_tol=1e-6)
     assert splitting_angles.march is not splitting_space.march_axis
+
+
+def test_a_long_composition_travels_as_an_array_and_arrives_whole():
+    """Numbers of every kind, a rule that hangs on the start included, to the bits of the rule that Python makes."""
+    scene = symtop.scene("spheroid")
+    drift, kick = [0.1, 0.2, 0.4, 0.2, 0.1], [0.05, 0.15, 0.3, 0.3, 0.15, 0.05]
+    for more in ({"rotation": "cayley-tuned"}, {"gradient": [0.0, 1e-3, 0.0, 0.0, 1e-3, 0.0], "processor": 0.01}):
+        method = symtop.composition("long", drift, kick, chart="space", **more)
+        for solver in method.solvers.values():
+            (row,) = solver._whole.rule
+            assert row.tolist()[:11] == [*solver.rule.rule.drift, *solver.rule.rule.kick]
+            assert_the_same_run(solver, scene.top, scene.start, Plan.steps(0.02, [0, 1, 300]))
+    short = symtop.integrator("strang").solvers["axis"]
+    assert short._whole.rule == tuple(short.rule.rule)

@@ -3,7 +3,6 @@
 import math
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 
 import mpmath as mp
@@ -11,6 +10,9 @@ import numpy as np
 import pytest
 
 import symtop
+from benchmarks import accuracy
+from benchmarks.accuracy import LIMITS, deviation, short
+from benchmarks.families import REGIMES, tops
 from symtop.base.validate import SymtopError
 from symtop.model import (
     closed_form,
@@ -27,67 +29,20 @@ from symtop.model.closed_form import ClosedForm
 from symtop.model.precise_constants import precise_constants
 from symtop.model.precise_form import PreciseForm
 from symtop.model.scenes import grazing, scene, sleeping
-from symtop.model.top import Angles, SymmetricTop
-from tests.model.test_exact import MAKE, REGIMES, Draw
+from symtop.model.top import Angles, SymmetricTop, flat
+from symtop.run.bounds import ROUNDING
 
 EPS = float(np.finfo(float).eps)
-LINES = (at.PHI_LINE, at.PSI_LINE, at.PHI_TURNS, at.DOWN_TURNS, at.UP_TURNS)
-MARKS = (at.ARITHMETIC, at.RATE_ERROR, at.VALUE_ERROR)
 SEPARATRIX = SymmetricTop(1.0, 0.5, -1.0), Angles(0.0, theta_dot=2.0)
 
 
-def _tops(count, seed, kinds=REGIMES):
-    """`count` tops of each regime."""
-    for kind in kinds:
-        random = np.random.default_rng([seed, REGIMES.index(kind)])
-        for _ in range(count):
-            yield MAKE[kind](Draw(random))
-
-
-def _numbers(top, start):
-    rates = start.theta_dot, start.phi_dot, start.psi_dot
-    return top.I1, top.I3, top.mgl, start.theta, start.phi, start.psi, *rates
-
-
-def _short(top, start):
-    """The constants without the last resort, interpreted, and their status."""
-    out = [0.0] * at.SIZE
-    status = motion_constants.motion_constants(*_numbers(top, start), out)
-    return np.array(out), status
-
-
-def _deviation(ours, true):
-    """Errors of the rate of the phase (relative), its start, mean rates (over the largest), starts, doubles (ulp)."""
-
-    def apart(place):
-        return abs((ours[place] - true[place]) + (ours[place + 1] - true[place + 1]))
-
-    largest = max(abs(true[place]) for place in LINES) or 1.0
-    rate = apart(at.QUARTERS) / (abs(true[at.QUARTERS]) or 1.0)
-    means = max(apart(place) for place in LINES) / largest
-    starts = max(apart(place + 2) / max(1.0, abs(true[place + 2])) for place in LINES)
-    pairs = {place + k for place in (*LINES, at.QUARTERS) for k in range(4)} | set(MARKS)
-    units = 0.0
-    for place in set(range(at.SIZE)) - pairs:
-        x, y = ours[place], true[place]
-        if x != y and not (math.isnan(x) and math.isnan(y)):
-            noise = 1e-29 * max(1.0, largest)  # of numbers that vanish for a reason, such as b - a u at a cusp
-            units = max(units, max(abs(x - y) - noise, 0.0) / math.ulp(y))
-    return np.array([rate, apart(at.QUARTERS + 2), means, starts, units])
-
-
-def _limits(true):
-    """What is allowed: digits enough for 1e12 radians, starts better than a double by a hundred."""
-    return np.array([motion_constants.RATE, 2e-18, 1e-28, 1e-18, 1.0])
-
-
 def test_constants_are_those_of_forty_digits_in_every_regime():
-    for top, start in _tops(2, seed=21):
-        ours, status = _short(top, start)
+    for top, start in tops(2, seed=21):
+        ours, status = short(top, start)
         assert status == moving_axis.DONE
-        deviation = _deviation(ours, precise_constants(top, start))
-        assert (deviation <= _limits(ours)).all(), (top, start, deviation)
-        assert deviation[0] <= ours[at.RATE_ERROR]
+        apart = deviation(ours, precise_constants(top, start))
+        assert (apart <= LIMITS).all(), (top, start, apart)
+        assert apart[0] <= ours[at.RATE_ERROR]
 
 
 def _double(monkeypatch):
@@ -107,37 +62,38 @@ def _double(monkeypatch):
 
 
 def test_double_arithmetic_in_place_of_double_double_is_seen(monkeypatch):
-    tops = [("generic", *next(_tops(1, 22, ["generic"]))), ("grazes", *next(_tops(1, 22, ["grazes the top"])))]
-    for _, top, start in tops:
+    for top, start in tops(1, 22, ["generic", "grazes the top"]):
         precise = precise_constants(top, start)
-        assert (_deviation(_short(top, start)[0], precise) <= _limits(precise)).all()
+        assert (deviation(short(top, start)[0], precise) <= LIMITS).all()
         with monkeypatch.context() as patch:
             _double(patch)
             patch.setattr(motion_constants, "RATE", math.inf)
             patch.setattr(motion_constants, "VALUE", math.inf)
-            ours, status = _short(top, start)
-        assert status == moving_axis.UNMET or _deviation(ours, precise)[0] > 1e-18
+            ours, status = short(top, start)
+        assert status == moving_axis.UNMET or deviation(ours, precise)[0] > 1e-18
 
 
 def test_the_bound_sends_tops_to_quad_double_that_need_it(monkeypatch):
     """With double-double sums alone the rates of some of them are wrong; the bound says so of every one."""
     wrong, longer = 0, 0
-    for top, start in _tops(
+    for top, start in tops(
         4, 23, ["nearly steady", "near the separatrix", "threshold of sleep", "pendulum to the top"]
     ):
-        ours, _ = _short(top, start)
+        ours, _ = short(top, start)
         if ours[at.ARITHMETIC] != at.QUAD_DOUBLE:
             continue
         longer += 1
         true = precise_constants(top, start)
-        assert (_deviation(ours, true) <= _limits(ours)).all()
+        assert (deviation(ours, true) <= LIMITS).all()
         with monkeypatch.context() as patch:
             patch.setattr(motion_constants, "long_sums", motion_sums.short_sums)
             patch.setattr(motion_constants, "RATE", math.inf)
             patch.setattr(motion_constants, "VALUE", math.inf)
-            short, status = _short(top, start)
-        assert status != moving_axis.DONE or max(short[at.RATE_ERROR], short[at.VALUE_ERROR]) > motion_constants.RATE
-        wrong += status != moving_axis.DONE or (_deviation(short, true) > _limits(true)).any()
+            rounded, status = short(top, start)
+        assert (
+            status != moving_axis.DONE or max(rounded[at.RATE_ERROR], rounded[at.VALUE_ERROR]) > motion_constants.RATE
+        )
+        wrong += status != moving_axis.DONE or (deviation(rounded, true) > LIMITS).any()
     assert longer >= 4
     assert wrong >= 1
 
@@ -165,7 +121,7 @@ def test_the_arithmetic_is_recorded():
 def test_the_last_resort_gives_the_same_motion(named, monkeypatch):
     times = np.linspace(-20.0, 1e3, 301)
     ours = ClosedForm(named.top, named.start)
-    monkeypatch.setattr(closed_form, "motion_constants", lambda *_: moving_axis.UNMET)
+    monkeypatch.setattr(motion_constants, "motion_constants", lambda *_: moving_axis.UNMET)
     monkeypatch.setattr(closed_form._build, "ready", lambda _: False)
     digits = ClosedForm(named.top, named.start)
     assert ours.provenance.arithmetic != digits.provenance.arithmetic == "40 digits"
@@ -182,18 +138,19 @@ def test_the_last_resort_gives_the_same_motion(named, monkeypatch):
 def test_compiled_and_interpreted_functions_give_the_same_bits():
     closed_form.compile_now()
     times = np.array([0.0, 0.3, -17.1, 1e3, 1e6, 1e17])
-    for top, start in [*_tops(4, seed=24), SEPARATRIX]:
-        plain, status = _short(top, start)
-        out = np.empty(at.SIZE)
-        assert closed_form._build.compiled(*_numbers(top, start), out) == status
+    for top, start in [*tops(4, seed=24), SEPARATRIX]:
+        plain, status = short(top, start)
+        out = np.empty((1, at.SIZE))
+        closed_form._build.compiled(np.array([flat(top, start)]), out)
+        plain[at.STATUS] = status
         assert out.tobytes() == plain.tobytes()
         if status != moving_axis.DONE:
             continue
         for view, width in enumerate(closed_form.WIDTHS):
-            shape = (width, times.size) if view == closed_form.MOTION else (times.size, width)
+            shape = (1, width, times.size) if view in closed_form.ROWS else (1, times.size, width)
             ours, theirs = np.empty(shape), np.empty(shape)
-            closed_form.samples(plain.tolist(), times.tolist(), view, ours)
-            closed_form._fill.compiled(out, times, view, theirs)
+            closed_form.all_samples([plain.tolist()], [times.tolist()], view, ours)
+            closed_form._fill.compiled(out, times[None], view, theirs)
             assert ours.tobytes() == theirs.tobytes()
 
 
@@ -211,10 +168,12 @@ def test_compiled_and_interpreted_functions_give_the_same_bits():
 def test_values_at_the_ends_of_the_range_end_in_a_status(numbers):
     """Neither way raises, and both say the same."""
     closed_form.compile_now()
-    plain, out = [0.0] * at.SIZE, np.empty(at.SIZE)
-    status = closed_form._build.compiled(*numbers, out)
-    assert motion_constants.motion_constants(*numbers, plain) == status
-    assert status == moving_axis.DONE or status in closed_form.REASONS
+    plain, out = [0.0] * at.SIZE, np.empty((1, at.SIZE))
+    failed = closed_form._build.compiled(np.array([numbers]), out)
+    status = motion_constants.motion_constants(*numbers, plain)
+    assert out[0, at.STATUS] == status
+    assert failed == (status != moving_axis.DONE)
+    assert status in closed_form.REASONS
 
 
 def test_a_few_forms_import_neither_numba_nor_mpmath():
@@ -229,7 +188,7 @@ def test_a_few_forms_import_neither_numba_nor_mpmath():
 
 
 def test_many_samples_are_worth_compiling(monkeypatch):
-    kernel = closed_form.LazyKernel(closed_form.samples, closed_form._fill.arguments, patience=0.2)
+    kernel = closed_form.LazyKernel(closed_form.all_samples, closed_form._fill.arguments, patience=0.2)
     monkeypatch.setattr(kernel, "_kept", lambda: False)
     assert not kernel.ready(0.1)
     monkeypatch.setattr(kernel, "compile", lambda: setattr(kernel, "compiled", True))
@@ -295,38 +254,37 @@ def test_next_to_the_separatrix_the_motion_is_periodic():
 # ---------------------------------------------------------------------------------------------- against 50 digits
 
 
-def _excess(top, start):
-    """Largest error over its allowance of theta, phi, psi and axis at 1, 1e3 and 1e6 nutations, and the arithmetic."""
-    form, precise = ClosedForm(top, start), PreciseForm(top, start, digits=50)
-    period = form.nutation_period if math.isfinite(form.nutation_period) else 1.0
-    times = period * np.array([1.0371, 1000.37, 1000000.37])
-    motion, axis, worst = form(times), form.axis(times), np.zeros((3, 4))
-    for i, time in enumerate(times):
-        true = precise(time)
-        worst[i] = [
-            float(abs(motion.theta[i] - true.theta)) / (1e-15 if true.theta < 2.0 else 2.0 * math.ulp(math.pi)),
-            float(abs(motion.phi[i] - true.phi) / (EPS * abs(true.phi) + 1e-15)),
-            float(abs(motion.psi[i] - true.psi) / (EPS * abs(true.psi) + 1e-15)),
-            float(max(abs(x - y) for x, y in zip(axis[i], precise.axis(time), strict=True))) / 1e-15,
-        ]
-    return worst, form.provenance.arithmetic
+def test_every_family_keeps_the_accuracy_that_is_claimed():
+    """Two of each: the whole population is `python -m benchmarks.accuracy`, and the slow test."""
+    found = accuracy.measure(2, jobs=1)
+    assert found.tops == 2 * len(REGIMES)
+    assert found.broken == []
+    assert found.share("40 digits") == 0.0
+
+
+def test_a_form_that_is_wrong_in_the_fifteenth_digit_breaks_the_claim(monkeypatch):
+    honest = accuracy.ClosedForm
+
+    def wrong(top, start):
+        form = honest(top, start)
+        form._constants[at.SCALE] *= 1.0 + 3e-15
+        return form
+
+    monkeypatch.setattr(accuracy, "ClosedForm", wrong)
+    assert accuracy.measure(1, jobs=1).broken
 
 
 @pytest.mark.slow
 def test_ten_thousand_tops_keep_the_accuracy_and_need_no_more_than_quad_double():
-    closed_form.compile_now()
-    arithmetic, motion, constants = Counter(), np.zeros((3, 4)), np.zeros(5)
-    for top, start in _tops(385, seed=25):  # 26 regimes
-        worst, served = _excess(top, start)
-        assert (worst <= 1.0).all(), (top, start, worst)
-        ours, _ = _short(top, start)
-        deviation = _deviation(ours, precise_constants(top, start))
-        assert (deviation <= _limits(ours)).all(), (top, start, deviation)
-        motion, constants = np.maximum(motion, worst), np.maximum(constants, deviation)
-        arithmetic[served] += 1
-    print(dict(arithmetic), motion, constants)
-    assert arithmetic["double-double"] > 0.7 * arithmetic.total()
-    assert arithmetic["40 digits"] == 0
+    found = accuracy.measure(385, jobs=2)  # 26 families
+    print("\n".join(accuracy.lines(found)))
+    assert found.tops >= 10_000
+    assert found.broken == []
+    assert found.share("double-double") > 0.7
+    assert found.share("40 digits") == 0.0
+    for name, bound in ROUNDING.items():
+        if name != "attitude":
+            assert found.largest(name) < 0.6 * bound
 
 
 def test_a_top_that_no_arithmetic_serves_is_refused():

@@ -12,6 +12,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from benchmarks.families import REGIMES, random_top
 from symtop.base.validate import SymtopError
 from symtop.model.charts import (
     attitude_distance,
@@ -92,99 +93,6 @@ def test_double_precision_reproduces_the_states_of_exact_doubles(name):
 # ----------------------------------------------------------------------------------------- double against 50 digits
 
 
-class Draw:
-    """A generic top and start, with the random numbers that a regime needs to change it."""
-
-    def __init__(self, random):
-        self.uniform = lambda low, high: float(random.uniform(low, high))
-        self.pick = lambda *values: float(random.choice(values))
-        self.spread = lambda low, high: math.exp(self.uniform(math.log(low), math.log(high)))
-        self.sign = self.pick(-1.0, 1.0)
-        self.I1, self.mgl = self.spread(0.1, 10.0), self.spread(0.05, 50.0)
-        self.I3 = self.I1 * self.uniform(0.02, 2.0)
-        self.theta, self.phi, self.psi = self.uniform(0.02, 3.12), self.uniform(-3.0, 3.0), self.uniform(-3.0, 3.0)
-        self.rates = self.uniform(-3.0, 3.0), self.uniform(-3.0, 3.0), self.uniform(-5.0, 5.0)
-
-    def change(self, theta=None, rates=None, I3=None, mgl=None):
-        top = SymmetricTop(self.I1, I3 or self.I3, self.mgl if mgl is None else mgl)
-        return top, Angles(self.theta if theta is None else theta, self.phi, self.psi, *(rates or self.rates))
-
-
-def _grazing(d, side):
-    """b - a (side 1) or b + a (side -1) is a small gap."""
-    precession, cosine, gap = d.rates[1], math.cos(d.theta), d.pick(1e-2, 1e-4, 1e-6, 1e-8, 1e-12)
-    spin = side * (precession * (d.I1 + side * (d.I1 - d.I3) * cosine) - gap) / d.I3
-    return d.change(rates=(2.0 * d.sign * d.uniform(1.0, 4.0) * math.sqrt(d.mgl / d.I1), precession, spin))
-
-
-def _nearly_steady(d):
-    """I3 w3 phi' = I1 phi'^2 cos theta + mgl, but for a gap."""
-    precession, cosine = d.sign * d.spread(0.3, 30.0), math.cos(d.theta)
-    spin = (d.I1 * precession**2 * cosine + d.mgl) / (d.I3 * precession) - precession * cosine
-    gap = d.pick(0.0, 1e-14, 1e-10, 1e-6)
-    return d.change(rates=(d.pick(0.0, 1e-14, 1e-10, 1e-6), precession, spin * (1.0 + gap)))
-
-
-def _near_separatrix(d):
-    """At a turning point with b = a and alpha = beta, but for gaps."""
-    theta = d.uniform(0.2, 3.0)
-    precession = math.sqrt(2.0 * d.mgl / d.I1 / (1.0 + math.cos(theta))) * (1.0 + d.pick(0.0, 1e-14, -1e-11, 1e-8))
-    spin = precession * (d.I1 + (d.I1 - d.I3) * math.cos(theta)) / d.I3 * (1.0 + d.pick(0.0, 1e-14, -1e-11, 1e-8))
-    return d.change(theta, (0.0, precession, spin))
-
-
-def _pendulum_to_the_top(d):
-    rate = d.sign * math.sqrt(2.0 * d.mgl / d.I1 * (1.0 - math.cos(d.theta)))
-    return d.change(rates=(rate * (1.0 + d.pick(0.0, 1e-15, -1e-15, 1e-10)), 0.0, 0.0))
-
-
-def _threshold_of_sleep(d):
-    theta, near = d.spread(1e-9, 0.1), 1.0 + d.pick(0.0, 1e-12, -1e-12, 1e-6)
-    w3 = near * 2.0 * math.sqrt(d.I1 * d.mgl) / d.I3
-    precession = w3 * d.I3 / (2.0 * d.I1)
-    return d.change(theta, (theta * d.uniform(-1.0, 1.0), precession, w3 - precession))
-
-
-MAKE = {
-    "generic": lambda d: d.change(),
-    "fast": lambda d: d.change(rates=(*d.rates[:2], d.sign * d.spread(30.0, 3e4))),
-    "slow": lambda d: d.change(rates=tuple(1e-3 * rate for rate in d.rates)),
-    "retrograde": lambda d: d.change(rates=(d.rates[0], -5.0 * abs(d.rates[1]), 5.0 * abs(d.rates[2]))),
-    "turning point": lambda d: d.change(rates=(0.0, *d.rates[1:])),
-    "cusp": lambda d: d.change(rates=(0.0, 0.0, d.sign * d.spread(0.1, 100.0))),
-    "plane pendulum": lambda d: d.change(rates=(d.sign * d.spread(0.01, 30.0), 0.0, 0.0)),
-    "spherical pendulum": lambda d: d.change(rates=(*d.rates[:2], -d.rates[1] * math.cos(d.theta))),
-    "grazes the top": lambda d: _grazing(d, 1.0),
-    "grazes the bottom": lambda d: _grazing(d, -1.0),
-    "through the top": lambda d: d.change(I3=d.I1, rates=(3.0 * d.rates[0], d.rates[1], d.rates[1])),
-    "through the bottom": lambda d: d.change(I3=d.I1, rates=(3.0 * d.rates[0], d.rates[1], -d.rates[1])),
-    "flat body": lambda d: d.change(I3=2.0 * d.I1 * (1.0 - d.pick(0.0, 1e-15, 1e-8, 1e-3))),
-    "thin body": lambda d: d.change(I3=d.I1 * d.spread(1e-8, 1e-2)),
-    "nearly steady": _nearly_steady,
-    "near the separatrix": _near_separatrix,
-    "pendulum to the top": _pendulum_to_the_top,
-    "nearly free": lambda d: d.change(mgl=d.sign * d.pick(1e-3, 1e-6, 1e-10, 1e-14)),
-    "free": lambda d: d.change(mgl=0.0),
-    "heavy": lambda d: d.change(mgl=d.sign * 1e6 * d.uniform(0.5, 2.0)),
-    "hanging": lambda d: d.change(mgl=-d.mgl),
-    "from the top": lambda d: d.change(d.pick(0.0, 1e-20, 1e-9, 1e-4), mgl=d.sign * d.mgl),
-    "from the bottom": lambda d: d.change(math.pi - d.pick(0.0, 4.5e-16, 1e-9, 1e-4), mgl=d.sign * d.mgl),
-    "asleep": lambda d: d.change(
-        d.pick(0.0, 1e-12, 1e-6), (0.0, d.rates[1], 10.0 * d.rates[2]), mgl=d.pick(-1.0, 1.0) * d.mgl
-    ),
-    "asleep below": lambda d: d.change(
-        math.pi - d.pick(0.0, 1e-12, 1e-6), (0.0, d.rates[1], 10.0 * d.rates[2]), mgl=d.pick(-1.0, 1.0) * d.mgl
-    ),
-    "threshold of sleep": _threshold_of_sleep,
-}
-REGIMES = tuple(MAKE)
-
-
-def _random_top(kind, random):
-    """A top and a start of one regime."""
-    return MAKE[kind](Draw(random))
-
-
 def _times(form, random):
     """The start, next to a turning point, within two periods, up to 1000, and about -+1e6."""
     period = form.nutation_period if math.isfinite(form.nutation_period) else 1.0
@@ -215,7 +123,7 @@ def _excess(top, start, precise, times):
 def _check_regime(kind, count, seed):
     random = np.random.default_rng([seed, REGIMES.index(kind)])
     for _ in range(count):
-        top, start = _random_top(kind, random)
+        top, start = random_top(kind, random)
         precise = PreciseForm(top, start, digits=50)
         excess = _excess(top, start, precise, _times(precise, random))
         assert (excess <= 1.0).all(), (top, start, excess)
@@ -245,7 +153,7 @@ def test_a_parameter_wrong_in_the_thirteenth_digit_is_seen(field):
 @pytest.mark.parametrize("kind", REGIMES)
 def test_theta_functions_and_elliptic_integrals_give_the_same_attitude(kind):
     random = np.random.default_rng([3, REGIMES.index(kind)])
-    top, start = _random_top(kind, random)
+    top, start = random_top(kind, random)
     form = PreciseForm(top, start, digits=50)
     for time in _times(form, random)[[1, 3, 4]]:
         gap = max(abs(x - y) for x, y in zip(form.quaternion(time), theta_quaternion(form, time), strict=True))
@@ -259,7 +167,7 @@ def test_theta_functions_and_elliptic_integrals_give_the_same_attitude(kind):
 @pytest.mark.parametrize("kind", REGIMES)
 def test_digits_are_right_in_every_regime(kind):
     random = np.random.default_rng([4, REGIMES.index(kind)])
-    top, start = _random_top(kind, random)
+    top, start = random_top(kind, random)
     time = float(random.uniform(0.0, 1e3))
     short, long = PreciseForm(top, start, digits=30)(time), PreciseForm(top, start, digits=90)(time)
     with mp.workdps(110):
@@ -272,7 +180,7 @@ def test_digits_are_right_in_every_regime(kind):
 @pytest.mark.parametrize("kind", ["generic", "fast", "grazes the top", "near the separatrix", "free", "hanging"])
 def test_motion_satisfies_the_equations_of_motion(kind):
     """Against five-point differences: step 1e-13, so that their own error is some 1e-52 times the fifth derivative."""
-    top, start = _random_top(kind, np.random.default_rng([5, REGIMES.index(kind)]))
+    top, start = random_top(kind, np.random.default_rng([5, REGIMES.index(kind)]))
     form, step, now = PreciseForm(top, start, digits=60), mp.mpf("1e-13"), mp.mpf("0.37")
     with mp.workdps(80):
         around = [form(now + k * step) for k in (-2, -1, 1, 2)]
@@ -325,7 +233,7 @@ def _integrate(top, start, times):
      "through the bottom", "flat body", "free", "hanging", "from the top", "asleep below", "nearly steady"],
 )  # fmt: skip
 def test_an_integration_of_the_attitude_ends_where_the_closed_form_says(kind):
-    top, start = _random_top(kind, np.random.default_rng([6, REGIMES.index(kind)]))
+    top, start = random_top(kind, np.random.default_rng([6, REGIMES.index(kind)]))
     times = np.linspace(0.1, 5.0, 21)
     form, states = ClosedForm(top, start), _integrate(top, start, times)
     reach = 1.0 + np.abs(states[:, 4:]).max()
@@ -484,7 +392,7 @@ def test_hanging_top_is_the_standing_one_upside_down():
 
 @pytest.mark.parametrize("kind", REGIMES)
 def test_views_of_one_motion_agree(kind):
-    top, start = _random_top(kind, np.random.default_rng([7, REGIMES.index(kind)]))
+    top, start = random_top(kind, np.random.default_rng([7, REGIMES.index(kind)]))
     form, times = ClosedForm(top, start), np.linspace(-3.0, 9.0, 401)
     motion, attitude, axis, momentum = form(times), form.quaternion(times), form.axis(times), form.momentum(times)
     grain = 4 * EPS * (1.0 + np.abs([motion.phi, motion.psi]).max())
@@ -503,7 +411,7 @@ def test_views_of_one_motion_agree(kind):
 
 def test_attitude_is_continuous_through_and_beside_the_poles():
     for kind in ("through the top", "through the bottom", "grazes the top", "plane pendulum", "generic"):
-        top, start = _random_top(kind, np.random.default_rng([8, REGIMES.index(kind)]))
+        top, start = random_top(kind, np.random.default_rng([8, REGIMES.index(kind)]))
         form, times = ClosedForm(top, start), np.linspace(0.0, 10.0, 20001)
         rate = np.linalg.norm(form.momentum(times), axis=-1).max() / min(top.I1, top.I3)
         for view in (form.quaternion(times), form.axis(times)):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import symtop
+from symtop.methods.calling import solve
 from symtop.methods.plan import Plan
-from symtop.methods.registry import solve
 from symtop.model.charts import CHARTS, DIMENSIONS
 from symtop.model.view import View, axis_of, space_momenta
 from symtop.run.reference import reference

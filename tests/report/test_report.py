@@ -8,7 +8,7 @@ import re
 import pytest
 import xarray as xr
 
-from symtop.report import page, style
+from symtop.report import markdown, page, style
 from symtop.runner import run as runner
 from symtop.runner.study import Case
 from tests.browser import Browser
@@ -116,3 +116,11 @@ def test_the_twin_names_every_figure(results):
     shown = re.findall(r"!\[[^]]+\]\((figures/[^)]+)\)", twin)
     assert len(shown) == len(list((results / "figures").iterdir()))
     assert all((results / file).is_file() for file in shown)
+
+
+def test_an_answer_links_to_the_studies_on_the_page_that_explain_it():
+    first = {"question": "Which?", "sentences": ["This one."], "table": {"header": ["a"], "rows": [["b"]]}}
+    study = {"opening": first | {"explained": {"drift": "where it drifts", "nowhere": "not shown"}}}
+    linked = markdown.opening(study, {"drift": "Drift and phase"})
+    assert linked.endswith("More: [where it drifts](#drift-and-phase).")
+    assert "More" not in markdown.opening(study, {}) + markdown.opening({"opening": first}, {"drift": "Drift"})

@@ -105,7 +105,7 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
     monkeypatch.setattr(longrun, "LONGEST", 200_000)
     from symtop.base import datasets
 
-    reached = datasets.read(file).attrs["steps_done"]
+    reached = datasets.read(file)["steps_done"].item()
     assert 10_000 <= reached < 12_000_000
     steps = 12_000_000
     seen = []
@@ -259,3 +259,27 @@ def test_the_command_runs_and_says_what_changed(tmp_path):
     assert output.is_file()
     bad = CliRunner().invoke(main, ["long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1"])
     assert bad.exit_code == 2
+
+
+def test_a_checkpoint_is_known_in_a_process_that_has_run_other_things():
+    script = """
+import symtop, sys
+from symtop.run import long_run
+scene, method = symtop.scene("spheroid"), symtop.integrator("midpoint")
+before = long_run._identity(scene, method, 0.01, 1000, True)
+if sys.argv[1] == "first":
+    print(before)
+symtop.simulate(scene, "strang", step_size=0.01, samples=3)
+symtop.reference(scene, [1.0])
+symtop.ensemble(symtop.population(40, seed=1), "midpoint", per_nutation=50, nutations=1, samples=3)
+if sys.argv[1] == "last":
+    print(long_run._identity(scene, method, 0.01, 1000, True))
+"""
+    environment = {**os.environ, "PYTHONPATH": _root()}
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", script, when], env=environment, capture_output=True, text=True, check=True
+        )
+        for when in ("first", "last")
+    ]
+    assert told[0].stdout == told[1].stdout != ""

@@ -50,7 +50,7 @@ def test_a_budget_is_no_failure_for_a_run_that_ends_within_it():
     assert symtop.simulate("spheroid", "taylor", budget=1e4).attrs["outcome"] == "ok"
     with pytest.raises(symtop.SymtopError, match="the limit is 700"):
         symtop.simulate("spheroid", "midpoint", step_size=0.01, budget=700)
-    assert symtop.simulate("spheroid", "midpoint", step_size=0.01, budget=800).attrs["outcome"] == "ok"
+    assert symtop.simulate("spheroid", "midpoint", step_size=0.01, budget=800, guard=False).attrs["outcome"] == "ok"
 
 
 @pytest.mark.parametrize("name", ["midpoint", "trapezoidal", "simpson-linear", "galerkin-simpson"])

@@ -6,14 +6,19 @@ import random
 import subprocess
 import sys
 import time
+import timeit
+import warnings
 
 import numpy as np
 import pytest
 from mpmath import mp, mpf, workdps
 
 import symtop
+from symtop.model import closed_form
 from symtop.model.precise_form import PreciseForm
-from symtop.run.reference import _cache_path, check_times, reference as reference_function
+from symtop.run.certificate import Certificate
+from symtop.run.reference import UNCERTIFIED, _cache_path, reference as reference_function
+from symtop.run.witnesses import check_times
 
 
 @pytest.fixture
@@ -114,24 +119,38 @@ def test_a_bound_that_is_too_small_would_be_seen():
     assert not np.all(errors[0] <= data["attitude_error_bound"].values / 1000.0)
 
 
-def test_a_disagreement_of_the_two_methods_raises_the_bound(monkeypatch):
-    """An integration that is 1e-9 off, and a closed form that an integration contradicts by 1e-6: both must show."""
+def test_an_integration_that_differs_from_the_closed_form_has_the_distance_as_its_bound(monkeypatch):
     module = sys.modules["symtop.run.reference"]
     where, times = symtop.scene("goldstein"), np.array([1.0, 2.0, 3.0])
-    honest = module._closed_values
+    honest = module.closed_values
 
     def off(scene, moments):
-        found = honest(scene, moments)
-        return {**found, "theta": found["theta"] + 1e-9}
+        values = honest(scene, moments)
+        return {**values, "theta": values["theta"] + 1e-9}
 
-    monkeypatch.setattr(module, "_closed_values", off)
-    assert np.all(module._compute(where, times, "longdouble")["theta_error_bound"] >= 0.99e-9)
-    monkeypatch.setattr(module, "_closed_values", honest)
-    assert np.all(module._compute(where, times, "longdouble")["theta_error_bound"] < 1e-15)
-    checks = module._closed_checks(where, 3.0)[0]
-    monkeypatch.setattr(module, "_closed_checks", lambda *_: (checks, 1e-6))
-    for name in ("axis", "attitude", "theta", "phi", "psi"):
-        assert np.all(module._compute(where, times, "closed-form")[f"{name}_error_bound"] >= 1e-6)
+    monkeypatch.setattr(module, "closed_values", off)
+    assert np.all(module._integration(where, times, "longdouble")["theta_error_bound"] >= 0.99e-9)
+    monkeypatch.setattr(module, "closed_values", honest)
+    assert np.all(module._integration(where, times, "longdouble")["theta_error_bound"] < 1e-15)
+
+
+def test_a_certificate_that_contradicts_the_bounds_raises_them(monkeypatch, cache):
+    """One of a witness that is 1e-6 away, one of an error three times its bound, and one that finds nothing."""
+    module, times = sys.modules["symtop.run.reference"], [1.0, 2.0, 3.0]
+    quantities = ("axis", "attitude", "theta", "phi", "psi")
+    plain = symtop.reference("goldstein", times)
+    for found, floor, factor in (
+        (Certificate(1e6, 30, 0.3, 100.0, 0.0, 1e-6), 1e-6, 1.0),
+        (Certificate(1e6, 30, 0.3, 100.0, 1e-6, math.nan), 1e-6, 1.0),
+        (Certificate(1e6, 30, 3.0, math.nan, math.nan, math.nan), 0.0, 24.0),
+        (Certificate(1e6, 30, 0.9, 100.0, 1e-15, 1e-15), 0.0, 1.0),
+    ):
+        monkeypatch.setattr(module, "certificate", lambda *_, found=found: found)
+        data = symtop.reference("goldstein", times)
+        for name in quantities:
+            expected = factor * plain[f"{name}_error_bound"].values + floor
+            np.testing.assert_allclose(data[f"{name}_error_bound"], expected, rtol=1e-12)
+        assert data.attrs["certificate"] == str(found)
 
 
 @pytest.mark.parametrize("name", ["spheroid_ieee", "goldstein_at_rest_ieee"])
@@ -158,18 +177,41 @@ def test_the_published_grazing_benchmark_agrees_between_both_methods():
 
 def test_published_displacement_of_the_grazing_benchmark():
     """Displacement of the centre of mass at t = 1, to the digits that public codes print (h = 2e-6)."""
-    data = symtop.reference("bruls-cardona-arnold", [1.0])
+    data = symtop.reference("bruls-cardona-arnold", [1.0], "longdouble")
     moved = data["axis"].values[0] - np.array([0.0, 1.0, 0.0])
     assert moved == pytest.approx([0.17334, -0.35991, -0.74849], abs=6e-6)
 
 
-def test_first_call_is_quick_and_the_second_quicker(cache):
+def test_a_long_reference_takes_milliseconds_and_states_what_it_rests_on(cache):
+    """1001 times up to 1e5 took half a minute by integration; the certificate is made once and told afterwards."""
+    closed_form.compile_now()
+    times = np.linspace(0.0, 1e5, 1001)
+    plain = symtop.reference("spheroid", times)
+    seconds = min(timeit.repeat(lambda: symtop.reference("spheroid", times), number=1, repeat=7))
+    assert seconds < 0.01
+    assert plain.attrs["precision"] == "closed-form"
+    assert plain.attrs["certificate"] == UNCERTIFIED
+    assert plain.attrs["arithmetic"] == "constants in double-double, values in double"
+    assert not list(cache.glob("reference/*.nc"))
+    assert float(plain["theta_error_bound"].max()) < 3e-15
+    certified = symtop.reference("spheroid", times, certify="integration")
+    assert certified.attrs["certificate"].startswith("40 digits at 32 times up to t = 1.18e+06")
+    assert "long double integration up to t = 118" in certified.attrs["certificate"]
+    assert len(list(cache.glob("reference/*.nc"))) == 1
+    told = symtop.reference("spheroid", times)
+    assert told.identical(certified)
+    assert told.equals(plain)
+    seconds = min(timeit.repeat(lambda: symtop.reference("spheroid", times), number=1, repeat=7))
+    assert seconds < 0.01
+
+
+def test_an_integration_is_kept_and_its_second_call_is_quicker(cache):
     times = np.linspace(0.0, 1000.0, 1001)
-    symtop.reference("goldstein", [1.0])  # imports and the build of the integrator
+    symtop.reference("goldstein", [1.0], "longdouble")  # imports and the build of the integrator
     start = time.perf_counter()
-    first = symtop.reference("spheroid", times)
+    first = symtop.reference("spheroid", times, "longdouble")
     middle = time.perf_counter()
-    second = symtop.reference("spheroid", times)
+    second = symtop.reference("spheroid", times, "longdouble")
     end = time.perf_counter()
     assert middle - start < 1.5
     assert end - middle < 0.2 * (middle - start)
@@ -182,7 +224,7 @@ def test_a_damaged_cache_file_is_noticed_said_and_computed_again(cache, damage):
     import xarray as xr
 
     times = np.linspace(0.0, 5.0, 21)
-    good = symtop.reference("spheroid", times)
+    good = symtop.reference("spheroid", times, "longdouble")
     path = _cache_path(symtop.scene("spheroid"), times, "longdouble")
     content = path.read_bytes()
     if damage == "one value changed":
@@ -200,9 +242,9 @@ def test_a_damaged_cache_file_is_noticed_said_and_computed_again(cache, damage):
             }[damage]
         )
     with pytest.warns(symtop.SymtopWarning, match="is damaged and is computed again"):
-        again = symtop.reference("spheroid", times)
+        again = symtop.reference("spheroid", times, "longdouble")
     assert again.equals(good)
-    assert symtop.reference("spheroid", times).equals(good)  # and mended on disk, in silence
+    assert symtop.reference("spheroid", times, "longdouble").equals(good)  # and mended on disk, in silence
 
 
 CALL = """
@@ -212,7 +254,7 @@ import symtop
 from pathlib import Path
 if len(sys.argv) > 1:
     Path.replace = lambda *_: os.kill(os.getpid(), 9)  # dies with the new file written and not yet in its place
-data = symtop.reference("spheroid", np.linspace(0.0, 5.0, 21))
+data = symtop.reference("spheroid", np.linspace(0.0, 5.0, 21), "longdouble")
 print(repr(float(data["theta"][-1])))
 """
 
@@ -232,7 +274,7 @@ def test_a_process_killed_while_it_writes_the_cache_harms_nobody(cache):
     after = call(cache)
     shown = after.communicate(timeout=120)[0]
     assert after.returncode == 0
-    assert float(shown) == float(symtop.reference("spheroid", np.linspace(0.0, 5.0, 21))["theta"][-1])
+    assert float(shown) == float(symtop.reference("spheroid", np.linspace(0.0, 5.0, 21), "longdouble")["theta"][-1])
 
 
 def test_several_processes_share_a_cache(cache):
@@ -249,45 +291,32 @@ def test_a_cache_that_cannot_be_written_costs_time_and_nothing_else(tmp_path, mo
     blocked.write_text("in the way")
     monkeypatch.setenv("SYMTOP_CACHE", str(blocked))
     with pytest.warns(symtop.SymtopWarning, match="is not kept"):
-        data = symtop.reference("spheroid", [0.5, 2.0])
+        data = symtop.reference("spheroid", [0.5, 2.0], "longdouble")
     assert np.isfinite(data["theta"]).all()
 
 
-def test_any_order_and_repeated_times_come_back_as_asked():
-    data = symtop.reference("spheroid", [3.0, 0.0, 3.0, 1.0])
+@pytest.mark.parametrize("precision", ["closed-form", "longdouble"])
+def test_any_order_and_repeated_times_come_back_as_asked(precision):
+    data = symtop.reference("spheroid", [3.0, 0.0, 3.0, 1.0], precision)
     assert list(data["time"].values) == [3.0, 0.0, 3.0, 1.0]
     assert data["theta"].values[0] == data["theta"].values[2]
     assert data["theta"].values[1] == pytest.approx(0.4, abs=1e-16)
 
 
-def test_without_heyoka_the_closed_form_stands_alone_and_says_so(monkeypatch, cache):
+def test_without_heyoka_the_closed_form_stands_in_and_says_so(monkeypatch, cache):
     monkeypatch.setitem(sys.modules, "heyoka", None)
-    with pytest.warns(symtop.SymtopWarning, match="heyoka is not installed"):
-        data = symtop.reference("spheroid", [1.0, 2.0, 7.77])
+    with pytest.warns(symtop.SymtopWarning, match="heyoka is not installed: the closed form in double stands in for"):
+        data = symtop.reference("spheroid", [1.0, 2.0, 7.77], "longdouble")
     assert data.attrs["precision"] == "closed-form"
     assert data.attrs["asked_for"] == "longdouble"
     assert np.all(data["theta_error_bound"] < 1e-13)
-
-
-def test_a_certificate_is_kept_and_one_made_without_heyoka_is_not_taken_for_one_with_it(monkeypatch, cache):
-    module = sys.modules["symtop.run.reference"]
-
-    def overlap():
-        module._closed_checks.cache_clear()  # as in a new process
-        data = symtop.reference("goldstein", [1.0, 2.5], precision="closed-form")
-        return data.attrs["overlap_with_integration"], data["theta_error_bound"].values
-
-    with monkeypatch.context() as hidden:
-        hidden.setitem(sys.modules, "heyoka", None)
-        assert np.isnan(overlap()[0])
-    made, bound = overlap()
-    assert 0.0 <= made < 1e-12
-    with monkeypatch.context() as lazy:
-        lazy.setattr(module, "_checked", None)  # it is not called again
-        kept, same = overlap()
-    assert kept == made
-    assert np.array_equal(same, bound)
-    module._closed_checks.cache_clear()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        symtop.reference("spheroid", [1.0])
+    with pytest.warns(symtop.SymtopWarning, match="is certified without an integration"):
+        data = symtop.reference("spheroid", [1.0], certify="integration")
+    assert "40 digits" in data.attrs["certificate"]
+    assert "integration" not in data.attrs["certificate"]
 
 
 def test_checks_reach_the_horizon_and_the_fastest_moments():
@@ -307,9 +336,12 @@ def test_checks_reach_the_horizon_and_the_fastest_moments():
         (("spheroid", [1.0, math.inf]), "finite"),
         (("spheroid", [[1.0]]), "times must be a row"),
         (("spheroid", [1.0], "octuple"), "precision 'octuple' is unknown"),
+        (("spheroid", [1.0], "closed-form", "twice"), "certify 'twice' is unknown"),
+        (("spheroid", [1.0], "quad", "digits"), "certify is for the closed form"),
         (("nowhere", [1.0]), "scene 'nowhere' is unknown"),
     ],
 )
 def test_bad_requests_are_refused_in_one_sentence(arguments, says):
+    certify = dict(zip(["certify"], arguments[3:], strict=False))
     with pytest.raises(symtop.SymtopError, match=says):
-        reference_function(*arguments)
+        reference_function(*arguments[:3], **certify)

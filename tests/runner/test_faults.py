@@ -14,7 +14,6 @@ from pathlib import Path
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from numba.core.caching import IndexDataCacheFile
 
 from symtop.base import compiled, datasets
 from symtop.base.validate import SymtopError
@@ -109,7 +108,7 @@ def test_a_full_disk_under_the_cache_of_kernels_costs_time_and_no_run(kernel, tm
     def full(*arguments):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(IndexDataCacheFile, "_save_data", full)
+    monkeypatch.setattr(compiled._Index, "_save_data", full)
     assert kernel()(2.0) == 4.0
     assert not list(tmp_path.rglob("*.nbc"))
     monkeypatch.undo()

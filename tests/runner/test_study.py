@@ -106,7 +106,7 @@ def pretend_edited(patch, path):
     """Let one file have another hash."""
     real = fingerprint.file_hash
     patch.setattr(fingerprint, "file_hash", lambda file: real(file) + ("edited" if file == path else ""))
-    depends._hashes.cache_clear()
+    depends.hashes.cache_clear()
 
 
 def stale_after(edited: str, study) -> set[str]:
@@ -118,7 +118,7 @@ def stale_after(edited: str, study) -> set[str]:
     with pytest.MonkeyPatch.context() as patch:
         pretend_edited(patch, path)
         after = [depends.digest(study, case) for case in cases]
-    depends._hashes.cache_clear()
+    depends.hashes.cache_clear()
     assert before == [depends.digest(study, case) for case in cases]
     return {case.integrator for case, one, two in zip(cases, before, after, strict=True) if one != two}
 
@@ -130,6 +130,7 @@ def of_everyone():
 
 
 GAUSS = {f"gauss-{order}" for order in (2, 4, 6, 8, 10, 12)}
+COLLECTIVE = {f"collective-gauss-{order}" for order in (2, 4, 6)}
 SCIPY = {"rk45", "dop853", "lsoda", "radau"}
 SPLITTING = {name for name, method in symtop.integrators().items() if method.family == "splitting"}
 STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "trapezoidal-unreduced"}
@@ -138,7 +139,7 @@ STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "
 @pytest.mark.parametrize(
     ("edited", "stale"),
     [
-        ("methods/gauss.py", GAUSS),
+        ("methods/gauss.py", GAUSS | COLLECTIVE),
         ("methods/galerkin.py", {"galerkin-simpson"}),
         ("methods/unreduced.py", {"midpoint-unreduced", "trapezoidal-unreduced"}),
         ("methods/discrete_lagrangian.py", STRAIGHT),
@@ -172,7 +173,7 @@ def test_findings_are_made_again_when_what_judges_them_is_edited(edited, again, 
     pretend_edited(monkeypatch, PACKAGE / edited)
     after = runner._stamp(study, ["case"], style.save)
     monkeypatch.undo()
-    depends._hashes.cache_clear()
+    depends.hashes.cache_clear()
     assert (after != before) is again
 
 
@@ -277,7 +278,7 @@ def test_a_users_package_is_drawn_again_when_what_stands_beside_its_script_is_ed
         pretend_edited(monkeypatch, folder / name)
         after = made()
         monkeypatch.undo()
-        depends._hashes.cache_clear()
+        depends.hashes.cache_clear()
         assert (after[0] != before[0]) is measured_again, name
         assert after[1] != before[1], name
     assert made() == before
@@ -424,7 +425,9 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
         found = runner.run(small, tmp_path, quick=True, quiet=True)
     finally:
         registry._registry.pop("unlucky")
-    assert found["failures"] == ["unlucky[angles] on goldstein failed: RuntimeError: no luck"]
+    assert found["failures"] == [
+        "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
+    ]
     assert list(datasets.read(tmp_path / "stability.nc")["integrator"].values) == ["midpoint[angles]"]
     assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten
 

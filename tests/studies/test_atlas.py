@@ -6,15 +6,15 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.stability import atlas, atlas_figures, atlas_words, words
-from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row, row_plan, spin_unit, with_spin
+from symtop_studies.stability import atlas, atlas_figures, atlas_words, outcome_maps, words
+from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row_plan, spin_unit, with_spin
 from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
 
 import symtop
 from symtop.base import datasets
 from symtop.measure.errors import errors_against
 from symtop.measure.verdicts import JUDGED, VERDICTS, verdict
-from symtop.methods.registry import integrator, integrators
+from symtop.methods.registry import integrator, methods
 from symtop.model.scenes import closed_form, scene
 from symtop.report.style import OUTCOME_COLORS
 from symtop.run.reference import reference
@@ -49,6 +49,36 @@ def test_a_map_says_what_single_runs_say(name):
                 assert runs.axis_error[place, column] >= 0.3 * error.max()
 
 
+@pytest.mark.parametrize("name", ["strang", "stormer-verlet", "midpoint"])
+def test_columns_that_are_run_together_have_the_bits_of_runs_one_by_one(name, monkeypatch):
+    """Runs of few steps, which show every step, and runs that fail among them."""
+    method, spins, steps = integrator(name), np.geomspace(0.1, 30.0, 7).tolist(), [*STEPS, 2.0]
+    plan, tops = row_plan(method, steps, 2.0), [family("cusp")(spin) for spin in spins]
+    whole, chart = outcome_map("cusp", spins, method, steps, 2.0), method.chart_for("axis")
+    alone = [outcome_maps.one_by_one(plan, chart, scene_) for scene_ in tops]
+    for columns in outcome_maps.columns_together(plan, len(tops)):
+        made = outcome_maps.together(plan, method.solvers[chart], columns, tops)
+        for one, part in zip(alone, zip(made.states, made.momenta, made.outcome, strict=True), strict=True):
+            for values, others in zip(one, part, strict=True):
+                seen = values[0, columns][:, : made.states.shape[2]] if others.ndim > 1 else values[0, columns]
+                np.testing.assert_array_equal(seen, others)
+    monkeypatch.setattr(outcome_maps, "MOST", plan.phases.size)  # other columns together
+    assert len(list(outcome_maps.columns_together(plan, len(tops)))) == len(steps)
+    for values, others in zip(whole, outcome_map("cusp", spins, method, steps, 2.0), strict=True):
+        np.testing.assert_array_equal(values, others)
+
+
+def test_errors_are_followed_where_they_are_asked_for():
+    """A column that is not followed has the same verdicts, and an error that is too large where the run is wrong."""
+    spins, method = [0.3, 1.0, 8.0], integrator("strang")
+    whole, one = (outcome_map("cusp", spins, method, STEPS, 12.0, followed) for followed in (None, [3]))
+    np.testing.assert_array_equal(whole.verdict, one.verdict)
+    np.testing.assert_array_equal(whole.axis_error[:, 3], one.axis_error[:, 3])
+    np.testing.assert_array_equal(whole.axis_error[whole.verdict == 0], one.axis_error[whole.verdict == 0])
+    assert (one.axis_error <= whole.axis_error).all()
+    assert (one.axis_error < whole.axis_error).any()
+
+
 def test_adaptive_methods_are_mapped_over_their_tolerance():
     runs = outcome_map("cusp", [1.0], integrator("rk45-compiled"), [1e-10, 1e-6, 0.3], 12.0)
     assert [VERDICTS[k] for k in runs.verdict[0][:2]] == ["accurate", "accurate"]
@@ -64,7 +94,7 @@ def test_rows_share_phases_and_are_not_commensurate_with_the_nutation():
     assert np.isnan(runs.phases[2]).sum() == 49 - 7
     phases = np.sort(np.mod(runs.phases[0], 1.0))
     assert np.max(np.diff(phases)) < 0.125
-    row(runs, family("cusp")(2.0))
+    assert [piece.stop - piece.start for piece in outcome_maps.columns_together(runs, 1)] == [2, 1]
 
 
 def test_the_families_are_what_they_say():
@@ -262,12 +292,14 @@ def test_words_of_mechanisms_come_only_from_what_is_there():
 
 def test_the_full_grid_is_as_large_as_promised():
     cases = [case for case in runner.load("stability").cases(False) if case.scene == "cusp"]
-    assert {integrator(case.integrator).method for case in cases} >= set(integrators())
+    assert {integrator(case.integrator).method for case in cases} >= set(methods())
     assert {"rk4[angles]", "rk4[axis]"} <= {case.integrator for case in cases}
     full = [case for case in cases if integrator(case.integrator).control == "step_size"]
     for case in full:
         assert len(case.settings["ladder"]) >= 200
         assert len(case.settings["parameters"]) >= 120
+        if case.integrator == "strang[axis]":  # in lanes
+            assert len(case.settings["ladder"]) * len(case.settings["parameters"]) >= 6 * 24_000
 
 
 def test_every_named_column_is_written_and_every_variable_has_a_name():

@@ -12,12 +12,14 @@ from symtop_studies.stability.failures import sampled_energy_error, separatrix_h
 from symtop_studies.stability.solver_tolerance import solver_sweep, textbook_midpoint
 
 import symtop
+from symtop.methods.calling import solve
 from symtop.methods.discrete_lagrangian import rule_of
 from symtop.methods.plan import Plan
-from symtop.methods.registry import integrator, integrators, solve
+from symtop.methods.registry import integrator, methods
 from symtop.model import charts, scenes
+from symtop.model.effective import effective_force
 from symtop.model.scenes import Scene, closed_form, grazing, sleeping
-from symtop.model.top import Angles, SymmetricTop, effective_force
+from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import View, axis_of
 from symtop.run.linear_stability import (
     few_steps,
@@ -439,13 +441,12 @@ def test_simulate_does_not_sample_commensurately():
 
 def test_every_fixed_step_method_shows_its_trace():
     """Consistency: at small steps each turns by h omega, in whatever chart it works."""
-    h = 0.02 / OMEGA
-    for name, method in integrators().items():
-        if method.control == "step_size":
-            measured = trace(method, STEADY, h)
-            assert math.acos(measured.trace / (2.0 * math.sqrt(measured.determinant))) == pytest.approx(
-                0.02, rel=2e-3
-            ), name
+    turn = 0.03  # more, and the error of rkmk-se3-2 shows, which grows with the spin; less, and that of the differences
+    for name, method in methods().items():
+        if method.control == "step_size" and name != "generalised-alpha":  # accelerations are a second state of it
+            measured = trace(method, STEADY, turn / OMEGA)
+            turned = math.acos(measured.trace / (2.0 * math.sqrt(measured.determinant)))
+            assert turned == pytest.approx(turn, rel=2e-3), name
 
 
 def test_few_steps_energies_are_the_scenes():

@@ -12,13 +12,13 @@ import pytest
 import xarray as xr
 
 from symtop.base import datasets
-from symtop.methods.registry import integrators, split_name
+from symtop.methods.registry import integrators, methods, split_name
 from symtop.model.scenes import scenes
 from symtop.runner.grid import grid_rows
 
 STUDIES = (
-    "truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction", "claims", "notebook",
-    "oscillators",
+    "population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction", "claims",
+    "notebook", "oscillators", "engines",
 )  # fmt: skip
 MUST_SAY = {
     "a step or a tolerance": r"\bsteps?\b|\btolerances?\b",
@@ -89,7 +89,7 @@ def test_a_name_that_leaves_the_chart_open_is_found(names, found):
 
 def test_the_rows_of_a_grid_are_every_method_and_no_chart_that_repeats_another():
     rows = [row.name for row in grid_rows("nutation")]
-    assert {split_name(name)[0] for name in rows} == set(integrators())
+    assert {split_name(name)[0] for name in rows} == set(methods())
     assert {"rk4[angles]", "rk4[axis]", "strang[axis]", "exact[attitude]"} <= set(rows)
     assert "strang[attitude]" not in rows
     assert "strang[attitude]" in [row.name for row in grid_rows("nutation", attitude=True)]

@@ -3,7 +3,8 @@
 Six equations on (e, L); PIDController with rtol = atol = the tolerance and no other change; samples by dense output.
 Compiled once for each solver and number of samples, outside of what is timed; tolerance and top are arguments. The
 public call hands over NumPy arrays; the inner loop has arrays that JAX holds and asks for the last state alone. A
-call starts with tens of microseconds of dispatch; diffrax is made for many tops at once (vmap), which is not asked.
+call starts with tens of microseconds of dispatch; diffrax is made for many tops at once (vmap), of which
+`benchmarks.peers.together` asks.
 """
 
 from typing import Any
@@ -22,7 +23,7 @@ MOST_STEPS = 2_000_000
 SOLVERS = {"Tsit5": (5, 7), "Dopri5": (5, 7), "Dopri8": (8, 14)}  # order, stages
 
 
-def _compiled(diffrax: Any, jax: Any, method: Any, *, sampled: bool) -> Any:
+def _solve(diffrax: Any, jax: Any, method: Any, *, sampled: bool) -> Any:
     jnp = jax.numpy
 
     def field(_: Any, y: Any, par: Any) -> Any:
@@ -49,7 +50,17 @@ def _compiled(diffrax: Any, jax: Any, method: Any, *, sampled: bool) -> Any:
         )
         return solution.ys, solution.stats["num_steps"]
 
-    return jax.jit(run)
+    return run
+
+
+def many_tops(name: str) -> Any:
+    """A pair under vmap, compiled: ``(states, times, (1/I1, mgl), tolerance)`` to last states and steps of each top."""
+    import diffrax
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    run = _solve(diffrax, jax, getattr(diffrax, name)(), sampled=False)
+    return jax.jit(jax.vmap(run, in_axes=(0, None, 0, None)))
 
 
 class Diffrax(Library):
@@ -58,8 +69,8 @@ class Diffrax(Library):
     def __init__(self, diffrax: Any, jax: Any, name: str, stages: int) -> None:
         method = getattr(diffrax, name)()
         self.jax, self.stages = jax, stages
-        self.sampled = _compiled(diffrax, jax, method, sampled=True)
-        self.bare = _compiled(diffrax, jax, method, sampled=False)
+        self.sampled = jax.jit(_solve(diffrax, jax, method, sampled=True))
+        self.bare = jax.jit(_solve(diffrax, jax, method, sampled=False))
 
     def public(self, top: SymmetricTop, start: Angles, plan: Plan) -> Motion:
         """One jitted call with the sample times."""

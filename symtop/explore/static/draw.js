@@ -95,7 +95,30 @@ export class Sphere {
     this.path(run.attitude, place, run.color, 1.4, [], run.trail);
     this.rods(attitudeAt(run.truth, place), true);
     const now = attitudeAt(run.attitude, place);
-    if (now.every(Number.isFinite)) this.rods(now, false);
+    if (!now.every(Number.isFinite)) return;
+    this.body(now, run.width, run.color);
+    this.rods(now, false);
+  }
+
+  // The top as a cone on its point, as wide as its inertia says; every third sector is darker, so that it is seen to spin.
+  body(attitude, width, color) {
+    const [first, second, third] = bodyAxes(...attitude);
+    const rim = Array.from({ length: 25 }, (_, k) => {
+      const [c, s] = [width * Math.cos((k * Math.PI) / 12), width * Math.sin((k * Math.PI) / 12)];
+      return [0, 1, 2].map((i) => 0.72 * third[i] + c * first[i] + s * second[i]);
+    });
+    const { context } = this;
+    context.fillStyle = color;
+    rim.slice(1).forEach((point, k) => {
+      for (const tip of [[0, 0, 0], third.map((value) => 0.78 * value)]) {
+        context.globalAlpha = k % 6 < 2 ? 0.3 : 0.12;
+        context.beginPath();
+        [tip, rim[k], point].forEach((corner, n) => { const [x, y] = this.at(corner); if (n) context.lineTo(x, y); else context.moveTo(x, y); });
+        context.fill();
+      }
+    });
+    context.globalAlpha = 1;
+    this.line(rim, color, 1.2, 0.8, false);
   }
 
   line(points, color, width, alpha, closed) {

@@ -3,11 +3,11 @@
 import { Sphere, plot } from "./draw.js";
 
 const $ = (id) => document.getElementById(id);
-// name, label, least, most of the slider, logarithmic
-const TOP = [["I1", "I1", 0.01, 20, true], ["I3", "I3", 0.01, 20, true], ["mgl", "mgl", -40, 160, false]];
+// name, label with its unit, least, most of the slider, logarithmic; a rate's slider spans twice the scene's own value
+const TOP = [["I1", "I1 (kg m²)", 0.01, 20, true], ["I3", "I3 (kg m²)", 0.01, 20, true], ["mgl", "mgl (N m)", -40, 160, false]];
 const START = [
-  ["theta", "theta", 0.01, 3.13, false], ["phi", "phi", -3.1416, 3.1416, false], ["psi", "psi", -3.1416, 3.1416, false],
-  ["theta_dot", "theta'", -5, 5, false], ["phi_dot", "phi'", -15, 15, false], ["psi_dot", "psi'", -160, 160, false],
+  ["theta", "theta (rad)", 0.01, 3.13, false], ["phi", "phi (rad)", -3.1416, 3.1416, false], ["psi", "psi (rad)", -3.1416, 3.1416, false],
+  ["theta_dot", "theta' (rad/s)", -2, 2, false], ["phi_dot", "phi' (rad/s)", -5, 5, false], ["psi_dot", "psi' (rad/s)", -10, 10, false],
 ];
 const SETTINGS = [["step_size", "step (s)", 1e-5, 1, true], ["tolerance", "tolerance", 1e-13, 1e-2, true], ["horizon", "time (s)", 0.5, 500, true]];
 const PLOTS = ["axis_error", "energy", "p_phi", "p_psi"];
@@ -34,9 +34,19 @@ function control([name, label, least, most, logarithmic], group) {
   row.append(words, slider, number);
   $(group).append(row);
   const show = (value) => { number.value = +value.toPrecision(6); slider.value = forth(value); };
-  slider.addEventListener("input", () => { values[name] = +back(+slider.value).toPrecision(6); number.value = values[name]; ask(); });
-  number.addEventListener("change", () => { values[name] = number.value === "" ? null : +number.value; slider.value = forth(values[name]); ask(); });
-  rows[name] = { row, set: (value) => { values[name] = value; show(value); } };
+  slider.addEventListener("input", () => { values[name] = +back(+slider.value).toPrecision(6); number.value = values[name]; edited(group); ask(); });
+  number.addEventListener("change", () => { values[name] = number.value === "" ? null : +number.value; slider.value = forth(values[name]); edited(group); ask(); });
+  const span = (value) => { if (name.endsWith("_dot")) Object.assign(slider, { min: Math.min(least, -2 * Math.abs(value)), max: Math.max(most, 2 * Math.abs(value)) }); };
+  rows[name] = { row, set: (value) => { values[name] = value; span(value); show(value); } };
+}
+
+// A top or a start that was changed is no longer the scene's, and the page and the run say so.
+function edited(group) {
+  if (group === "settings") return;
+  const option = $("scene").selectedOptions[0];
+  option.text = `${option.value} (edited)`;
+  values.scene = `${option.value}-edited`;
+  $("reset").disabled = false;
 }
 
 function chosen() {
@@ -46,6 +56,9 @@ function chosen() {
 function chooseScene(name) {
   const entry = catalogue.scenes.find((scene) => scene.name === name);
   $("purpose").textContent = entry.purpose;
+  for (const option of $("scene").options) option.text = option.value;
+  values.scene = name;
+  $("reset").disabled = true;
   for (const [key] of [...TOP, ...START]) rows[key].set(entry[key]);
   rows.horizon.set(entry.horizon);
   rows.step_size.set(+((entry.period || entry.horizon) / 60).toPrecision(2));
@@ -105,6 +118,7 @@ function show(answer, began) {
   const before = run && run.time.length > 1 ? place / (run.time.length - 1) : 0;
   run = Object.fromEntries(Object.entries(answer.arrays).map(([name, text]) => [name, unpack(text)]));
   run.color = chosen().color;
+  run.width = Math.min(0.6, 0.42 * Math.sqrt(values.I3 / values.I1));
   const last = run.time.length - 1;
   run.trail = answer.period ? Math.ceil((8 * answer.period * last) / run.time[last]) : last;
   run.trueTheta = Array.from({ length: last + 1 }, (_, k) => {
@@ -181,6 +195,7 @@ async function begin() {
     $("integrator").append(group);
   }
   $("scene").addEventListener("change", () => chooseScene($("scene").value));
+  $("reset").addEventListener("click", () => chooseScene($("scene").value));
   $("integrator").addEventListener("change", () => chooseIntegrator($("integrator").value));
   $("clock").addEventListener("input", () => { place = $("clock").value * (run ? run.time.length - 1 : 0); playing = false; $("play").textContent = "Play"; drawPlots(); });
   $("play").addEventListener("click", () => { playing = !playing; $("play").textContent = playing ? "Pause" : "Play"; });

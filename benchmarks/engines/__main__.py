@@ -1,0 +1,42 @@
+"""Run all engines that are installed against their maps: results/live-engines.json.
+
+make engines        (makes benchmarks/engines/.venv and a second one with the last MuJoCo 3 once)
+"""
+
+import argparse
+from pathlib import Path
+
+from benchmarks.engines import ADAPTERS, load
+from benchmarks.engines.measure import row
+from benchmarks.engines.study import NAME, findings
+from benchmarks.measured import circumstances, sentence
+from symtop.runner import store
+
+
+def main() -> None:
+    """Measure, print and write down."""
+    parser = argparse.ArgumentParser(description="physics engines against their maps")
+    parser.add_argument("--results", type=Path, default=Path("results"))
+    parser.add_argument("--only", nargs="+", default=list(ADAPTERS), help="these engines")
+    parser.add_argument("--add", action="store_true", help="to what is stored, in place of the same versions")
+    options = parser.parse_args()
+    file = options.results / f"{NAME}.json"
+    settings, missing = load(tuple(options.only))
+    facts, rows = circumstances(), [row(setting) for setting in settings]
+    if options.add and (stored := store.read_json(file)):
+        anew = {(made["engine"], made["version"]) for made in rows}
+        rows = [made for made in stored["rows"] if (made["engine"], made["version"]) not in anew] + rows
+        missing = [*stored["missing"], *missing]
+    versions: dict[str, list[str]] = {}
+    for made in rows:
+        known = versions.setdefault(made["engine"], [])
+        known += [made["version"]] if made["version"] not in known else []
+    measured = sentence(facts, "make engines", {engine: " and ".join(known) for engine, known in versions.items()})
+    said = findings(rows, missing, measured)
+    store.write_json(file, said)
+    for line in (*said["verdict"], *said["failures"]):
+        print(line)
+
+
+if __name__ == "__main__":
+    main()

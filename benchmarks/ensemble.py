@@ -1,0 +1,140 @@
+"""Many tops in one call of `symtop.ensemble` against as many calls of `simulate`, and what the call is made of.
+
+python -m benchmarks.ensemble
+
+Both make the same runs of the same tops, to the same bits. Calls of `simulate` are timed on `ALONE` tops from all over
+the population, without its guard, which an ensemble does not have, and with it, as a user calls it. Rounds of all of
+them alternate, and the best of each counts.
+
+The setting is what an error of 1e-3 takes: 100 steps a nutation period in the median of the population. It bounds what
+an ensemble can be worth: a step of strang[axis] is 152 sums and products, 76 cycles for eight tops on a processor that
+begins two vector operations a cycle, and no way of calling it makes it less. `verdict` says how often the steps alone,
+on all cores, go into the time of `simulate`.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import symtop
+from symtop.base.threads import cores
+from symtop.methods.fixed_step import FixedStep
+from symtop.methods.many import members_of
+from symtop.run import members as reading
+from symtop.run.pieces import Job
+from symtop.run.schedule import nutation_periods, schedule
+
+METHOD, CHART, PER_NUTATION, NUTATIONS, SAMPLES = "strang", "axis", 100, 10, 11
+MEMBERS, ALONE, ROUNDS = 10_000, 300, 9
+SHOWN = ("axis", "energy")
+WHOLE = "`ensemble`, axis and energy"
+STEPS_ALONE, CALLER = "of it: the steps, without starts and samples", "of it: in the calling thread"
+
+
+class Item(NamedTuple):
+    """One part of an ensemble, or a way of making its runs."""
+
+    name: str
+    seconds: float  # for each member
+    ratio: float  # how many times faster than `simulate` with its guard
+
+
+def measure() -> list[Item]:
+    """Times a member of `simulate`, of the whole call, and of its parts on one thread."""
+    tops = symtop.population(MEMBERS, seed=1)
+    numbers = reading.read_members(tops).numbers
+    row = symtop.integrator(METHOD).row(CHART)
+    period = nutation_periods(numbers)
+    horizon, steps = NUTATIONS * period, np.full(MEMBERS, NUTATIONS * PER_NUTATION)
+    plan, solver = schedule(period, horizon, SAMPLES, steps), row.solvers[CHART]
+    assert isinstance(solver, FixedStep)
+    asked: dict[str, Any] = {"per_nutation": PER_NUTATION, "nutations": NUTATIONS, "samples": SAMPLES, "quiet": True}
+
+    def one_by_one(*, guard: bool) -> Callable[[], None]:
+        chosen = np.linspace(0, MEMBERS - 1, ALONE).astype(int)
+        scenes = [
+            symtop.Scene("one", top, start, float(end))
+            for (top, start), end in zip(members_of(numbers[chosen]), horizon[chosen], strict=True)
+        ]
+
+        def run() -> None:
+            for scene in scenes:
+                warned = (lambda _: None) if guard else False
+                symtop.simulate(
+                    scene, row, step_size=scene.horizon / (NUTATIONS * PER_NUTATION), samples=SAMPLES, guard=warned
+                )
+
+        return run
+
+    def stepped(times: int) -> Callable[[], object]:
+        """So many times the steps, and the last state alone."""
+        return lambda: solver.many(numbers, plan.step_size, times * plan.marks[:, -1:])
+
+    def whole(threads: int, shown: tuple[str, ...] | None) -> Callable[[], object]:
+        return lambda: symtop.ensemble(tops, row, threads=threads, variables=shown, **asked)
+
+    shown, angles = (
+        Job(row, CHART, numbers, horizon, steps, None, SAMPLES, None, names) for names in (SHOWN, ("phi",))
+    )
+    done = shown._runs(plan)
+    calls: dict[str, tuple[Callable[[], object], int]] = {
+        "`simulate`": (one_by_one(guard=True), ALONE),
+        "`simulate` without its guard": (one_by_one(guard=False), ALONE),
+        WHOLE: (whole(1, SHOWN), MEMBERS),
+        "`ensemble`, all variables": (whole(1, None), MEMBERS),
+        f"{WHOLE}, {cores()} threads": (whole(cores(), SHOWN), MEMBERS),
+        f"`ensemble`, all variables, {cores()} threads": (whole(cores(), None), MEMBERS),
+        "of it: nutation periods": (lambda: nutation_periods(numbers), MEMBERS),
+        "of it: steps and samples laid out": (lambda: schedule(period, horizon, SAMPLES, steps), MEMBERS),
+        "of it: the steps": (lambda: solver.many(numbers, plan.step_size, plan.marks), MEMBERS),
+        "once the steps": (stepped(1), MEMBERS),
+        "twice the steps": (stepped(2), MEMBERS),
+        "of it: axis and energy": (lambda: shown._observables(done, plan.times), MEMBERS),
+        "of it: phi, with its closed form": (lambda: angles._observables(done, plan.times), MEMBERS),
+    }
+    best = dict.fromkeys(calls, np.inf)
+    caller = np.inf
+    for _ in range(ROUNDS):
+        for name, (call, count) in calls.items():
+            begun, own = time.perf_counter(), time.thread_time()
+            call()
+            best[name] = min(best[name], (time.perf_counter() - begun) / count)
+            if name == f"{WHOLE}, {cores()} threads" and cores() > 1:
+                caller = min(caller, (time.thread_time() - own) / count)
+    best[STEPS_ALONE] = best.pop("twice the steps") - best.pop("once the steps")
+    if caller < np.inf:
+        best[CALLER] = caller
+    return [Item(name, seconds, best["`simulate`"] / seconds) for name, seconds in best.items()]
+
+
+def verdict(items: list[Item]) -> list[str]:
+    """How much faster an ensemble is, and how much it could be."""
+    took = {item.name: item for item in items}
+    fast = max((item for item in items if item.name.startswith(WHOLE)), key=lambda item: item.ratio)
+    said = (
+        f"{MEMBERS} tops, {NUTATIONS * PER_NUTATION} steps of {METHOD}[{CHART}]: `ensemble` is {fast.ratio:.0f} times "
+        "faster than as many calls of `simulate`"
+    )
+    if STEPS_ALONE in took:
+        said += f"; the steps alone, on {cores()} cores, bound that at {cores() * took[STEPS_ALONE].ratio:.0f} times"
+    return [f"{said}."]
+
+
+def lines(items: list[Item]) -> list[str]:
+    """As text."""
+    return (
+        [f"{'a member of an ensemble':<48} us   times faster than `simulate`"]
+        + [f"{item.name:<44} {item.seconds * 1e6:8.2f} {item.ratio:8.1f}" for item in items]
+        + verdict(items)
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    print("\n".join(lines(measure())))
+
+
+if __name__ == "__main__":
+    main()

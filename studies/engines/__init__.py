@@ -1,0 +1,1 @@
+"""How well do the integrators of physics engines follow a top?"""

@@ -1,0 +1,75 @@
+"""How well do the integrators of physics engines follow a top?
+
+Their maps run a slow top and a fast one: from few steps a nutation to many, at the steps that people use, over 10 s and
+over 1000 s, and on tops that nobody picked. Some methods of the catalogue run beside them.
+"""
+
+import functools
+
+import numpy as np
+import xarray as xr
+
+from symtop.methods.registry import engines, integrator
+from symtop.model.closed_forms import ClosedForms
+from symtop.model.scenes import scene
+from symtop.run.ensemble import ensemble
+from symtop.run.population import NUMBERS, population
+from symtop.runner.study import Case, Study
+
+from . import figures, listed, words
+from .tables import HORIZON, SCENES, axis_angle, frames, ladder
+
+COMPARED = ("strang[axis]", "rk4[axis]", "srkn-11-6[axis]")
+SEED = 1
+ORDINARY = {"steps": 1.5e6, "long": 1000.0, "members": 400}
+QUICK = {"steps": 3e4, "long": 20.0, "members": 100}
+FRAME = 1.0 / 240.0  # unit of time, on the population
+
+
+def row_names() -> list[str]:
+    """Every map on the axis, or the attitude if it has no other chart, and what is compared with them."""
+    charts = {name: entry.charts() for name, entry in engines().items()}
+    return [f"{name}[{'axis' if 'axis' in known else known[0]}]" for name, known in charts.items()] + list(COMPARED)
+
+
+def cases(quick: bool) -> list[Case]:
+    """One case a row and scene, and one a row for the population."""
+    chosen = QUICK if quick else ORDINARY
+    plan, names = {"steps": chosen["steps"], "long": chosen["long"]}, row_names()
+    runs = [Case(one, name, plan, group="tops") for one in SCENES for name in names]
+    many = {"members": chosen["members"], "seed": SEED}
+    return [*runs, *(Case("population", name, many, group="population") for name in names)]
+
+
+@functools.lru_cache(maxsize=2)
+def _members(count: int, seed: int) -> tuple[xr.Dataset, np.ndarray, np.ndarray]:
+    """Tops, where their axes point after `HORIZON`, and steps a nutation at `FRAME`."""
+    tops = population(count, seed=seed)
+    forms = ClosedForms(np.stack([tops[name].values for name in NUMBERS], axis=1))
+    return tops, forms.axis(np.full((count, 1), HORIZON))[:, 0], np.asarray(forms.nutation_period) / FRAME
+
+
+def measure(case: Case) -> xr.Dataset:
+    """The table of a row on a scene, or the angles at the end on the population."""
+    chosen, row = case.settings, integrator(case.integrator)
+    if case.group == "tops":
+        there = scene(case.scene)
+        return ladder(there, row, chosen["steps"]).merge(frames(there, row, (HORIZON, chosen["long"])))
+    tops, true, per_nutation = _members(chosen["members"], chosen["seed"])
+    run = ensemble(tops, row, step_size=FRAME, horizon=HORIZON, samples=2, threads=1, quiet=True)
+    off = axis_angle(run["axis"].values[:, -1], true)
+    return xr.Dataset({"off": ("member", off), "steps_a_nutation": ("member", per_nutation)})
+
+
+STUDY = Study(
+    name="engines",
+    title="Physics engines",
+    question="How well do the integrators of physics engines follow a top?",
+    how_to_read=words.HOW_TO_READ,
+    cases=cases,
+    measure=measure,
+    pictures=figures.pictures,
+    tables=listed.tables,
+    verdict=words.verdict,
+    uses=lambda case: [case.integrator],
+)

@@ -1,0 +1,89 @@
+"""Errors of one row on one scene: against the steps a nutation, at the steps that people use, and at the same cost.
+
+axis        the largest angle (rad) between the axis and the true one, at a hundred samples
+spherical   the same to the axis of the spherical top, I3 := I1, with the same start
+energy      the change of the energy at the end, over |E| + |mgl|
+spin        the change of L.e at the end, over the largest |L.e| and |L_z| of the start
+precession  the azimuth that the axis has run through, less the true one, over the true one: the mean rate's error
+forces      evaluations of the torque
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from symtop.methods.calling import solve
+from symtop.methods.plan import Plan
+from symtop.methods.registry import Integrator
+from symtop.model.closed_forms import ClosedForms
+from symtop.model.scenes import Scene
+from symtop.model.top import SymmetricTop, flat
+from symtop.model.view import axis_of, space_energy, space_momenta
+
+SCENES = ("goldstein", "fast")
+HORIZON = 10.0  # s
+PER_NUTATION = 16.0 * 2.0 ** np.arange(16)  # steps
+FREQUENCIES = (60.0, 240.0, 1000.0)  # steps a second
+SAMPLES = 100
+WINDING = 32  # samples a nutation that the azimuth is followed by
+NUMBERS = ("axis", "spherical", "energy", "spin", "precession", "forces")
+
+
+def axis_angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """The angle between unit vectors, shape (..., 3) to (...); pi where a run has ended."""
+    angle = np.arctan2(np.linalg.norm(np.cross(one, other), axis=-1), np.sum(one * other, axis=-1))
+    return np.where(np.isfinite(angle), angle, math.pi)
+
+
+def azimuth(e: np.ndarray) -> float:
+    """The angle (rad) that axes of shape (n, 3) have run through about the vertical; NaN where a run has ended."""
+    turned = np.unwrap(np.arctan2(e[:, 1], e[:, 0]))
+    return float(turned[-1] - turned[0])
+
+
+def judged(there: Scene, row: Integrator, h: float, horizon: float) -> dict[str, float]:
+    """One run, and what became of it."""
+    chart, top = row.charts()[0], there.top
+    steps = max(SAMPLES, round(horizon / h))
+    between = max(1, min(math.ceil(WINDING * horizon / (there.nutation_period * SAMPLES)), steps // SAMPLES))
+    marks = np.rint(np.linspace(0.0, steps, SAMPLES * between + 1)).astype(int)
+    run = solve(row, chart, top, there.start, Plan.steps(h, marks))
+    form, ball = (ClosedForms([flat(one, there.start)]) for one in (top, SymmetricTop(top.I1, top.I1, top.mgl)))
+    with np.errstate(over="ignore", invalid="ignore"):  # a run that flies apart
+        e, spin = axis_of(chart, run.states), space_momenta(chart, run.states)[1]
+        energy = space_energy(top, e, run.states[:, -3:], spin)
+    true, shown = form.axis(marks[None] * h)[0], slice(None, None, between)
+    sizes = abs(float(form.energy[0])) + abs(top.mgl), max(abs(float(form.p_psi[0])), abs(float(form.p_phi[0])))
+    return {
+        "axis": float(axis_angle(e[shown], true[shown]).max()),
+        "spherical": float(axis_angle(e[shown], ball.axis(marks[None, shown] * h)[0]).max()),
+        "energy": float(energy[-1] - energy[0]) / sizes[0],
+        "spin": float(spin[-1] - spin[0]) / sizes[1],
+        "precession": azimuth(e) / azimuth(true) - 1.0,
+        "forces": float(run.force_evaluations),
+        "steps": float(steps),
+    }
+
+
+def ladder(there: Scene, row: Integrator, most: float) -> xr.Dataset:
+    """The axis error after `HORIZON` from few steps a nutation to many, at most so many in all."""
+    counts = PER_NUTATION[PER_NUTATION * HORIZON / there.nutation_period <= most]
+    runs = [judged(there, row, there.nutation_period / count, HORIZON) for count in counts]
+    return xr.Dataset({"axis": ("per_nutation", [one["axis"] for one in runs])}, coords={"per_nutation": counts})
+
+
+def frames(there: Scene, row: Integrator, horizons: tuple[float, float]) -> xr.Dataset:
+    """Errors after a short time and a long one, at so many steps a second and at so many evaluations of the torque."""
+
+    def at(rates: Sequence[float]) -> list[list[dict[str, float]]]:
+        return [[judged(there, row, 1.0 / rate, horizon) for horizon in horizons] for rate in rates]
+
+    runs = at(FREQUENCIES)
+    a_step = max(1, *(round(one["forces"] / one["steps"]) for part in runs for one in part))
+    level = runs if a_step == 1 else at([rate / a_step for rate in FREQUENCIES])
+    shown = {f"frame_{name}": [[one[name] for one in part] for part in runs] for name in NUMBERS}
+    shown["level_axis"] = [[one["axis"] for one in part] for part in level]
+    table = xr.Dataset({name: (("rate", "horizon"), values) for name, values in shown.items()})
+    return table.assign(forces_a_step=float(a_step)).assign_coords(rate=list(FREQUENCIES), horizon=list(horizons))

@@ -1,0 +1,1 @@
+"""Does the verdict hold for tops that nobody picked?"""

@@ -1,0 +1,276 @@
+"""The figures of the population study: run lengths, slowdowns and wins, strata, silent failures, the guard."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.methods.registry import split_name
+from symtop.model.charts import Array
+from symtop.report.style import BLACK, GREY, ORANGES, grid, legend_below, look, panels
+from symtop.run.guard import EXPECTED
+from symtop.runner.study import Picture
+
+from . import verdicts, words
+from .costs import run_lengths
+from .ladder import KEPT, WRONG
+from .verdicts import ALL, UNITS, Cell
+
+NAMED = 8  # rows with a label; all others are thin and grey
+FAMILIAR = ("rk4[axis]", "rk45-compiled[axis]", "strang[axis]", "midpoint[angles]")  # always among them, dashed
+TEXT = "#222222"  # of labels: the lighter shades of a family are no colour for letters
+MARKS = 9  # on a line
+SHOWN = 12  # rows of a panel of slowdowns
+FAR = 1e3  # slowdown at which an axis ends
+LATEST = 0.995  # of a named row's costs lie within the axis of a panel
+RARE = 1e-3  # share of false alarms at which an axis begins
+LEAST = 0.05  # a row that solves less has no label on its line
+
+
+def pictures(data: xr.DataTree) -> list[Picture]:
+    """Run lengths in seconds and in evaluations, slowdowns, strata, silent failures and the guard."""
+    return [
+        draw_run_lengths(data, "alone"),
+        draw_run_lengths(data, "evaluations"),
+        *(draw_slowdowns(data, horizon) for horizon in verdicts.horizons(data)),
+        draw_strata(data),
+        draw_silent(data),
+        draw_guard(data),
+    ]
+
+
+def power(target: float) -> str:
+    """A target as a power of ten."""
+    return f"$10^{{{np.log10(target):.0f}}}$"
+
+
+def named(data: xr.DataTree, horizon: str, unit: str) -> list[str]:
+    """The familiar rows and those with the most wins at the targets of the axis."""
+    standings = [
+        verdicts.standings(verdicts.costs(data, Cell(horizon, "axis", target), unit))
+        for target in verdicts.targets(data)
+    ]
+    there = {one.name for listed in standings for one in listed}
+    ranked = [listed[place].name for place in range(3) for listed in standings if len(listed) > place]
+    familiar = [name for name in FAMILIAR if name in there]
+    ahead = [name for name in dict.fromkeys(ranked) if name not in familiar]
+    return [*ahead[: NAMED - len(familiar)], *familiar]
+
+
+def drawn(name: str) -> dict[str, Any]:
+    """How a named row is drawn: its look, as in every figure, and thin and dashed if it is familiar."""
+    mark, known = look(name), name in FAMILIAR
+    style = {"lw": 1.3, "ls": "--"} if known else {"lw": 2.2, "ls": "-"}
+    shape = {"color": mark.color, "marker": mark.marker, "fillstyle": mark.fill, "ms": 5.5}
+    return {**shape, **style, "zorder": 3, "label": name}
+
+
+def label_lines(axis: Any, lines: dict[str, tuple[Array, Array]], top: float) -> None:
+    """Write each name on its own line: those that rise first at the height `top`, the others lower and lower."""
+    order = sorted(
+        lines, key=lambda name: float(lines[name][0][np.searchsorted(lines[name][1], 0.4 * max(lines[name][1]))])
+    )
+    height = top
+    for name in order:
+        x, y = lines[name]
+        at = max(min(height, 0.75 * float(max(y))), 0.03)
+        height = at if at > 0.8 * height else height  # a line that ends low does not press down those behind it
+        k = min(int(np.searchsorted(y, at)), len(x) - 1)
+        axis.annotate(
+            name, (x[k], at), ha="right" if k > 0.8 * len(x) else "center", va="center", fontsize=8.5,
+            color=TEXT, zorder=5,
+            bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+        )  # fmt: skip
+        height -= 0.085
+
+
+def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Picture:
+    """The share of tops that each row has solved within a cost, one panel a target."""
+    targets, rows = verdicts.targets(data), named(data, horizon, unit)
+    scale = 1e6 if unit != "evaluations" else 1.0
+    label = "force evaluations of a run" if unit == "evaluations" else "force evaluations x time of one (us)"
+    figure, axes = grid(len(targets), 2, (label, "share of tops solved"), width=11.5, height=3.9)
+    for axis, target in zip(axes, targets, strict=True):
+        taken = verdicts.costs(data, Cell(horizon, "axis", target), unit)
+        ends = [
+            np.quantile(part, LATEST) for name in rows if (part := taken.of(name)[np.isfinite(taken.of(name))]).size
+        ]
+        if not ends:
+            continue
+        budgets = np.geomspace(0.9 * taken.values.min(), 1.5 * max(ends), 400)
+        lines = {}
+        for name in taken.names:
+            share = run_lengths(taken.of(name), budgets)
+            if name in rows:
+                first = 5 * rows.index(name)  # markers of two lines seldom meet
+                axis.plot(scale * budgets, share, markevery=(first, len(budgets) // MARKS), **drawn(name))
+                if share[-1] >= LEAST:
+                    lines[name] = scale * budgets, share
+            else:
+                axis.plot(scale * budgets, share, color=GREY, lw=0.6, alpha=0.4, zorder=1)
+        label_lines(axis, lines, 0.78)
+        axis.set(xscale="log", ylim=(0.0, 1.03), title=f"axis error below {power(target)} rad")
+        axis.set_xlim(scale * budgets[0], scale * budgets[-1])
+        axis.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
+        if axis is axes[0]:
+            axis.annotate(
+                "faster", (0.03, 0.93), (0.17, 0.93), xycoords="axes fraction", va="center", fontsize=9.5,
+                arrowprops={"arrowstyle": "->"},
+            )  # fmt: skip
+        if lacking := [name for name in rows if name not in lines]:
+            said = f"below {LEAST:.0%} within the budget:\n" + "\n".join(lacking)
+            axis.text(0.02, 0.97, said, transform=axis.transAxes, fontsize=8, color="#444444", va="top")
+    asked = verdicts.costs(data, Cell(horizon, "axis", targets[0]), unit).values.shape[1]
+    return Picture(
+        f"run-lengths-{unit}",
+        figure,
+        f"Share of random tops on which a row, method[chart], has met the axis error within a cost: a line further to "
+        f"the left is faster, one that ends higher solves more tops within {words.budget(data, horizon)} force "
+        f"evaluations a nutation. {words.span(data, horizon)} ({asked:,} of them have a nutation wider than the "
+        "coarsest error), no named scene. At each cost every row has the step or tolerance that suits the top. "
+        f"Cost in {UNITS[unit]}. Coloured: rows that win on the most tops; dashed: familiar ones; grey: all others. "
+        f"{words.winner_sentence(data, Cell(horizon, 'axis', targets[0]), unit)}.",
+        f"Empirical distribution functions of the cost, one panel for each axis error, {len(rows)} lines labelled.",
+    )
+
+
+def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
+    """The best rows of each target: median and 10 to 90 % of the slowdown, and the share of tops on which they win."""
+    targets = verdicts.targets(data)
+    labels = ("evaluations x seconds of one, over the cheapest row's", "")
+    figure, axes = grid(len(targets), 2, labels, width=11.5, height=0.27 * SHOWN + 0.9)
+    for axis, target in zip(axes, targets, strict=True):
+        listed = verdicts.standings(verdicts.costs(data, Cell(horizon, "axis", target), words.UNIT))
+        listed = [one for one in listed if np.isfinite(one.slowdown[1])][:SHOWN]
+        for place, one in enumerate(listed):
+            low, middle, high = one.slowdown
+            mark = look(one.name)
+            axis.plot([low, min(high, FAR)], [place, place], color=mark.color, lw=2.0, solid_capstyle="butt")
+            if not np.isfinite(high):
+                axis.plot(0.8 * FAR, place, ">", color=mark.color, ms=5)
+            axis.plot(middle, place, mark.marker, color=mark.color, ms=7, fillstyle=mark.fill)
+            said = f"{words.percent(one.won)}, level {words.percent(one.level)}"
+            axis.annotate(
+                said, (1.02, place), xycoords=("axes fraction", "data"), va="center", fontsize=8, annotation_clip=False
+            )
+        axis.set(xscale="log", xlim=(0.9, FAR), ylim=(SHOWN - 0.4, -0.6), yticks=range(len(listed)))
+        axis.set_yticklabels([one.name for one in listed], fontsize=8.5)
+        axis.set_title(f"axis error below {power(target)} rad")
+        axis.annotate("wins on", (1.02, 1.02), xycoords="axes fraction", fontsize=8, va="bottom", annotation_clip=False)
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.grid(visible=False, axis="y")
+    return Picture(
+        f"slowdowns-{horizon}",
+        figure,
+        f"The {SHOWN} rows, method[chart], with the most wins for each axis error: marker, median of the slowdown "
+        "against the cheapest row on the same top; bar, from the 10 % to the 90 % quantile (arrow: not reached within "
+        f"the budget). Beside it the share of tops on which the row wins beyond ties, and on which it is level with "
+        f"the cheapest or wins. A bar that stays near 1 is a safe choice. {words.span(data, horizon)}, no named scene; "
+        f"cost in {UNITS[words.UNIT]}, each at its own step or tolerance. "
+        f"{words.verdict_of(data, horizon, 'axis')}",
+        "Dot plots of slowdown with bars from the 10 to the 90 % quantile, one panel for each axis error.",
+    )
+
+
+def draw_strata(data: xr.DataTree) -> Picture:
+    """The row with the most wins of every stratum and target, one panel a horizon."""
+    from matplotlib.colors import to_rgb
+
+    targets, kinds, spans = verdicts.targets(data), [ALL, *verdicts.strata(data)], verdicts.horizons(data)
+    figure, axes = panels(1, len(spans), width=11.5, height=0.8 + 0.5 * len(kinds), sharey=True)
+    for axis, horizon in zip(axes[0], spans, strict=True):
+        for line, kind in enumerate(kinds):
+            for column, target in enumerate(targets):
+                taken, won = verdicts.best(data, Cell(horizon, "axis", target, kind), words.UNIT)
+                label, color, size = "not asked" if not taken.values.size else "none", "#444444", 7.5
+                if won is not None:
+                    method, chart = split_name(taken.names[won.row])
+                    strength = 0.95 if won.sure else 0.35
+                    shade = strength * np.array(to_rgb(look(method).color)) + (1.0 - strength)
+                    box = ([column - 0.49, column + 0.49], line - 0.46, line + 0.46)
+                    axis.fill_between(*box, color=shade, lw=0)
+                    color = "white" if shade @ np.array([0.3, 0.59, 0.11]) < 0.55 else "black"
+                    share = f"{won.share.value:.0%}" if won.share.count else "level"
+                    label = f"{'' if won.sure else '~'}{method}\n[{chart}] {share}"
+                    size = min(8.0, 130.0 / len(method))
+                axis.text(column, line, label, ha="center", va="center", fontsize=size, color=color, linespacing=1.2)
+        axis.set(
+            xlim=(-0.5, len(targets) - 0.5), ylim=(len(kinds) - 0.5, -0.5), yticks=range(len(kinds)),
+            yticklabels=["all tops", *kinds[1:]], xticks=range(len(targets)), xticklabels=map(power, targets),
+            xlabel="largest axis error allowed (rad)", title=words.span(data, horizon),
+        )  # fmt: skip
+        axis.grid(visible=False)
+        axis.tick_params(length=0)
+    return Picture(
+        "strata",
+        figure,
+        "Which tops want which row: the method[chart] that wins on the most tops of each stratum, and its share of "
+        f"wins beyond ties, for each axis error. Pale and with a tilde: its lead may be chance or noise of the "
+        "times; level: no row wins beyond ties. Cost in "
+        f"{UNITS[words.UNIT]}, each row at its own step or tolerance on each top; random tops, no named scene. "
+        f"{words.strata_sentence(data)}",
+        "Coloured cells naming the winning row, a line a stratum, a column an accuracy, a panel a horizon.",
+    )
+
+
+def draw_silent(data: xr.DataTree) -> Picture:
+    """Wrong runs, and the part of them that nothing warns of, against the steps a nutation."""
+    rows = named(data, "short", words.UNIT)
+    figure, axes = panels(1, 2, width=11.5, height=4.2, sharex=True)
+    for name in verdicts.judged_rows(data):
+        one = verdicts.health(data, name)
+        if not one.fixed_step:
+            continue
+        enough = one.wrong >= 0.01 * one.runs
+        curves = one.wrong / one.runs, np.where(enough, one.silent / np.maximum(one.wrong, 1.0), np.nan)
+        for axis, values in zip(axes[0], curves, strict=True):
+            if name in rows:
+                axis.plot(one.setting, values, **drawn(name))
+            else:
+                axis.plot(one.setting, values, color=GREY, lw=0.6, alpha=0.5, zorder=1)
+    for axis, title in zip(axes[0], ("runs that are wrong", "of the wrong runs, those that look healthy"), strict=True):
+        axis.set(xscale="log", ylim=(0.0, 1.03), title=title, xlabel="steps a nutation", ylabel="share")
+        axis.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
+        axis.xaxis.set_major_formatter("{x:g}")
+    legend_below(figure, axes)
+    return Picture(
+        "silent",
+        figure,
+        f"Left: the share of runs whose axis is off by more than {WRONG:g} rad, against the steps a nutation. "
+        "Right: of these, the share that nothing warns of: they end ok and keep the energy of the nutation and both "
+        f"momenta to {KEPT:.0%}, drawn where at least 1 % of runs are wrong. Rows, method[chart], with a fixed step; "
+        f"grey: all others. {words.span(data, 'short')}, no named scene. {words.silent_sentence(data)} A conserved "
+        "energy is no sign of a right answer.",
+        "Two panels of shares against steps a nutation: wrong runs, and wrong runs without any sign.",
+    )
+
+
+def draw_guard(data: xr.DataTree) -> Picture:
+    """Hits of the guard against its false alarms, by the threshold of its forecast; with the one that it uses."""
+    spans = verdicts.horizons(data)
+    figure, axes = panels(1, len(spans), width=9.6, height=4.2, sharey=True)
+    for axis, horizon in zip(axes[0], spans, strict=True):
+        for score, label, color, spot in (
+            ("foretold", "the guard, before the run", BLACK, (0.03, 0.92)),
+            ("watched", "energy and momenta, after it", ORANGES[1], (0.40, 0.35)),
+        ):
+            curve, (hits, alarms) = verdicts.detected(data, horizon, score), verdicts.caught(data, horizon, score)
+            axis.plot(np.maximum(curve.alarms, RARE), curve.hits, color=color, lw=2.0)
+            axis.plot(max(alarms.value, RARE), hits.value, "o", color=color, ms=7)
+            axis.annotate(
+                f"{label}\n{words.percent(hits)} of wrong runs,\n{words.percent(alarms)} of right ones",
+                (max(alarms.value, RARE), hits.value), spot, textcoords="axes fraction", fontsize=9, color=color,
+                va="top", arrowprops={"arrowstyle": "-", "color": color, "lw": 0.7},
+            )  # fmt: skip
+        axis.set(xscale="log", xlim=(RARE, 1.05), ylim=(-0.01, 1.03), title=words.span(data, horizon))
+        axis.set(xlabel="false alarms: share of right runs with a warning", ylabel="hits: share of wrong runs")
+    return Picture(
+        "guard",
+        figure,
+        "Wrong runs that are noticed against right ones that are suspected, as the threshold varies. Black: by the "
+        f"guard's forecast, made before the run (dot: {EXPECTED:g} rad, where it warns). Orange: by the larger error "
+        f"of energy and momenta, seen after the run (dot: {KEPT:.0%}). All rows, method[chart], at every "
+        "step and tolerance of the ladder, on random tops, no named scene. "
+        f"{words.guard_sentence(data)}",
+        "Receiver operating characteristics of the guard and of the conserved quantities, with their thresholds.",
+    )

@@ -1,0 +1,249 @@
+"""One row on all tops: runs from coarse to fine settings, and what they cost and hide.
+
+Steps are halved from setting to setting, tolerances divided by ten. A member leaves the ladder
+
+    when every quantity has reached the finest target that is asked of it,
+    before a run that is foreseen to take more force evaluations than the budget,
+    when no target that is left can be reached within the budget: the error falls with the declared order or, if that is
+    more, as from the last setting to this, and a tenth of the target's distance is forgiven,
+    when two settings below `ROUNDED` have the same error: rounding.
+
+The energy is asked from `LEAST_STEPS` a nutation on, because longer steps may keep it and miss the motion. A run is
+*wrong* if its axis is off by more than `WRONG`; it is a *silent failure* if nothing warns of it: it ended `ok` and kept
+the energy and both momenta to `KEPT`. A member that left with an accurate run is right at all finer settings.
+
+Variables over `quantity`, `target`, `member`, `level`, `stratum`, `guarded`:
+
+    cost(quantity, target, member)   force evaluations, inf if it was not reached, NaN if it was not asked
+    setting(level)                   steps a nutation, or the tolerance
+    runs, wrong, ended, silent (level, stratum)    numbers of members: judged, wrong, ended `ok`, silent failures
+    foretold, measured (level, guarded)            axis error, rad: of the guard's forecast, and of the run
+    made, evaluated                                runs of the ladder, and their force evaluations
+    watched(level, guarded)                        the larger error of energy and momenta, infinite if it ended badly
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from symtop.base.validate import SymtopError
+from symtop.measure.settings import FLAT, LEAST_STEPS, ROUNDED
+from symtop.measure.work import TARGETS
+from symtop.methods.calling import solve
+from symtop.methods.fixed_step import FixedStep, inside
+from symtop.methods.outcomes import OUTCOMES
+from symtop.methods.plan import Plan
+from symtop.methods.registry import Integrator
+from symtop.model.charts import DIMENSIONS, Array
+from symtop.model.scenes import Scene
+from symtop.model.top import Angles, SymmetricTop
+from symtop.run.forecast import forecast
+
+from .costs import cost_to_reach
+from .tops import ASKED, FIRST, MOMENTA, Tops
+
+LEVELS = 15  # settings at most
+WRONG = 0.1  # rad
+KEPT = 0.01  # of the energy of the nutation, of the larger momentum
+ASYMPTOTIC = 1e-2  # rad; an error below this falls as the order says
+FORGIVEN = 10.0
+BLOCK = 256  # members of an adaptive row that climb together: as many starts as heyoka's conversion remembers
+DIGITS = 10  # bits of a cost that are stored, 0.1 %
+Members = NDArray[np.int64]  # places of members
+
+GUARDED_LEVELS = 10  # of them are shown to the guard: up to 559 steps a nutation
+
+
+class Level(NamedTuple):
+    """The runs of some members with one setting."""
+
+    states: Array
+    momenta: Array
+    work: Array  # force evaluations
+    outcome: NDArray[np.int64]
+
+
+class Climb(NamedTuple):
+    """Work (LEVELS, n), errors (LEVELS, n) by quantity, NaN where a member was not run; and how runs ended."""
+
+    work: Array
+    errors: dict[str, Array]
+    ended: NDArray[np.bool_]
+    settled: NDArray[np.bool_]  # (n,): left with an accurate run
+
+
+def quantities_of(row: Integrator, twin: bool) -> tuple[str, ...]:
+    """What a row is judged by: the attitude alone where the axis chart has the same axis (`twin`).
+
+    The energy is not asked of a row that claims to conserve it: any step would do.
+    """
+    (chart,) = row.charts()
+    left = {"energy"} if "energy" in (row.conserves or ()) else set()
+    left |= {"attitude"} if chart == "axis" else {"axis", "energy"} if twin else set()
+    return tuple(name for name in ASKED if name not in left)
+
+
+def setting_of(row: Integrator, level: int) -> float:
+    """Steps a nutation, or the tolerance; NaN below the least that the row has."""
+    if row.fixed_step:
+        return FIRST * 2.0**level
+    tolerance = 10.0 ** (-2 - level)
+    return tolerance if tolerance >= row.least_tolerance else math.nan
+
+
+def run_level(row: Integrator, tops: Tops, chosen: Members, level: int, budget: float) -> Level:
+    """Run the chosen members with one setting."""
+    (chart,) = row.charts()
+    if row.fixed_step:
+        solver = loop_of(row)
+        h = tops.period[chosen] / FIRST * 0.5**level
+        marks = np.broadcast_to(tops.marks << level, (len(chosen), tops.marks.size))
+        many = solver.many(tops.numbers[chosen], h, marks)
+        work = np.asarray(solver.counts(many.steps, many.work)[0], dtype=float)
+        return Level(many.states, many.momenta, work, many.outcome)
+    states = np.full((len(chosen), tops.marks.size, DIMENSIONS[chart]), np.nan)
+    momenta, work = np.full((*states.shape[:2], 2), np.nan), np.empty(len(chosen))
+    outcome = np.empty(len(chosen), dtype=np.int64)
+    for k, (top, start) in enumerate(bodies(tops, chosen)):
+        plan = Plan.until(tops.times[chosen[k]], setting_of(row, level), budget)
+        run = solve(row, chart, top, start, plan)
+        states[k], momenta[k, :, 0], momenta[k, :, 1] = run.states, run.p_phi, run.p_psi
+        work[k], outcome[k] = run.force_evaluations, OUTCOMES.index(run.outcome)
+    return Level(states, momenta, work, outcome)
+
+
+def loop_of(row: Integrator) -> FixedStep:
+    """The fixed-step loop of a row."""
+    solver = inside(row.solvers[row.charts()[0]])
+    if solver is None:
+        raise SymtopError(f"{row.name} has no compiled loop that many tops could share")
+    return solver
+
+
+def bodies(tops: Tops, chosen: Members) -> Iterator[tuple[SymmetricTop, Angles]]:
+    """The top and the start of each chosen member."""
+    for numbers in tops.numbers[chosen].tolist():
+        yield SymmetricTop(*numbers[:3]), Angles(*numbers[3:])
+
+
+def climb(row: Integrator, tops: Tops, asked: dict[str, NDArray[np.bool_]], budget: float) -> Climb:
+    """All runs of a row; `asked` (targets, n) by quantity."""
+    n, (chart,) = len(tops.period), row.charts()
+    names = (*asked, *(name for name in ("axis", "energy", MOMENTA) if name not in asked))
+    blank = np.full((LEVELS, n), np.nan)
+    done = Climb(blank.copy(), {name: blank.copy() for name in names}, np.zeros((LEVELS, n), bool), np.zeros(n, bool))
+    everyone = np.flatnonzero(tops.known)
+    for block in [everyone] if row.fixed_step else np.array_split(everyone, -(-everyone.size // BLOCK) or 1):
+        live = block
+        for level in range(LEVELS):
+            if not live.size or math.isnan(setting_of(row, level)):
+                break
+            runs = run_level(row, tops, live, level, budget)
+            shown = tops.errors(chart, runs, live)
+            good = (runs.outcome == 0) & np.isfinite(shown["axis"])
+            done.work[level, live], done.ended[level, live] = runs.work, good
+            for name, values in done.errors.items():
+                values[level, live] = np.where(good, shown[name], np.inf)
+            stay, settled = _stay(row, done, asked, live, level, budget)
+            done.settled[live] = settled
+            live = live[stay]
+    return done
+
+
+def _stay(
+    row: Integrator, done: Climb, asked: dict[str, NDArray[np.bool_]], live: Members, level: int, budget: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:  # fmt: skip
+    """Which of the live members go on to the next setting, and which have an accurate run."""
+    work, good = done.work[level, live], done.ended[level, live]
+    typical = float(np.max(work[good], initial=1.0))  # a run that failed early has not shown what the next one costs
+    work = np.where(good, work, typical)
+    order = float(row.order or 1)
+    ratio, falls = (2.0, 2.0**order) if row.fixed_step else (10.0 ** (1.0 / (row.order or 20)), 10.0)
+    left = np.floor(np.log(budget / np.maximum(work, 1.0)) / math.log(ratio))
+    settled = done.errors["axis"][level, live] <= ASYMPTOTIC
+    worth = ~settled
+    for name, targets in asked.items():
+        error = np.maximum(done.errors[name][level, live], 1e-300)
+        before = done.errors[name][level - 1, live] if level else np.full(live.size, np.inf)
+        open_targets = targets[:, live] & (error > np.asarray(TARGETS)[:, np.newaxis])
+        following = np.max(np.where(open_targets, np.asarray(TARGETS)[:, np.newaxis], 0.0), axis=0)
+        with np.errstate(all="ignore"):
+            gain = np.clip(before / error, falls, 1e4)
+            gain = np.where(np.isfinite(before), gain, 1e4)
+            foreseen = error * gain**-left / FORGIVEN
+        stuck = (error < ROUNDED) & (error > before / FLAT)
+        worth |= (following > 0.0) & ~stuck & ((foreseen <= following) | (error > ASYMPTOTIC))
+    return worth & (left >= 1.0), settled
+
+
+def stored(values: Array) -> Array:
+    """Positive numbers with `DIGITS` bits, which a file holds in half the space."""
+    size, power = np.frexp(values)
+    return np.asarray(np.ldexp(np.rint(np.ldexp(size, DIGITS)), power - DIGITS))
+
+
+def table(
+    row: Integrator, tops: Tops, strata: NDArray[np.int64], kinds: int, budget: float, *, twin: bool, guarded: int
+) -> xr.Dataset:
+    """The dataset of one row over one horizon."""
+    asked = {name: mask for name, mask in tops.asked(TARGETS).items() if name in quantities_of(row, twin)}
+    done = climb(row, tops, asked, budget)
+    costs = np.full((len(ASKED), len(TARGETS), len(tops.period)), np.nan)
+    for place, name in enumerate(ASKED):
+        if name in asked:
+            first = round(math.log2(LEAST_STEPS / FIRST)) if row.fixed_step and name == "energy" else 0
+            reached = cost_to_reach(done.work[first:], done.errors[name][first:], TARGETS)
+            costs[place] = np.where(asked[name], stored(reached), np.nan)
+    data: dict[str, Any] = {
+        "cost": (("quantity", "target", "member"), costs),
+        "setting": ("level", [setting_of(row, level) for level in range(LEVELS)]),
+        **{name: (("level", "stratum"), values) for name, values in _healthy(done, tops, strata, kinds).items()},
+        "chart": ((), row.charts()[0]),
+        "control": ((), row.control or ""),
+        "order": ((), float(row.order or math.nan)),
+        "budget": ((), budget),
+        "made": ((), float(np.isfinite(done.work).sum())),
+        "evaluated": ((), float(np.nansum(done.work))),
+    }
+    if guarded:
+        data |= {
+            name: (("level", "guarded"), values) for name, values in guarded_runs(row, tops, done, guarded).items()
+        }
+    return xr.Dataset(data, coords={"quantity": list(ASKED), "target": list(TARGETS)})
+
+
+def _healthy(done: Climb, tops: Tops, strata: NDArray[np.int64], kinds: int) -> dict[str, Array]:
+    """Numbers of members judged, wrong, ended `ok` and silent failures, (LEVELS, strata)."""
+    ran, error = np.isfinite(done.work), done.errors["axis"]
+    right_later = done.settled & ~ran & tops.known  # left before with an accurate run
+    wrong = ran & ~(error <= WRONG)
+    silent = wrong & done.ended & (done.errors["energy"] <= KEPT) & (done.errors[MOMENTA] <= KEPT)
+    counted = {"runs": ran | right_later, "wrong": wrong, "ended": done.ended | right_later, "silent": silent}
+    return {
+        name: np.stack([mask[:, strata == kind].sum(axis=1) for kind in range(kinds)], axis=1).astype(float)
+        for name, mask in counted.items()
+    }
+
+
+def guarded_runs(row: Integrator, tops: Tops, done: Climb, guarded: int) -> dict[str, Array]:
+    """What the guard foretells, what is watched and what is measured, for the first members; (LEVELS, guarded)."""
+    (chart,) = row.charts()
+    seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured")}
+    chosen = np.flatnonzero(tops.known)[:guarded]
+    for place, (top, start) in enumerate(bodies(tops, chosen)):
+        member = chosen[place]
+        scene = Scene(f"member-{member}", top, start, horizon=float(tops.times[member, -1]))
+        for level in range(GUARDED_LEVELS):
+            if math.isfinite(done.work[level, member]):
+                if row.fixed_step:
+                    plan = Plan.steps(float(tops.period[member]) / FIRST * 0.5**level, tops.marks << level)
+                else:
+                    plan = Plan.until(tops.times[member], setting_of(row, level))
+                seen["foretold"][level, place] = forecast(scene, row, chart, plan).axis_error
+                seen["watched"][level, place] = max(done.errors[name][level, member] for name in ("energy", MOMENTA))
+                seen["measured"][level, place] = done.errors["axis"][level, member]
+    return seen

@@ -1,0 +1,204 @@
+"""The tops of the study: their scales, the truth at the times of the samples, and the errors of many runs at once.
+
+Everything is an array over members, because ten thousand scenes would take a hundred times the time of their runs. The
+formulas are those of `symtop.measure.errors` and `symtop.model.scenes`, and the tests hold them together:
+
+    axis, attitude   angle between, rad                      energy   |E - E0| / (E0 - p_psi^2/2 I3 - min V)
+    momenta          the larger of |p_phi - ref| and |p_psi - ref|, over max(|p_phi|, |p_psi|)
+
+A run of a row with fixed step makes FIRST 2^k steps a nutation. Its samples fall on the same times at every k, a dozen
+that are not commensurate with the nutation, so that the truth is computed once. Of the largest error of 2000 samples
+they see 93 to 100 % in the median run, and half in one of twenty; it is the same for all rows. The coarsest run is that
+coarse because a step of 14 stages meets 1e-6 at four a nutation.
+"""
+
+import math
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop.base.numbers import EPSILON, GOLDEN, TINY
+from symtop.model import charts
+from symtop.model.charts import Array
+from symtop.model.closed_forms import ClosedForms
+from symtop.model.effective import effective_force, effective_potential, effective_stiffness
+from symtop.model.scenes import NEXT_TO_POLE, STEADY
+from symtop.model.view import axis_of, space_energy
+from symtop.run.bounds import ROUNDING
+from symtop.run.population import NUMBERS, STRATA, population
+
+FIRST = 1.0925  # steps a nutation of the coarsest run
+SAMPLES = 12
+ASKED = ("axis", "attitude", "energy")  # quantities that have targets
+MOMENTA = "momenta"
+CLEAR = 0.1  # a target is asked where the truth's bound is at most this part of it
+BISECTIONS = 60
+
+
+class Body(NamedTuple):
+    """The parameters of n tops, each (n, 1) beside samples."""
+
+    I1: Array
+    I3: Array
+    mgl: Array
+
+
+class Shown(Protocol):
+    """What n runs have shown, such as `symtop.methods.many.Many`."""
+
+    @property
+    def states(self) -> Array:
+        """States (n, samples, dimension)."""
+
+    @property
+    def momenta(self) -> Array:
+        """p_phi and p_psi (n, samples, 2)."""
+
+
+class Tops:
+    """Tops and starts as rows (n, 9) of `NUMBERS`, followed for a number of nutations."""
+
+    def __init__(self, numbers: Array, nutations: float) -> None:
+        self.numbers, self.nutations = np.ascontiguousarray(numbers), nutations
+        self.forms = ClosedForms(self.numbers)
+        self.period = np.array(self.forms.nutation_period)
+        self.steps = math.ceil(nutations * FIRST)  # of the coarsest run
+        places = np.arange(1.0, SAMPLES + 1.0) + np.append(np.mod(GOLDEN * np.arange(1.0, SAMPLES), 1.0) - 0.5, 0.0)
+        self.marks = np.unique(np.maximum(np.rint(places * self.steps / SAMPLES).astype(np.int64), 1))
+        self.times = self.marks * (self.period / FIRST)[:, np.newaxis]
+
+    @classmethod
+    def drawn(cls, members: int, seed: int, nutations: float) -> "Tops":
+        """The first members of the population of that seed."""
+        return cls(numbers_of(members, seed), nutations)
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which members have a nutation and a closed form."""
+        return np.isfinite(self.period) & (self.period > 0.0)
+
+    @cached_property
+    def truth(self) -> tuple[Array, Array]:
+        """Axes (n, samples, 3) and quaternions (n, samples, 4)."""
+        times = np.where(self.known[:, np.newaxis], self.times, 0.0)
+        return self.forms.axis(times), self.forms.quaternion(times)
+
+    @property
+    def body(self) -> Body:
+        """The parameters, beside samples."""
+        return Body(*(self.numbers[:, k, np.newaxis] for k in range(3)))
+
+    @cached_property
+    def momenta(self) -> tuple[Array, Array, Array, Array]:
+        """p_phi, p_psi, p_phi - p_psi and p_phi + p_psi of the starts, each (n,)."""
+        I1, I3, _, theta, _, _, _, phi_dot, psi_dot = self.numbers.T
+        p_psi = I3 * (psi_dot + phi_dot * np.cos(theta))
+        sin_x, cos_x = np.sin(0.5 * theta), np.cos(0.5 * theta)
+        swing = 4.0 * I1 * phi_dot * (sin_x * cos_x) ** 2
+        north, south = swing - 2.0 * p_psi * sin_x**2, swing + 2.0 * p_psi * cos_x**2
+        return swing + p_psi * np.cos(theta), p_psi, north, south
+
+    @cached_property
+    def energy(self) -> Array:
+        """Total energy (n,)."""
+        I1, I3, mgl, theta, _, _, theta_dot, phi_dot, psi_dot = self.numbers.T
+        across = theta_dot**2 + (phi_dot * np.sin(theta)) ** 2
+        return 0.5 * I1 * across + 0.5 * I3 * (psi_dot + phi_dot * np.cos(theta)) ** 2 + mgl * np.cos(theta)
+
+    @cached_property
+    def energy_scale(self) -> Array:
+        """What energy errors are divided by, (n,): `Scene.energy_scale`, the energy of the nutation."""
+        I1, _, mgl = (self.numbers[:, k] for k in range(3))
+        _, _, north, south = self.momenta
+        low, high = np.clip(self.forms.theta_range.T, NEXT_TO_POLE, math.pi - NEXT_TO_POLE)
+        for _ in range(BISECTIONS):  # the lowest place of the potential lies between the turning points
+            middle = 0.5 * (low + high)
+            falls = effective_force(middle, north, south, I1, mgl)[0] < 0.0
+            low, high = np.where(falls, middle, low), np.where(falls, high, middle)
+        lowest = 0.5 * (low + high)
+        start = np.clip(self.numbers[:, 3], NEXT_TO_POLE, math.pi - NEXT_TO_POLE)
+        depth = (
+            0.5 * I1 * self.numbers[:, 6] ** 2
+            + effective_potential(start, north, south, I1, mgl)
+            - effective_potential(lowest, north, south, I1, mgl)
+        )
+        swing = 0.5 * np.maximum(effective_stiffness(lowest, north, south, I1, mgl), 0.0)
+        rounding = STEADY * EPSILON * (np.abs(self.energy) + np.abs(mgl))
+        kinds = [depth > rounding, swing > rounding, np.abs(mgl) > rounding]
+        return np.asarray(np.select(kinds, [depth, swing, np.abs(mgl)], TINY))
+
+    @cached_property
+    def width(self) -> Array:
+        """Angle between the turning points, rad, (n,)."""
+        return np.asarray(np.diff(self.forms.theta_range, axis=1)[:, 0])
+
+    @cached_property
+    def regime(self) -> Array:
+        """Four numbers without units that fix the motion of the axis, (n, 4); see `symtop.measure.nearest`."""
+        I1, _, mgl = (self.numbers[:, k] for k in range(3))
+        unit = np.sqrt(I1 * np.maximum(np.abs(mgl), TINY))
+        high, low = np.cos(self.forms.theta_range.T)
+        p_phi, p_psi = (np.arcsinh(p / unit) for p in self.momenta[:2])
+        turned = self.numbers[:, 2] < 0.0
+        low, high = np.where(turned, -high, low), np.where(turned, -low, high)
+        return np.stack([low, high, np.where(turned, -p_psi, p_psi), p_phi], axis=1)
+
+    def bounds(self) -> dict[str, Array]:
+        """The least error of each quantity that the truth can judge over the horizon, (n,).
+
+        That of the axis and the attitude is the rounding of the closed form, which `symtop.run.bounds` states. Rows of
+        the angles chart show phi and psi as doubles, whose rounding is an angle; it counts for all rows.
+        """
+        turns = (np.abs(self.forms.phi_per_period) + np.abs(self.forms.psi_per_period)) * self.nutations
+        grain = (np.abs(self.energy) + np.abs(self.numbers[:, 2])) / self.energy_scale
+        same = np.ones(len(self.period))
+        energy = 4.0 * EPSILON * np.maximum(grain, 1.0)
+        return {
+            "axis": ROUNDING["axis"] * same, "attitude": ROUNDING["attitude"] + 0.5 * EPSILON * turns, "energy": energy
+        }  # fmt: skip
+
+    def asked(self, targets: Any) -> dict[str, NDArray[np.bool_]]:
+        """Which targets are asked of which members, (targets, n): below the nutation's width, above the bound."""
+        levels = np.asarray(targets)[:, np.newaxis]
+        wide = (levels < self.width) & self.known
+        return {name: wide & (bound <= CLEAR * levels) for name, bound in self.bounds().items()}
+
+    def errors(self, chart: str, shown: Shown, chosen: NDArray[np.int64]) -> dict[str, Array]:
+        """Largest error of each quantity of the chosen members' runs, (chosen,); inf after a failure.
+
+        `attitude` is left out where the chart does not show it.
+        """
+        states, body = shown.states, Body(*(part[chosen] for part in self.body))
+        p_phi, p_psi = shown.momenta[..., 0], shown.momenta[..., 1]
+        with np.errstate(all="ignore"):  # a run may have blown up
+            axis = axis_of(chart, states)
+            each = {"axis": charts.axis_distance(axis, self.truth[0][chosen])}
+            if chart == "angles":
+                quaternion = charts.quaternion_from_angles(states[..., 0], states[..., 2], states[..., 3])
+                place = effective_potential(states[..., 0], p_phi - p_psi, p_phi + p_psi, body.I1, body.mgl)
+                energy = states[..., 1] ** 2 / (2.0 * body.I1) + p_psi**2 / (2.0 * body.I3) + place
+            else:
+                quaternion = states[..., :4]
+                energy = space_energy(body, axis, states[..., -3:], p_psi)  # type: ignore[arg-type]
+            if chart != "axis":
+                each["attitude"] = charts.attitude_distance(quaternion, self.truth[1][chosen])
+            each["energy"] = np.abs(energy - self.energy[chosen, np.newaxis]) / self.energy_scale[chosen, np.newaxis]
+            start = [part[chosen, np.newaxis] for part in self.momenta[:2]]
+            scale = np.maximum(np.maximum(np.abs(start[0]), np.abs(start[1])), TINY)
+            each[MOMENTA] = np.maximum(np.abs(p_phi - start[0]), np.abs(p_psi - start[1])) / scale
+            largest = {name: values.max(axis=1) for name, values in each.items()}
+        return {name: np.where(np.isfinite(values), values, np.inf) for name, values in largest.items()}
+
+
+def numbers_of(members: int, seed: int) -> Array:
+    """Tops and starts (members, 9)."""
+    drawn = population(members, seed=seed)
+    return np.stack([drawn[name].values for name in NUMBERS], axis=1)
+
+
+def strata_of(members: int, seed: int) -> NDArray[np.int64]:
+    """Places of the members' strata in `STRATA`."""
+    names = list(STRATA)
+    return np.array([names.index(name) for name in population(members, seed=seed)["stratum"].values])

@@ -1,0 +1,221 @@
+"""What the study's datasets say: costs of all rows on all tops, and verdicts by horizon, target and stratum.
+
+The dataset is a tree. Groups "short" and "long" hold the rows over the two horizons (see `ladder`), "tops" what is
+known of the tops, "prices" the seconds of a force evaluation of each row (see `prices`). A cost is in one of:
+
+    evaluations   force evaluations
+    alone         force evaluations x seconds of one in a run by itself
+    together      force evaluations x seconds of one in one call for many tops
+
+Rows are compared where they show the same quantity: the axis in every chart but the attitude chart of a method that has
+the axis chart, which steps the same axis, and the attitude in the charts that show it.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from symtop.model.charts import Array
+from symtop.run.guard import EXPECTED
+
+from .costs import Detection, Share, Winner, detection, quantiles, slowdowns, winner, wins
+from .ladder import KEPT, WRONG
+
+HORIZONS = ("short", "long")
+UNITS = {
+    "evaluations": "force evaluations",
+    "alone": "force evaluations x seconds of one, alone",
+    "together": "force evaluations x seconds of one, in a call for many tops",
+}
+ALL = "all"  # tops, whatever their stratum
+THRESHOLDS = {"foretold": EXPECTED, "watched": KEPT}
+WHOLE = 0.999  # of the members must be judged at a setting whose shares are shown
+
+
+class Cell(NamedTuple):
+    """A question: who reaches a target of a quantity over a horizon on the tops of a stratum."""
+
+    horizon: str
+    quantity: str
+    target: float
+    stratum: str = ALL
+
+
+class Costs(NamedTuple):
+    """Costs of rows on the tops of a cell."""
+
+    names: list[str]
+    values: Array  # (rows, tops), inf where a row does not reach the target
+    halves: Array  # (2, rows): the price of an evaluation by half of the rounds of timing, over that by all
+
+    def of(self, name: str) -> Array:
+        """The costs of one row."""
+        return np.asarray(self.values[self.names.index(name)])
+
+
+class Standing(NamedTuple):
+    """How a row does in a cell."""
+
+    name: str
+    solved: Share
+    slowdown: tuple[float, float, float]  # 10 %, median, 90 %: cost over the cheapest on each top that some row solves
+    won: Share
+    level: Share
+
+
+def horizons(data: xr.DataTree) -> list[str]:
+    """The groups of rows that are there."""
+    return [name for name in HORIZONS if name in data.children]
+
+
+def nutations(data: xr.DataTree, horizon: str) -> float:
+    """The length of a horizon."""
+    return float(np.nanmax(data[horizon]["nutations"].values))
+
+
+def targets(data: xr.DataTree) -> list[float]:
+    """The targets."""
+    return [float(value) for value in data[horizons(data)[0]]["target"].values]
+
+
+def members(data: xr.DataTree, horizon: str) -> int:
+    """How many tops a horizon has."""
+    return int(data[horizon].sizes["member"])
+
+
+def strata(data: xr.DataTree) -> list[str]:
+    """Names of the strata."""
+    return [str(name) for name in data["tops"]["stratum"].values]
+
+
+def stratum_of(data: xr.DataTree, horizon: str) -> Array:
+    """The place of each member's stratum."""
+    return np.asarray(data["tops"]["stratum_place"].values.ravel()[: members(data, horizon)])
+
+
+def price(data: xr.DataTree, names: list[str], unit: str) -> Array:
+    """What a force evaluation of each row costs in a unit, (3, rows): the least time, and that of each half."""
+    if unit == "evaluations":
+        return np.ones((3, len(names)))
+    timed = data["prices"].to_dataset().isel(scene=0).sel(integrator=names)
+    return np.stack([timed[unit].values, *timed[f"{unit}_half"].transpose("half", "integrator").values])
+
+
+def costs(data: xr.DataTree, cell: Cell, unit: str) -> Costs:
+    """Costs of all rows that show a cell's quantity, on the tops that are asked."""
+    group = data[cell.horizon].to_dataset().isel(scene=0)
+    values = group["cost"].sel(quantity=cell.quantity, target=cell.target).transpose("integrator", "member").values
+    if cell.stratum != ALL:
+        values = values[:, stratum_of(data, cell.horizon) == strata(data).index(cell.stratum)]
+    rows, tops = ~np.isnan(values).all(axis=1), ~np.isnan(values).all(axis=0)
+    names = [str(name) for name in group["integrator"].values[rows]]
+    seconds = price(data, names, unit)
+    values = np.where(np.isnan(values), np.inf, values)[np.ix_(rows, tops)]
+    return Costs(names, values * seconds[0][:, np.newaxis], seconds[1:] / seconds[0])
+
+
+def standings(taken: Costs) -> list[Standing]:
+    """All rows of a cell, the one with the most wins first; then by ties, cost, and tops that are solved."""
+    won, level = wins(taken.values)
+    ratios = slowdowns(taken.values)
+    solvable = int(np.isfinite(taken.values).any(axis=0).sum())
+    total = taken.values.shape[1]
+    listed = [
+        Standing(
+            name,
+            Share(int(np.isfinite(taken.values[row]).sum()), total),
+            quantiles(ratios[row]),
+            Share(int(won[row].sum()), solvable),
+            Share(int((level[row] & np.isfinite(taken.values[row])).sum()), solvable),
+        )
+        for row, name in enumerate(taken.names)
+    ]
+    return sorted(listed, key=lambda one: (-one.won.count, -one.level.count, one.slowdown[1], -one.solved.count))
+
+
+def best(data: xr.DataTree, cell: Cell, unit: str) -> tuple[Costs, Winner | None]:
+    """Costs of a cell, and its winner, which is sure if it is with the times of either half of the rounds."""
+    taken = costs(data, cell, unit)
+    won = winner(taken.values) if taken.names else None
+    if won is not None and won.sure:
+        halves = [winner(taken.values * half[:, np.newaxis]) for half in taken.halves]
+        won = won._replace(steady=all(one is not None and one.sure and one.row == won.row for one in halves))
+    return taken, won
+
+
+def cells(data: xr.DataTree, quantity: str, among: tuple[str, ...] | None = None) -> Iterator[Cell]:
+    """The cells of a quantity, by horizon, stratum (all tops at first) and target."""
+    for horizon in horizons(data):
+        for stratum in (ALL, *strata(data)) if among is None else among:
+            for target in targets(data):
+                yield Cell(horizon, quantity, target, stratum)
+
+
+# ---- silent failures and the guard -----------------------------------------------------------------------------------
+
+
+class Health(NamedTuple):
+    """Of one row over one horizon, by setting: runs judged, wrong ones, silent failures; (settings,)."""
+
+    fixed_step: bool
+    setting: Array  # steps a nutation, or tolerances
+    runs: Array
+    wrong: Array
+    silent: Array
+
+    @property
+    def hidden(self) -> float:
+        """The part of all wrong runs that are silent failures; NaN if none is wrong."""
+        return float(self.silent.sum() / self.wrong.sum()) if self.wrong.sum() else np.nan
+
+
+def health(data: xr.DataTree, name: str, horizon: str = "short", stratum: str = ALL) -> Health:
+    """Runs, wrong runs and silent failures of a row at the settings at which (nearly) all members were judged."""
+    group = data[horizon].to_dataset().isel(scene=0).sel(integrator=name)
+    count = float(data["tops"]["known"].values.ravel()[: members(data, horizon)].sum())
+    judged = group["runs"].transpose("level", "stratum").values
+    there = judged.sum(axis=1) >= WHOLE * count
+    chosen = slice(None) if stratum == ALL else [strata(data).index(stratum)]
+    numbers = (group[key].transpose("level", "stratum").values[there][:, chosen] for key in ("runs", "wrong", "silent"))
+    fixed = str(group["control"].values) == "step_size"
+    return Health(fixed, group["setting"].values[there], *(part.sum(axis=1) for part in numbers))
+
+
+def judged_rows(data: xr.DataTree, horizon: str = "short") -> list[str]:
+    """The rows whose axis is judged, in the order of the registry."""
+    return costs(data, Cell(horizon, "axis", targets(data)[0]), "evaluations").names
+
+
+def scored(
+    data: xr.DataTree, horizon: str, score: str, names: list[str] | None = None
+) -> tuple[Array, NDArray[np.bool_]]:
+    """A score of the runs that the guard was asked about, and whether they were wrong.
+
+    The score is the guard's forecast of the axis error ("foretold"), or the larger error of energy and momenta of the
+    run ("watched"). Runs between `EXPECTED` and `WRONG` are neither right nor wrong and are left out.
+    """
+    group = data[horizon].to_dataset().isel(scene=0).sel(integrator=names or judged_rows(data, horizon))
+    values, errors = group[score].values.ravel(), group["measured"].values.ravel()
+    asked = ~np.isnan(values) & ((errors <= EXPECTED) | (errors > WRONG))
+    return values[asked], errors[asked] > WRONG
+
+
+def detected(
+    data: xr.DataTree, horizon: str = "short", score: str = "foretold", names: list[str] | None = None
+) -> Detection:
+    """How well a score tells wrong runs from right ones."""
+    return detection(*scored(data, horizon, score, names))
+
+
+def caught(
+    data: xr.DataTree, horizon: str = "short", score: str = "foretold", names: list[str] | None = None
+) -> tuple[Share, Share]:
+    """Wrong runs with a score above its threshold, and right ones."""
+    values, wrong = scored(data, horizon, score, names)
+    warned = values > THRESHOLDS[score]
+    return Share(int((warned & wrong).sum()), int(wrong.sum())), Share(
+        int((warned & ~wrong).sum()), int((~wrong).sum())
+    )

@@ -1,0 +1,78 @@
+"""The closed form against the fastest row, from the times of one round: what an integrator is not needed for."""
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure import ranking
+from symtop.measure.work import TARGETS
+from symtop.runner.study import Table
+
+
+class Beside(NamedTuple):
+    """The fastest compiled row of one scene, horizon and target, and the closed form timed in the same rounds."""
+
+    scene: str
+    far: int  # index of the horizon
+    target: float
+    row: str
+    seconds: float  # of the row
+    closed_form: float  # seconds
+
+    @property
+    def ratio(self) -> float:
+        """How many times less the closed form takes."""
+        return self.seconds / self.closed_form
+
+
+def compared(data: xr.Dataset) -> list[Beside]:
+    """Every problem that a compiled row solved and the closed form was timed on."""
+    names = [str(name) for name in data["integrator"].values if name not in ranking.ranked(data)]
+    if not names:
+        return []
+    taken = data["seconds"].sel(integrator=names)
+    taken = taken.min([dim for dim in taken.dims if dim not in ("scene", "horizon")])
+    pairs = []
+    for (scene, far, target), won in ranking.winners(data).items():
+        beside = float(taken.sel(scene=scene).isel(horizon=far))
+        if won is not None and np.isfinite(beside):
+            pairs.append(Beside(scene, far, target, won.best.integrator, won.best.cost, beside))
+    return pairs
+
+
+def headline(data: xr.Dataset) -> str:
+    """What the comparison says, in two or three sentences; empty if the closed form was not timed."""
+    ratios = np.array([pair.ratio for pair in compared(data)])
+    if ratios.size == 0:
+        return ""
+    faster = ratios > 1.0
+    if not faster.any():
+        return f"The closed form is slower than the fastest row in all {ratios.size} combinations of both."
+    most_often = faster.mean() > 0.5
+    first = "For a free symmetric top under gravity the fastest method is no integrator. " if most_often else ""
+    least, middle, most = np.quantile(ratios[faster], [0.0, 0.5, 1.0])
+    return (
+        f"{first}In {int(faster.sum())} of {ratios.size} combinations of scene, horizon and target the closed form "
+        f"takes less time than the fastest compiled row, {least:.2g} to {most:.2g} times less (median {middle:.2g}). "
+        "The rows are compared for what they do on problems without a closed form."
+    )
+
+
+def table(data: xr.Dataset, spans: list[str]) -> Table:
+    """The ratios: how many times less the closed form takes than the fastest row, by scene, horizon and target."""
+    pairs = {(pair.scene, pair.far, pair.target): pair for pair in compared(data)}
+    rows = [
+        [str(scene), span, *(_cell(pairs.get((str(scene), far, target))) for target in TARGETS)]
+        for scene in data["scene"].values
+        for far, span in enumerate(spans)
+    ]
+    return Table(
+        "The closed form beside the fastest compiled row, timed in the same rounds: how many times less it takes",
+        ["scene", "horizon", *(f"axis error {target:.0e}" for target in TARGETS)],
+        rows,
+    )
+
+
+def _cell(pair: Beside | None) -> str:
+    return "" if pair is None else f"{pair.ratio:.3g} ({pair.closed_form * 1e6:.3g} us; {pair.row})"

@@ -1,0 +1,31 @@
+"""A clock on the terminal that goes on while one piece of work takes long, such as a compilation."""
+
+import contextlib
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+from tqdm import tqdm
+
+BEAT = 1.0  # seconds from one look of the clock to the next
+
+
+@contextlib.contextmanager
+def ticking(words: str) -> Iterator[Any]:
+    """Some words and the time since, on the standard error if that is a terminal, drawn each second until the end."""
+    with tqdm(desc=words, bar_format="{desc}: {elapsed}", disable=None, leave=False) as bar:
+        ended = threading.Event()
+
+        def beat() -> None:
+            while not ended.wait(BEAT):
+                bar.refresh()
+
+        thread = threading.Thread(target=beat, daemon=True)
+        if not bar.disable:
+            thread.start()
+        try:
+            yield bar
+        finally:
+            ended.set()
+            if thread.is_alive():
+                thread.join()

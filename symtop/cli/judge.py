@@ -1,0 +1,88 @@
+"""``symtop judge``: anybody's integrator against what it claims."""
+
+import json
+import sys
+
+import click
+
+from symtop.cli.common import json_option, plugin_option, terminal_width
+from symtop.cli.completion import completing
+
+FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
+
+
+@click.command(short_help="Judge an integrator of your own.")
+@click.argument("target")
+@click.option("--form", type=click.Choice(FORMS), help="What TARGET is, if not clear.")
+@click.option("--chart", default="axis", show_default=True, help="What a state is: axis, attitude or angles.")
+@click.option("--scene", default="spheroid", show_default=True, shell_complete=completing("scenes"), help="The top.")
+@click.option("--order", type=int, help="Claim an order.")
+@click.option("--symplectic/--not-symplectic", default=None, help="Claim that the step is symplectic, or not.")
+@click.option("--symmetric/--not-symmetric", default=None, help="Claim that a step of -h undoes one of h, or not.")
+@click.option("--explicit/--implicit", default=None, help="Claim that it solves no equations, or that it does.")
+@click.option("--conserves", metavar="NAMES", help="Claim constants: energy, p_phi, p_psi, axis_length, with commas.")
+@click.option("--energy", type=click.Choice(["kept", "bounded"]), help="Claim what becomes of the energy.")
+@click.option("--adaptive", is_flag=True, help="Judge a class of SciPy's at a tolerance, not at fixed steps.")
+@click.option("--quick", is_flag=True, help="Ten seconds at most: shorter runs.")
+@click.option("--output", type=click.Path(dir_okay=False), help="Write the findings to this netCDF file.")
+@click.option("--card", type=click.Path(dir_okay=False), help="Write a page with two figures and the ledger (HTML).")
+@click.option("--badge", type=click.Path(dir_okay=False), help="Write a badge for a README (SVG).")
+@plugin_option
+@json_option
+def judge(
+    target: str, form: str | None, chart: str, scene: str, order: int | None, symplectic: bool | None,
+    symmetric: bool | None, explicit: bool | None, conserves: str | None, energy: str | None, adaptive: bool,
+    quick: bool, output: str | None, card: str | None, badge: str | None, as_json: bool,
+) -> None:  # fmt: skip
+    """Judge TARGET: its order, structure, invariants and drift on the top, beside what you claim of it.
+
+    \b
+    TARGET          what it is
+    my.py:step      a function step(f, t, y, h) -> y for y' = f(t, y)
+    my.py:MyRK      a class derived from scipy.integrate.OdeSolver
+    my.py:solver    an instance of a solver of diffrax
+    ./my.so         void step(double *y, double h, const double *par, long n)
+    "./engine -x"   a program: a line of numbers in, states out
+    run.csv         a trajectory without a method: time and states (see symtop.judging.trajectory)
+
+    Without a claim it says what the method is. The exit code is 1 if a claim is refuted.
+
+    \b
+    symtop judge my.py:step --order 4 --symplectic
+    symtop judge ./my.so --chart axis --order 2
+    symtop judge "./my_engine --top" --form program --quick
+    symtop judge run.csv --scene spheroid --conserves p_phi
+    """
+    from symtop.judging import screen
+    from symtop.judging.judge_step import judge as judged
+    from symtop.judging.ledger import Finding
+    from symtop.judging.watched import About
+
+    def tell(event: About | Finding) -> None:
+        shown = screen.heading(event._asdict(), scene) if isinstance(event, About) else screen.line(event, width)
+        if shown:
+            click.echo(shown)
+
+    width = terminal_width()
+    ledger = judged(
+        target, form=form, chart=chart, scene=scene, order=order, symplectic=symplectic, symmetric=symmetric,
+        explicit=explicit, conserves=None if conserves is None else conserves.split(","), energy=energy,
+        adaptive=adaptive, quick=quick, tell=None if as_json else tell,
+    )  # fmt: skip
+    if as_json:
+        click.echo(json.dumps([finding.plain() for finding in ledger.findings], indent=1))
+    else:
+        click.echo(screen.ending(ledger.findings))
+    if output is not None:
+        from symtop.base import datasets
+
+        datasets.write(ledger.dataset(), output)
+        click.echo(f"written to {output}", err=as_json)
+    if card is not None or badge is not None:
+        from symtop.report import card as cards
+
+        for file, write in ((card, cards.card), (badge, cards.write_badge)):
+            if file is not None:
+                click.echo(f"written to {write(ledger, file)}", err=as_json)
+    if ledger.refuted:
+        sys.exit(1)

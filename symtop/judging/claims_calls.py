@@ -1,0 +1,139 @@
+"""What a step from elsewhere is like to call: the same twice, from any start, in double precision, backwards.
+
+A one-step method is a function of its arguments. A call is repeated, then repeated after a step somewhere else: numbers
+that depend on what was called before are those of a step that keeps something, such as the last force, and its runs
+depend on the runs before. Where the loop over steps is somebody else's, a run of n + m steps is compared with a run of
+n and one of m: a loop that sums its time and stops too late or too soon is a step away, a method of several steps less.
+"""
+
+import contextlib
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from symtop.base.validate import SymtopError
+from symtop.judging.ledger import Finding
+from symtop.judging.sockets.socket import Stepper
+from symtop.measure.step_map import generic_start
+from symtop.model.scenes import Scene
+from symtop.model.top import Angles
+
+SHARE = 0.0137  # of a nutation: the step that is called
+SAME = 1e-13  # relative: what threads may leave between two calls
+A_FUNCTION = "a function"
+REPEATS, SECONDS = 250, 0.3  # calls with the same arguments, or as many as there is time for
+NOTHING, STANDS = 1e-8, 1e-6  # a step of so little moves a state by less than this, relative
+FAR = 200.0  # times the step: one that most methods do not survive
+PARTS = ((20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000))  # runs that are cut in two
+REMEMBERED = 1e-9  # of a step: a last slope that is kept, and not computed anew, makes 1e-10 in 2000 steps
+MISSED = 0.2  # of a step: a method of several steps starts anew with less
+ELSEWHERE = 0.3  # rad and units of the rates, from the start that is called
+
+
+def calls(stepper: Stepper, scene: Scene) -> Finding:
+    """The finding on the calls; refuted if a step is not a function of its arguments."""
+    h, start = SHARE * scene.time_scale(), generic_start(scene)
+
+    def once(at: Angles, step: float) -> Any:
+        par, state = stepper.form.prepare(scene.top, at)
+        return stepper.march(scene.top, par, np.array(state), step, np.array([1])).states[0]
+
+    names = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
+    other = Angles(*(getattr(start, name) * (1.0 - ELSEWHERE) for name in names))
+    first = once(start, h)
+    again, third = once(start, h), once(start, h)
+    count, differs = (0, 0.0) if stepper.own_loop else _repeated(lambda: once(start, h), third)
+    once(other, h)
+    with contextlib.suppress(SymtopError):
+        once(other, FAR * h)  # which may fail, and must not be remembered either
+    after = once(start, h)
+    twice, later = _apart(again, third), max(_apart(first, again), _apart(first, after), _apart(again, after))
+    if twice > SAME:
+        why = f"two calls with the same arguments differ by {twice:.1e}"
+        return Finding("calls", A_FUNCTION, "not repeatable", "refuted", why, twice, SAME)
+    if later > SAME:
+        why = f"it keeps something between calls: after a step elsewhere the same call differs by {later:.1e}"
+        return Finding("calls", A_FUNCTION, "keeps state", "refuted", why, later, SAME)
+    if differs > SAME:
+        why = f"it keeps something between calls: call {count} with the same arguments differs by {differs:.1e}"
+        return Finding("calls", A_FUNCTION, "keeps state", "refuted", why, differs, SAME)
+    still = np.array(stepper.form.prepare(scene.top, other)[1])
+    moved = _apart(still, _alike(stepper.chart, still, once(other, NOTHING * h)))
+    if moved > STANDS:
+        why = (
+            f"it keeps something of its first start: from another one, a step of {NOTHING * h:.0e} moves by {moved:.1e}"
+        )
+        return Finding("calls", A_FUNCTION, "keeps state", "refuted", why, moved, STANDS)
+    told = _told(stepper, first)
+    if stepper.own_loop:
+        missed, why = _steps_missed(stepper, scene, h / 10.0)
+        if missed > MISSED:
+            return Finding("calls", A_FUNCTION, "miscounts steps", "refuted", why, missed, MISSED)
+        told |= {"remembers": why} if missed > REMEMBERED else {}
+    told |= _backwards(lambda step: once(start, step), h)
+    why = "; ".join(["a call gives the same numbers again, and after a step elsewhere", *told.values()])
+    return Finding("calls", "", ", ".join(told) or A_FUNCTION, "measured", why, later, SAME)
+
+
+def _repeated(call: Callable[[], Any], state: Any) -> tuple[int, float]:
+    """The first of many calls that differs, counted from the one that gave `state`, and by how much; else the last."""
+    began, count, gap = time.monotonic(), 0, 0.0
+    while count < REPEATS and gap <= SAME and time.monotonic() - began < SECONDS:
+        count, gap = count + 1, _apart(state, call())
+    return count, gap
+
+
+def _steps_missed(stepper: Stepper, scene: Scene, h: float) -> tuple[float, str]:
+    """How far a run is from two runs of as many steps, in steps, and a clause; the largest of `PARTS`."""
+    par, state = stepper.form.prepare(scene.top, generic_start(scene))
+    start = np.array(state)
+
+    def run(y: Any, steps: int) -> Any:
+        return stepper.march(scene.top, par, y.copy(), h, np.array([steps])).states[0]
+
+    a_step = float(np.max(np.abs(run(start, 1) - start)))
+    worst, why = 0.0, ""
+    for first, second in PARTS:
+        gap = float(np.max(np.abs(run(start, first + second) - run(run(start, first), second)))) / a_step
+        if gap > worst:
+            worst = gap
+            why = f"a run of {first + second} steps is {gap:.2g} steps from one of {first} and one of {second}"
+    return worst, why
+
+
+def _alike(chart: str, guide: Any, state: Any) -> Any:
+    """The state, its q or angles as near to those of `guide` as they can be: -q is q, and angles have whole turns."""
+    if chart == "attitude":
+        return np.concatenate([np.copysign(1.0, guide[:4] @ state[:4]) * state[:4], state[4:]])
+    if chart == "angles":
+        return np.concatenate([state[:3] - 2.0 * math.pi * np.rint((state[:3] - guide[:3]) / 2.0 / math.pi), state[3:]])
+    return state
+
+
+def _apart(first: Any, second: Any) -> float:
+    """Largest difference, relative to the largest number."""
+    size = float(np.max(np.abs(first)))
+    apart = float(np.max(np.abs(first - second))) / max(size, 1e-300)
+    return apart if np.isfinite(apart) else math.inf
+
+
+def _backwards(once: Callable[[float], Any], h: float) -> dict[str, str]:
+    """What becomes of a step of -h, where it makes none."""
+    try:
+        once(-h)
+    except SymtopError as error:
+        return {"forward only": str(error)}
+    except Exception as error:  # noqa: BLE001  (somebody else's code)
+        return {"forward only": f"a step of -h raises {type(error).__name__}: {error}"}
+    return {}
+
+
+def _told(stepper: Stepper, state: Any) -> dict[str, str]:
+    """What else is to be told of a call: in two words, and in a clause."""
+    single = np.isfinite(state).all() and (state == state.astype(np.float32)).all()
+    return ({"changes its input": "it writes to its input"} if getattr(stepper, "wrote", False) else {}) | (
+        {"single precision": "its numbers are those of single precision"} if single else {}
+    )

@@ -1,0 +1,104 @@
+"""Any program: it reads one line on the standard input and writes states on the standard output.
+
+    in      I1 I3 mgl h n stride y1 y2 ...           numbers, separated by blanks
+    out     the state after 0, stride, 2 stride, ... n steps, as text (any blanks or commas) or as raw doubles
+
+y is (e, L) on the axis, (q, L) on the attitude, (theta, phi, psi and their rates) in angles; n is a multiple of stride,
+and h may be negative. The program is started for every run, so that nothing is left from one to the next.
+"""
+
+import contextlib
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop.base.validate import SymtopError
+from symtop.judging.pulse import pulse
+from symtop.judging.sockets.socket import March, label_of
+from symtop.methods.formulations import FORMULATIONS
+from symtop.methods.plan import Array
+from symtop.methods.registry import Solver
+from symtop.model.top import SymmetricTop
+
+WORDS = 100  # characters of what a program says when it fails
+SLACK = 5.0  # times the seconds that earlier runs make one expect
+
+
+class Program:
+    """A stepper around a command."""
+
+    implementation = "python"
+    adaptive: Solver | None = None
+    own_loop = True
+
+    def __init__(self, command: str, chart: str) -> None:
+        self.words, self.chart, self.form = shlex.split(command), chart, FORMULATIONS[chart]
+        if not self.words or shutil.which(self.words[0]) is None:
+            raise SymtopError(f"a program must be a command that can be run, not {command!r}")
+        self.name = label_of(Path(self.words[0]).name)
+        self.seconds_a_step = 0.0  # of the slowest run so far
+
+    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: NDArray[np.int64]) -> March:
+        """The state at the marks; SymtopError if the program fails or writes anything else."""
+        stride = max(int(np.gcd.reduce(marks)), 1)
+        last = int(marks[-1])
+        numbers = [top.I1, top.I3, top.mgl, h, last, stride, *y.tolist()]
+        rows = last // stride + 1
+        answer = self._answer(" ".join(map(repr, numbers)) + "\n", h, last)
+        states = _states(answer, rows, y.size, self.name)
+        return March(states[marks // stride], 0)
+
+    def _answer(self, line: str, h: float, steps: int) -> bytes:
+        expected = SLACK * self.seconds_a_step * steps
+        seconds = pulse.patience + expected
+        pulse.begin(h, expected + seconds)
+        began = time.monotonic()
+        with subprocess.Popen(  # noqa: S603  (the command is the user's)
+            self.words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+        ) as process:
+            try:
+                out, said = process.communicate(line.encode(), timeout=seconds)
+            except subprocess.TimeoutExpired:
+                with contextlib.suppress(OSError):
+                    os.killpg(process.pid, signal.SIGKILL)
+                raise SymtopError(
+                    f"{self.name} had not ended {seconds:.0f} s after it was asked for {steps} steps of {h:.3g}"
+                ) from None
+        pulse.end()
+        if process.returncode != 0:
+            words = " ".join(said.decode(errors="replace").split())[-WORDS:]
+            raise SymtopError(f"{self.name} ended with code {process.returncode}: {words or 'it said nothing'}")
+        if steps > 0:
+            self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps) if steps > 50 else 0.0
+        return out
+
+
+def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
+    """The states that a program wrote, shape (rows, size)."""
+    if len(answer) == 8 * rows * size:
+        raw = np.frombuffer(answer)
+        if not _is_text(answer):
+            return raw.reshape(rows, size).copy()
+    try:
+        values = np.array(answer.decode("ascii").replace(",", " ").split(), dtype=float)
+    except ValueError:
+        shown = answer[:40].decode(errors="replace").strip()
+        raise SymtopError(f"{name} must write numbers, as text or as raw doubles, not {shown!r}") from None
+    if values.size != rows * size:
+        raise SymtopError(
+            f"{name} must write {rows} states of {size} numbers (the start and one every stride steps), "
+            f"{rows * size} in all, not {values.size}"
+        )
+    return values.reshape(rows, size)
+
+
+def _is_text(answer: bytes) -> bool:
+    return all(byte in b"0123456789+-.eEinfaINFA, \t\r\n" for byte in answer)

@@ -1,0 +1,159 @@
+"""A trajectory without a method: its errors, and what became of the constants of the motion, as far as it shows them.
+
+Errors are against the true motion of the scene (`symtop.measure.errors`). Where the angular momentum L in space is
+there, energy and momenta are recomputed from it, whatever the file reports,
+
+    E = |L|^2/2 I1 + (L.e)^2 (1/I3 - 1/I1)/2 + mgl e_z,      p_phi = L_z,      p_psi = L.e,
+
+and else they are those of the file. A text file has a line of names and then numbers, with commas or blanks between:
+time, elapsed since the start of the scene, and any of
+
+    ex ey ez           the axis, a unit vector in space, z up       theta phi psi         Euler angles (z-x-z), rad
+    qw qx qy qz        the attitude, body to space                  energy p_phi p_psi
+    Lx Ly Lz           the angular momentum in space
+
+A netCDF file has time, axis (n, 3), quaternion (n, 4), momentum (n, 3) and the same scalars, or is one of `simulate`.
+"""
+
+import math
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.base import datasets
+from symtop.base.validate import SymtopError
+from symtop.judging.claims_long import KEPT, Constant
+from symtop.judging.ledger import Finding
+from symtop.measure.conservation import CONSTANTS, constant_of
+from symtop.measure.errors import errors
+from symtop.measure.trajectory import completed
+from symtop.model.scenes import Scene
+from symtop.model.view import space_energy
+
+FILES = (".csv", ".txt", ".dat", ".nc")
+VECTORS = {"axis": ("ex", "ey", "ez"), "quaternion": ("qw", "qx", "qy", "qz"), "momentum": ("Lx", "Ly", "Lz")}
+SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
+ERRORS = ("axis", "attitude", "theta")
+FEWEST = 100  # samples by which a law of growth is judged
+
+
+def is_trajectory(target: Any) -> bool:
+    """Is it a file or a table of states, and nothing that steps?"""
+    if isinstance(target, (xr.Dataset, Mapping)):
+        return True
+    return isinstance(target, (str, Path)) and str(target).lower().endswith(FILES) and " " not in str(target)
+
+
+def read(target: Any) -> dict[str, Any]:
+    """Columns by name, of a file, a Dataset or a mapping; SymtopError for anything else."""
+    if not isinstance(target, (str, Path)):
+        columns = {str(name): np.asarray(target[name]) for name in target if str(name) in (*VECTORS, *SCALARS)}
+        return columns | {"time": np.asarray(target["time"])} if "time" in target else columns
+    if str(target).lower().endswith(".nc"):
+        return read(datasets.read(target))
+    return _text(Path(target))
+
+
+def _text(path: Path) -> dict[str, Any]:
+    """The columns of a text file."""
+    try:
+        head, *lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text, or empty"
+        raise SymtopError(f"the trajectory {path} cannot be read: {reason}") from None
+    names = head.lstrip("# ").replace(",", " ").split()
+    known = (*SCALARS, *(part for parts in VECTORS.values() for part in parts))
+    unknown = [name for name in names if name not in known]
+    if unknown or "time" not in names or len(set(names)) < len(names):
+        raise SymtopError(
+            f"{path.name} must begin with a line of names, time and of {', '.join(known[1:])}, not {head[:60]!r}"
+        )
+    rows = [line.replace(",", " ").split() for line in lines if line.strip()]
+    for k, row in enumerate(rows):
+        if len(row) != len(names):
+            raise SymtopError(f"{path.name} must have {len(names)} numbers a line, and row {k + 1} has {len(row)}")
+    try:
+        table = np.array(rows, dtype=float).reshape(-1, len(names))
+    except ValueError as error:
+        raise SymtopError(f"{path.name} must hold numbers: {error}") from None
+    columns = dict(zip(names, table.T, strict=True))
+    for name, parts in VECTORS.items():
+        if set(parts) <= set(columns):
+            columns[name] = np.stack([columns[part] for part in parts], axis=-1)
+    return {name: values for name, values in columns.items() if name in (*VECTORS, *SCALARS)}
+
+
+def findings(target: Any, scene: Scene, conserves: Collection[str] = (), energy: str | None = None) -> list[Finding]:
+    """What the samples say: a finding for each error and each constant that they show.
+
+    Raises SymtopError for data that are no trajectory of a top.
+    """
+    given = read(target)
+    momentum = given.pop("momentum", None)
+    apart = errors(given, scene)
+    time = apart["time"].values
+    shown = [_error(name, time, apart) for name in ERRORS if name in apart]
+    own = _from_states(scene, given, momentum)
+    for name in CONSTANTS:
+        values = own.get(name, given.get(name))
+        if values is not None:
+            declared = (energy or "") if name == "energy" and energy else "kept" if name in conserves else ""
+            shown.append(_constant(name, declared, time, np.asarray(values, float), scene))
+    return shown
+
+
+def _from_states(scene: Scene, given: Mapping[str, Any], momentum: Any) -> dict[str, np.ndarray]:
+    """Energy and momenta by the angular momentum and the axis; nothing where one of them is not there."""
+    if momentum is None:
+        return {}
+    whole = completed(xr.Dataset({name: (_dimensions(name), given[name]) for name in given if name != "time"}))
+    if "axis" not in whole:
+        return {}
+    axis = whole["axis"].values
+    L = np.asarray(momentum, dtype=float)
+    if L.shape != axis.shape:
+        raise SymtopError(f"momentum must have the shape {axis.shape}, one row for each time, not {L.shape}")
+    p_psi = np.sum(L * axis, axis=1)
+    return {"energy": space_energy(scene.top, axis, L, p_psi), "p_phi": L[:, 2], "p_psi": p_psi}
+
+
+def _dimensions(name: str) -> tuple[str, ...]:
+    return {"axis": ("time", "component"), "quaternion": ("time", "part")}.get(name, ("time",))
+
+
+def _error(name: str, time: np.ndarray, apart: xr.Dataset) -> Finding:
+    """The largest error of a quantity and its law of growth."""
+    values = apart[name].values
+    seen = constant_of(time, values) if time.size >= FEWEST else None
+    largest = float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
+    bound = float(np.nanmax(apart[f"{name}_bound"].values))
+    why = f"largest error {largest:.1e} rad in {time.size} samples up to t = {time[-1]:.4g}"
+    if seen is not None and math.isfinite(seen.exponent):
+        why += f", growing as t^{seen.exponent:.2f} +- {seen.exponent_interval:.2f} ({seen.law})"
+    law = f", {seen.law}" if seen is not None and seen.law not in ("undecided", "not judged") else ""
+    return Finding(f"{name}_error", "", f"{largest:.0e} rad{law}", "measured", why, largest, bound)
+
+
+def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, scene: Scene) -> Finding:
+    """What became of a constant of the motion, beside what is claimed of it."""
+    scale, grain = (scene.energy_scale, scene.energy_grain) if name == "energy" else (scene.momentum_scale, 1.0)
+    true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
+    change = (values - values[0]) / scale
+    seen = Constant(constant_of(time, change), math.nan, KEPT * grain, grain)
+    largest, off = seen.changed.largest, abs(values[0] - true) / scale
+    why = f"largest relative change {largest:.1e} in {time.size} samples; it begins {off:.1e} from the scene's"
+    kind = seen.kind if time.size >= FEWEST else "kept" if largest <= seen.floor else "unknown"
+    if kind == "unknown":
+        return Finding(name, declared, "", "undecided", f"{why}; no law of growth to judge it by", largest, seen.floor)
+    if kind != "kept":
+        why += f", growth exponent {seen.changed.exponent:.2f} +- {seen.changed.exponent_interval:.2f}"
+    holds = {"kept": kind == "kept" or largest <= seen.floor, "bounded": not seen.grows}.get(declared)
+    if declared == "bounded" and seen.grows is None:
+        return Finding(
+            name, declared, "", "undecided", f"{why}, which leaves open whether it grows", largest, seen.floor
+        )
+    verdict = "measured" if holds is None else "confirmed" if holds else "refuted"
+    return Finding(name, declared, f"{kind}, {largest:.0e}", verdict, why, largest, seen.floor)

@@ -1,0 +1,158 @@
+"""The card of a judged step, one self-contained page, and the badge for a README.
+
+Two figures, the errors over the step size with the order that they show, and the energy over the long run; below them
+the ledger, a row a claim, with the reason of each verdict. The badge says what the method is, or which claims are
+refuted, in SVG of a fixed width for each letter, so that it looks alike with any font.
+"""
+
+import html
+import io
+import math
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from symtop.base import datasets
+from symtop.base.validate import SymtopError
+from symtop.judging.judge_step import Judged
+from symtop.judging.ledger import Finding, spoken
+from symtop.judging.screen import described
+from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels
+
+LEAST = 1e-17  # what is smaller is drawn here
+LETTER = 6.6  # width of a letter of the badge, pixels
+LONGEST = 72  # letters of what a badge says
+SIGNS = {"confirmed": "✓", "refuted": "✗", "measured": "=", "undecided": "?", "inapplicable": "–"}
+
+
+def figures(ledger: Judged) -> tuple[Any, Any]:
+    """Two figures: errors over the step size, and the change of the energy over the long run."""
+    (first, order), (second, energy) = (panels(1, 1, width=4.8, height=3.5) for _ in range(2))
+    _order(order[0, 0], ledger)
+    _energy(energy[0, 0], ledger)
+    return first, second
+
+
+def _drawn(figure: Any) -> str:
+    """A figure as SVG, from its opening tag on."""
+    drawn = io.StringIO()
+    figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
+    plt.close(figure)
+    return drawn.getvalue().partition("<svg")[2]
+
+
+def _order(axis: Any, ledger: Judged) -> None:
+    traces, finding = ledger.traces, ledger["order"]
+    axis.set(title=f"order: {finding.measured or 'not measured'}", xlabel="step size", ylabel="error at the end (rad)")
+    steps, errors = (np.asarray(traces.get(name, [])) for name in ("step_size", "error"))
+    seen = np.isfinite(steps) & (errors > 0.0)
+    if not seen.any():
+        _nothing(axis, finding)
+        return
+    fitted = np.asarray(traces["fitted"]) == 1.0
+    axis.plot(steps[seen], errors[seen], "o", color=GREY, fillstyle="none", label="not in the fit")
+    axis.plot(steps[seen & fitted], errors[seen & fitted], "o", color=BLUE, label="in the fit")
+    axis.set(xscale="log", yscale="log")
+    claimed = finding.declared.isdigit()
+    order = int(finding.declared) if claimed else _integer(finding.value)
+    if order is not None:
+        used = np.flatnonzero(seen & fitted) if (seen & fitted).any() else np.flatnonzero(seen)
+        first, last = used[np.argmin(steps[used])], used[np.argmax(steps[used])]
+        ends = steps[[first, last]]
+        label = f"h^{order}{', as claimed' if claimed else ''}"
+        axis.plot(ends, errors[first] * (ends / ends[0]) ** order, color=GREY, lw=0.9, ls=(0, (5, 3)), label=label)
+    axis.legend(frameon=False)
+
+
+def _integer(slope: float) -> int | None:
+    return round(slope) if 0.5 < slope < 99.0 else None
+
+
+def _energy(axis: Any, ledger: Judged) -> None:
+    traces, finding = ledger.traces, ledger["energy"]
+    axis.set(
+        title=f"energy: {finding.measured or 'not measured'}", xlabel="time (nutations)",
+        ylabel="|change|, of the nutation's energy",
+    )  # fmt: skip
+    times, change = (np.asarray(traces.get(name, [])) for name in ("long_nutations", "energy_change"))
+    seen = np.isfinite(change) & np.isfinite(times)
+    if not seen.any():
+        _nothing(axis, finding)
+        return
+    axis.plot(times[seen], np.maximum(change[seen], LEAST), color=ORANGE, label=f"{int(traces['steps_run'])} steps")
+    axis.set(xscale="log", yscale="log")
+    if math.isfinite(finding.resolution):
+        axis.axhline(finding.resolution, color=GREY, lw=0.9, ls=(0, (5, 3)), label="what rounding explains")
+    axis.legend(frameon=False)
+
+
+def _nothing(axis: Any, finding: Finding) -> None:
+    """A panel without points says why."""
+    words = textwrap.fill(finding.why or "it was not measured", 44)
+    axis.text(0.5, 0.5, words, ha="center", va="center", transform=axis.transAxes)
+    axis.set(xticks=[], yticks=[])
+
+
+def card(ledger: Judged, path: str | Path) -> Path:
+    """Write the card, an HTML page; SymtopError for a trajectory and a place that cannot be written to."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    if not ledger.about.chart:
+        raise SymtopError("a card shows a method: there is none of a trajectory")
+    folder = Path(__file__).parent / "templates"
+    loader = PackageLoader("symtop", "report/templates")
+    page = Environment(loader=loader, autoescape=True, undefined=StrictUndefined).get_template("card.html")
+    text = page.render(
+        css=(folder / "style.css").read_text(encoding="utf-8"),
+        about=ledger.about,
+        scene=ledger.scene,
+        described=described(ledger.findings),
+        badge=badge(ledger),
+        drawings=[_drawn(figure) for figure in figures(ledger)],
+        rows=[_row(one) for one in ledger.findings if one.declared or one.verdict != "inapplicable"],
+    )
+    return _written(text, path)
+
+
+def _row(finding: Finding) -> dict[str, str]:
+    verdict = f"{SIGNS[finding.verdict]} {finding.verdict}"
+    cells = finding.plain() | {"verdict": verdict, "claim": spoken(finding.claim)}
+    return {name: str(value) for name, value in cells.items()}
+
+
+def badge(ledger: Judged) -> str:
+    """The badge: what the method is, in green without a claim that is refuted, in vermillion with one."""
+    refuted = [spoken(one.claim) for one in ledger.findings if one.verdict == "refuted"]
+    words = f"refuted: {', '.join(refuted)}" if refuted else described(ledger.findings).partition(";")[0]
+    if len(words) > LONGEST:
+        words = words[:LONGEST].rsplit(",", 1)[0]
+    left, right = (round(len(text) * LETTER + 12) for text in ("symtop", words))
+    title, color = html.escape(words, quote=True), VERMILLION if refuted else GREEN
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {left + right} 20"',
+        f'width="{left + right}" height="20" role="img">',
+        f"<title>symtop: {title}</title>",
+        f'<rect width="{left}" height="20" fill="#444444"/>',
+        f'<rect x="{left}" width="{right}" height="20" fill="{color}"/>',
+        '<g fill="#ffffff" font-family="Verdana,DejaVu Sans,sans-serif" font-size="11">',
+        f'<text x="6" y="14" textLength="{left - 12}">symtop</text>',
+        f'<text x="{left + 6}" y="14" textLength="{right - 12}">{title}</text>',
+        "</g>",
+        "</svg>",
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def write_badge(ledger: Judged, path: str | Path) -> Path:
+    """Write the badge as an SVG file; SymtopError if the folder cannot be written to."""
+    return _written(badge(ledger), path)
+
+
+def _written(text: str, path: str | Path) -> Path:
+    target = Path(path)
+    with datasets.replacing(target, target.suffix) as partial:
+        partial.write_text(text, encoding="utf-8")
+    return target

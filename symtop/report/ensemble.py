@@ -1,0 +1,67 @@
+"""An ensemble as a picture: how the errors of its members spread as time goes on."""
+
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure.spread import LEVELS, QUANTITIES, member_errors, spread
+from symtop.report.style import look, panels, save
+
+LEAST = 1e-16  # what is smaller is drawn here
+BANDS = ((0, 4, 0.18, "1 to 99 %"), (1, 3, 0.38, "10 to 90 %"))  # of `LEVELS`, and how opaque
+MOST = 1e3  # what is larger, and members that failed, are drawn here
+
+
+def draw(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> Path:
+    """Two panels into a PNG: quantiles over members of the axis error and of the energy error against time."""
+    shown = [name for name in QUANTITIES if name in data]
+    figure, axes = panels(len(shown), 1, height=2.9, sharex=True)
+    for axis, name in zip(axes[:, 0], shown, strict=True):
+        bands(axis, members, data, name)
+        axis.label_outer()
+    ended = (data["outcome"] == "ok").mean().item()
+    sentence = (
+        f"{data.attrs['integrator']} on {data.sizes['member']} tops: errors against the closed form; "
+        f"{100.0 * ended:.4g} % of the runs ended ok"
+    )
+    if ended < 1.0:
+        sentence += ", and those that failed count as infinitely wrong"
+    axes[0, 0].set_title(textwrap.fill(sentence, 110))
+    target = Path(path)
+    save(figure, target)
+    return target
+
+
+def bands(axis: Any, members: xr.Dataset, data: xr.Dataset, quantity: str) -> None:
+    """Quantiles over members of an error against time, on one Axes."""
+    horizons = data["horizon"].values
+    shared = (horizons == horizons[0]).all()
+    times = _places(data) * (horizons[0] if shared else 1.0)
+    quantiles = np.clip(spread(member_errors(members, data, quantity)), LEAST, MOST)
+    _bands(axis, times[1:], quantiles[:, 1:], look(data.attrs["integrator"]).color)
+    label = "time" if shared else "time, as a fraction of each member's horizon"
+    axis.set(yscale="log", ylabel=QUANTITIES[quantity], xlabel=label)
+
+
+def _places(data: xr.Dataset) -> Any:
+    """Mean place of each sample in the runs, from 0 to 1: it is dithered in some."""
+    return np.nanmean(np.atleast_2d(data["time"].values) / data["horizon"].values[:, None], axis=0)
+
+
+def _bands(axis: Any, times: Any, quantiles: Any, color: str) -> None:
+    """The median as a line and two bands about it, labelled at their right ends."""
+    for low, high, opaque, _ in BANDS:
+        axis.fill_between(times, quantiles[low], quantiles[high], color=color, alpha=opaque, lw=0.0)
+    axis.plot(times, quantiles[LEVELS.index(0.5)], color=color, lw=1.8)
+    names = [f"{100.0 * level:g} %" if level != 0.5 else "median" for level in LEVELS]
+    ends, place = np.log10(quantiles[:, -1]), -np.inf
+    least = 0.045 * max(np.ptp(np.log10(quantiles)), 1.0)  # labels do not overlap
+    for end, name in zip(ends, names, strict=True):
+        place = max(end, place + least)
+        axis.annotate(
+            name, (times[-1], 10.0**place), xytext=(5, 0), textcoords="offset points", fontsize=8.5, va="center"
+        )
+    axis.set_xlim(0.0, times[-1] * 1.07)

@@ -1,0 +1,230 @@
+"""sweep(): scenes x integrators x steps or tolerances -> one dataset of errors, work and outcomes.
+
+A cell, one integrator on one scene, is an error table (`symtop.measure.accuracy`). Cells are computed on threads, which
+compiled kernels let run at once. With a file, cells are kept in it as they are done, each with the digest of all that
+its numbers depend on (`symtop.base.fingerprint`), as the cases of a study are: what is up to date is not run again.
+"""
+
+import functools
+import math
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from tqdm import tqdm
+
+from symtop.base import datasets, fingerprint
+from symtop.base.threads import cores, in_threads
+from symtop.base.validate import SymtopError, positive, whole
+from symtop.base.walk import Walk
+from symtop.measure.accuracy import as_table, enough_samples, error_row
+from symtop.measure.errors import QUANTITIES
+from symtop.measure.settings import ANGLES
+from symtop.methods.registry import Integrator, integrator as find_integrator
+from symtop.model.scenes import Scene, scene as find_scene
+from symtop.run.simulation import make_plan
+from symtop.runner import depends
+
+KEEP_EVERY = 5.0  # seconds between two writings of the file
+RAISED = "raised"  # outcome of a run whose integrator raised an exception
+COUNTS = {
+    "steps": "steps",
+    "force_evaluations": "force evaluations",
+    "newton_iterations": "iterations of Newton's method",
+}
+
+
+class _Cell(NamedTuple):
+    """One integrator on one scene with its settings, and what its numbers depend on."""
+
+    scene: Scene
+    method: Integrator
+    settings: tuple[float, ...]
+    horizon: float
+    observe: str | None
+    made_of: str
+
+
+def sweep(
+    scenes: "str | Scene | Iterable[str | Scene]", integrators: "str | Integrator | Iterable[str | Integrator]", *,
+    step_size: object = None, tolerance: object = None, per_nutation: object = None, horizon: float | None = None,
+    observe: str | None = None, path: str | Path | None = None, threads: int | None = None, quiet: bool = False,
+) -> xr.Dataset:  # fmt: skip
+    """Run integrators on scenes at several steps or tolerances and return errors, work and outcomes as one dataset.
+
+    Methods of fixed step take every `step_size`, or a nutation period over every `per_nutation`; adaptive ones take
+    every `tolerance`; a formula, such as ``exact``, runs once. `scenes` and `integrators` are names, rows such as
+    ``rk4[axis]``, records, or lists of them. `horizon` and `observe` are those of `simulate`.
+
+    Dimensions ``scene``, ``integrator``, ``setting`` (in the order given). Variables, each over all three:
+
+        axis, attitude, theta, energy, p_phi, p_psi    largest error over the run (units as in `symtop.errors`)
+        axis_end ...                                   error at the horizon
+        axis_bound ...                                 the least error that the reference can judge
+        steps, force_evaluations, newton_iterations    work
+        step_size, tolerance                           what was set; NaN where the method has no such setting
+        outcome, message                               "ok", or how the run ended; "not_run" where a method has fewer
+                                                       settings; "raised", with the message, if it raised an exception
+
+    Cells are computed on as many `threads` as there are cores. With a `path`, they are kept in that netCDF file as they
+    are done: the same call resumes a sweep that was interrupted, runs again what has changed (a setting, a scene, the
+    source of a method), and ends in the same dataset. Raises SymtopError for arguments that make no sense.
+    """
+    chosen = [find_scene(one) for one in _listed(scenes)]
+    methods = [find_integrator(one) for one in _listed(integrators)]
+    workers = cores() if threads is None else whole("threads", threads, 1)
+    for words, names in (("scenes", [one.name for one in chosen]), ("integrators", [one.name for one in methods])):
+        if not names or len(set(names)) < len(names):
+            raise SymtopError(f"{words} must be one or more, each once, not {names!r}")
+    given = {
+        name: [positive(name, value) for value in np.ravel(np.asarray(values, dtype=object)).tolist()]
+        for name, values in (("step_size", step_size), ("per_nutation", per_nutation), ("tolerance", tolerance))
+        if values is not None
+    }
+    asked = [_cell(one, method, given, horizon, observe) for one in chosen for method in methods]
+    file = None if path is None else Path(path)
+    done = {} if file is None else _stored(file)
+    rest = [cell for cell in asked if cell.made_of not in done]
+
+    def combined() -> xr.Dataset:
+        size = max(len(cell.settings) for cell in asked)
+        tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in _rows(asked, len(methods))]
+        data = xr.concat([xr.concat(row, "integrator") for row in tables], "scene")
+        data = data.assign_coords(scene=[one.name for one in chosen], integrator=[one.name for one in methods])
+        units = chosen[0].units if len({one.units for one in chosen}) == 1 else ""
+        return _described(datasets.describe(data, "errors and work of a sweep", units=units))
+
+    kept = time.monotonic()
+    with tqdm(
+        total=len(asked), initial=len(asked) - len(rest), desc="sweep", disable=quiet or None, leave=False
+    ) as bar:
+        try:
+            for cell, table in zip(rest, in_threads(_table, rest, workers), strict=True):
+                done[cell.made_of] = table
+                bar.update()
+                if file is not None and time.monotonic() - kept > KEEP_EVERY:
+                    datasets.write(combined(), file)
+                    kept = time.monotonic()
+        except BaseException:
+            if file is not None and done:
+                datasets.write(combined(), file)
+            raise
+    data = combined()
+    if file is not None and rest:
+        datasets.write(data, file)
+    return data
+
+
+def _listed(things: Any) -> list[Any]:
+    """One thing, or several, as a list."""
+    if isinstance(things, (str, Scene, Integrator)) or not isinstance(things, Iterable):
+        return [things]
+    return list(things)
+
+
+def _rows(cells: list[_Cell], width: int) -> Iterator[list[_Cell]]:
+    for begin in range(0, len(cells), width):
+        yield cells[begin : begin + width]
+
+
+def _cell(
+    scene: Scene, method: Integrator, given: dict[str, list[float]], horizon: float | None, observe: str | None
+) -> _Cell:
+    """A cell, refused before anything is run if one of its runs could not be."""
+    until = scene.horizon if horizon is None else positive("horizon", horizon)
+    if method.fixed_step:
+        if ("step_size" in given) is ("per_nutation" in given):
+            raise SymtopError(f"{method.name} has a fixed step: give step_size or per_nutation")
+        settings = given.get("step_size") or [scene.time_scale(until) / count for count in given["per_nutation"]]
+    elif method.adaptive:
+        if "tolerance" not in given:
+            raise SymtopError(f"{method.name} is adaptive: give tolerance")
+        settings = given["tolerance"]
+    else:
+        settings = [math.nan]
+    for value in settings:
+        make_plan(scene, method, **method.setting(value).kwargs(), horizon=until, samples=enough_samples(scene, until))
+    return _Cell(scene, method, tuple(settings), until, observe, _made_of(scene, method, (settings, until, observe)))
+
+
+def _made_of(scene: Scene, method: Integrator, asked: object) -> str:
+    """The digest of all that the numbers of a cell depend on."""
+    walk = Walk("sweep")
+    walk.add((scene, method, repr(asked)))
+    measured, files = _measure()
+    return fingerprint.digest(
+        {**fingerprint.packages(), **walk.values(), **measured, **depends.hashes(files | walk.closure())}
+    )
+
+
+@functools.cache
+def _measure() -> tuple[fingerprint.Reasons, frozenset[Path]]:
+    base = depends.basis(error_row)
+    return base.values, base.files
+
+
+def _table(cell: _Cell) -> xr.Dataset:
+    """The error table of a cell; a run that raises is a row that says so."""
+    rows: list[dict[str, float | str] | None] = []
+    reasons = []
+    for setting in cell.settings:
+        reasons.append("")
+        try:
+            rows.append(error_row(cell.scene, cell.method, setting, cell.horizon, cell.observe))
+        except SymtopError as error:
+            reasons[-1] = str(error)
+            rows.append(None)
+    blank = _blank(next((row for row in rows if row is not None), None), cell.method) | {"outcome": RAISED}
+    table = as_table([row or {**blank, **cell.method.setting(value).kwargs()}
+                      for row, value in zip(rows, cell.settings, strict=True)])  # fmt: skip
+    return table.assign(message=("setting", reasons))
+
+
+def _blank(row: dict[str, float | str] | None, method: Integrator) -> dict[str, float | str]:
+    """A row without numbers."""
+    names = [f"{name}{end}" for name in QUANTITIES for end in ("", "_end", "_bound")]
+    every = [*(row or [*COUNTS, "step_size", "tolerance", "outcome", "reached_time", "implementation", *names])]
+    return dict.fromkeys(every, math.nan) | {"outcome": "not_run", "implementation": method.implementation}
+
+
+def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
+    """A cell of so many settings; what was not run has no numbers and no digest."""
+    blank = as_table([_blank(None, cell.method) | {"message": ""}] * size)
+    if table is None:
+        return blank.assign(made_of=((), ""))
+    short = size - table.sizes["setting"]
+    whole = xr.concat([table, blank.isel(setting=slice(0, short))], "setting") if short else table
+    return whole.assign(made_of=((), cell.made_of))
+
+
+def _stored(file: Path) -> dict[str, xr.Dataset]:
+    """The cells of an earlier sweep by their digests; SymtopError for a file that is no sweep's."""
+    if not file.exists():
+        return {}
+    data = datasets.read(file)
+    if "made_of" not in data:
+        raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")
+    cells = {}
+    for s in range(data.sizes["scene"]):
+        for i in range(data.sizes["integrator"]):
+            cell = data.isel(scene=s, integrator=i)
+            digest = str(cell["made_of"].values)
+            run = cell["outcome"].values != "not_run"
+            if digest and run.any():
+                cells[digest] = cell.drop_vars(["scene", "integrator", "made_of"]).isel(setting=np.flatnonzero(run))
+    return cells
+
+
+def _described(data: xr.Dataset) -> xr.Dataset:
+    """Words and units for the errors and the counts, whose names are those of other quantities elsewhere."""
+    ends = {"": "largest over the run", "_end": "at the horizon", "_bound": "the least that can be judged"}
+    for name, words in QUANTITIES.items():
+        for end, what in ends.items():
+            unit = "rad" if name in ANGLES else "1"
+            data[f"{name}{end}"].attrs = {"long_name": f"{words}, {what}", "units": unit}
+    for name, words in COUNTS.items():
+        data[name].attrs["long_name"] = words
+    return data

@@ -1,0 +1,143 @@
+"""Engines against their maps: what counts as the same map, and that an engine that is absent or raises is data."""
+
+import importlib
+import json
+import math
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import symtop
+from benchmarks import engines
+from benchmarks.engines import drivers, measure, study
+from benchmarks.engines.common import body_of
+from symtop.methods import registry
+from symtop.methods.engines import SINGLE
+
+SCENES = {body_of(symtop.scene(name)).velocity.tobytes(): symtop.scene(name) for name in measure.STEPS}
+
+
+def engine(method, stepped, name="setting"):
+    """An engine that steps by a map of the catalogue and is said to have another."""
+
+    def run(body, h, steps):
+        return measure.mapped(SCENES[body.velocity.tobytes()], stepped, h, steps)
+
+    return engines.Setting("Engine", "1", name, engines.FREE, method, run)
+
+
+def broken(body, h, steps):
+    """An engine that raises."""
+    raise RuntimeError("no such body")
+
+
+@pytest.mark.parametrize(
+    ("method", "stepped", "same"),
+    [
+        ("bullet", "bullet", True), ("bullet", "mujoco-implicit", False), ("rkmk4", "mujoco3-rk4", False),
+        ("jolt-float32", "jolt-float32", True), ("jolt-float32", "jolt", True), ("jolt", "jolt-float32", False),
+        ("no-squish", "no-squish", True),
+    ],
+)  # fmt: skip
+def test_a_map_is_an_engines_own_if_one_step_agrees(method, stepped, same):
+    assert measure.agrees(measure.row(engine(method, stepped))) is same
+
+
+def test_the_axis_error_is_that_of_the_catalogue():
+    made = measure.row(engine("mujoco-euler", "mujoco-euler"))
+    assert made["goldstein_axis"] == pytest.approx(0.61079, rel=1e-4)
+    assert made["goldstein_steps"] == 0.0
+
+
+def test_an_engine_that_raises_is_a_row_with_its_reason():
+    made = measure.row(engines.Setting("Engine", "1", "bad", engines.FREE, "ode", broken))
+    assert made["failed"] == "RuntimeError: no such body"
+    assert not measure.agrees(made)
+    found = study.findings([made], ["Other is not installed here and was skipped: reason."], "today")
+    assert found["failures"] == [*found["missing"], "Engine (bad): RuntimeError: no such body"]
+
+
+def test_the_verdict_names_what_is_not_the_map():
+    rows = [measure.row(engine("bullet", "bullet")), measure.row(engine("bullet", "ode", "other"))]
+    said = study.verdict(rows)
+    assert said[0].startswith("1 of 2 settings in double precision")
+    assert said[1] == "Not the map: Engine (other, free)."
+    assert all(math.isfinite(float(cell)) for cell in study.cells(rows[0])[5:10])
+
+
+def test_an_engine_that_is_absent_is_skipped_with_the_reason(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "rapier3d", None)
+    settings, missing = engines.load(("rapier",))
+    assert settings == []
+    assert missing[0].startswith("Rapier is not installed here and was skipped")
+
+
+# ---- programs of other languages -------------------------------------------------------------------------------------
+
+ECHO = """
+import sys
+setting, held, *numbers = sys.argv[1:]
+row = [2.0 * float(number) for number in numbers[3:7]] + [float(number) for number in numbers[7:10]]
+if setting == "broken":
+    sys.exit("no such body")
+for step in range(int(numbers[-1]) + (setting == "default")):
+    print(*row)
+"""
+
+
+def test_a_driver_gets_the_numbers_of_the_body_and_its_quaternions_have_length_one():
+    body = body_of(symtop.scene("goldstein"))
+    path = drivers.run((sys.executable, "-c", ECHO), "default", "free", body, 0.1, 3)
+    np.testing.assert_allclose(path.attitude, np.tile(body.attitude, (4, 1)), atol=1e-16)
+    np.testing.assert_array_equal(path.velocity, np.tile(body.velocity, (4, 1)))
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"), [("broken", "ended with 1: no such body"), ("short", "2 rows where 3 were expected")]
+)
+def test_a_driver_that_fails_is_an_error_with_its_reason(setting, message):
+    with pytest.raises(RuntimeError, match=message):
+        drivers.run((sys.executable, "-c", ECHO), setting, "free", body_of(symtop.scene("goldstein")), 0.1, 2)
+
+
+def test_a_package_or_a_library_that_is_absent_skips_its_engines_with_the_reason(monkeypatch):
+    monkeypatch.setattr(drivers, "PACKAGES", Path(measure.__file__).parent / "absent")
+    monkeypatch.setattr(drivers.shutil, "which", lambda name: f"/usr/bin/{name}" if name == "node" else None)
+    drivers.built.cache_clear()
+    settings, missing = engines.load(engines.DRIVEN)
+    assert settings == []
+    assert [one.split(" is not installed here")[0] for one in missing[-3:]] == ["ODE", "Bullet", "Simbody"]
+    assert missing[-1].endswith("there is no pkg-config on this machine.")
+    assert missing[0].endswith("the npm package @babylonjs/havok is not installed in benchmarks/engines/absent.")
+
+
+@pytest.mark.parametrize("name", engines.DRIVEN)
+def test_each_setting_of_a_driven_engine_names_a_map_of_the_catalogue_or_none(name, monkeypatch):
+    """One of single precision has a map in single precision, and on a joint there is none: its solver takes part."""
+
+    def listed(*arguments):
+        return [engines.Setting(arguments[1], "1", *row, broken) for row in arguments[-1]]
+
+    monkeypatch.setattr(drivers, "of_npm", listed)
+    monkeypatch.setattr(drivers, "native", listed)
+    adapter = importlib.import_module(f"benchmarks.engines.adapters.{name}")
+    made = adapter.settings()
+    assert {setting.method for setting in made} <= {"", *registry.engines()}
+    assert all(not setting.method for setting in made if setting.held == engines.JOINT)
+    single = {setting.method.endswith(SINGLE) for setting in made if setting.method}
+    assert single == {"jolt": {True}, "physx": {True}, "havok": {True}, "bullet": {True, False}, "simbody": set()}.get(
+        name, {False}
+    )
+
+
+def test_packages_of_npm_are_pinned_and_no_engine_is_asked_for_that_is_not_there():
+    folder = Path(drivers.__file__).parent / "node"
+    plan = json.loads((folder / "package.json").read_text(encoding="utf-8"))
+    assert set(plan) == {"name", "private", "description", "optionalDependencies"}
+    assert all(re.fullmatch(r"\d+\.\d+\.\d+", version) for version in plan["optionalDependencies"].values())
+    drivers_of_node = {file.stem for file in folder.glob("*.mjs")} - {"top"}
+    assert drivers_of_node == {"cannon", "havok", "jolt", "physx"}
+    assert drivers_of_node | {file.stem for file in (folder.parent / "native").glob("*.cpp")} == set(engines.DRIVEN)

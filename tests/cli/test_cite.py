@@ -1,0 +1,55 @@
+"""``symtop cite``: every key exists, every built-in method with a source is cited, and a stranger's is said."""
+
+import re
+
+import pytest
+from click.testing import CliRunner
+
+import symtop
+from symtop.base import datasets
+from symtop.cli.main import main
+from symtop.methods.citations import entries, keys
+
+
+def cited(*arguments):
+    done = CliRunner().invoke(main, ["cite", *map(str, arguments)])
+    assert done.exit_code == 0, done.output
+    return done
+
+
+def test_without_a_file_the_package_is_cited_with_its_version():
+    text = cited().stdout
+    assert re.findall(r"^@(\w+)", text, re.MULTILINE) == ["software"]
+    assert f"version = {{{symtop.__version__}}}" in text
+
+
+@pytest.mark.parametrize("name", ["strang", "gauss-4", "midpoint"])
+def test_a_run_cites_the_sources_of_its_method(tmp_path, name):
+    data = symtop.simulate("spheroid", name, step_size=0.01, horizon=0.1)
+    text = cited(datasets.write(data, tmp_path / "run.nc")).stdout
+    sources = keys(symtop.integrator(name))
+    assert sources
+    for key in sources:
+        assert entries()[key] in text
+    assert text.count("\n@") == len(sources)
+
+
+def test_every_source_is_cited_once(tmp_path):
+    data = symtop.ensemble(symtop.population(3, seed=1), "strang", step_size=0.01, horizon=0.1)
+    twice = datasets.write(data, tmp_path / "runs.nc")
+    assert cited(twice).stdout == cited(twice, twice).stdout
+
+
+def test_a_method_without_a_known_source_is_said(tmp_path):
+    data = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.1).assign_attrs(integrator="of-a-user")
+    done = cited(datasets.write(data, tmp_path / "run.nc"))
+    assert "no source is known of of-a-user" in done.stderr
+    assert done.stdout.count("@") == 1
+
+
+def test_a_file_that_is_no_dataset_is_refused(tmp_path):
+    path = tmp_path / "notes.txt"
+    path.write_text("no netCDF")
+    done = CliRunner().invoke(main, ["cite", str(path)])
+    assert done.exit_code == 2
+    assert "cannot read" in done.output

@@ -1,0 +1,58 @@
+"""`recommend --i-use`: errors of an engine's settings, its best one, and a method that does as well for less."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+import symtop
+from symtop.cli.engine_advice import SETTINGS, i_use
+from symtop.cli.main import main
+from symtop.methods.registry import engines
+
+
+def test_every_setting_has_a_map_and_every_map_of_the_engines_a_setting():
+    named = {method for settings in SETTINGS.values() for method in settings.values()}
+    assert named <= set(engines())
+    left = {name.removesuffix("-float32") for name in set(engines()) - named}
+    assert left <= {name.removesuffix("-float32") for name in named} | {"fincham"}  # as published, in no engine
+
+
+@pytest.mark.slow
+def test_mujoco_is_told_its_best_setting_and_the_gain_of_another_method():
+    said = i_use("mujoco", "goldstein", step_size=0.025, horizon=10.0)
+    assert said.errors["Euler"] == pytest.approx(0.61, abs=0.01)
+    assert said.best == "RK4 of 4.0"
+    assert said.advice is not None
+    assert said.advice.expected_error <= said.errors[said.best]
+    assert said.gain > 1.0
+    assert "Its best setting is RK4 of 4.0" in str(said)
+
+
+def test_an_engine_without_a_gyroscopic_term_has_nothing_to_match():
+    said = i_use("havok", "goldstein", horizon=10.0)
+    assert said.advice is None
+    assert "nothing to match" in str(said)
+
+
+@pytest.mark.parametrize(
+    ("engine", "step", "message"),
+    [("unreal", 0.01, "mujoco"), ("mujoco", -1.0, "step_size"), ("mujoco", 20.0, "below the horizon")],
+)
+def test_bad_input_is_refused_in_a_sentence(engine, step, message):
+    with pytest.raises(symtop.SymtopError, match=message):
+        i_use(engine, "goldstein", step_size=step, horizon=10.0)
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["--accuracy", "1e-6", "--i-use", "ode"], ["--accuracy", "1e-6", "--step-size", "0.1"]]
+)
+def test_the_command_asks_for_one_of_both(words):
+    done = CliRunner().invoke(main, ["recommend", "goldstein", *words])
+    assert done.exit_code == 2
+
+
+def test_the_command_says_what_an_engine_does():
+    done = CliRunner().invoke(main, ["recommend", "goldstein", "--i-use", "havok", "--horizon", "10", "--json"])
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.output)["errors"]["default"] > 1.5

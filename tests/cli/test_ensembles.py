@@ -1,0 +1,69 @@
+"""`symtop ensemble`: what it writes, draws and prints, and what it refuses."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from PIL import Image
+
+import symtop
+from symtop.cli.main import main
+
+STEPS = ("--per-nutation", 30, "--nutations", 2)
+
+
+def call(*arguments):
+    return CliRunner().invoke(main, ["ensemble", *map(str, arguments)])
+
+
+def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path):
+    path, figure = tmp_path / "runs.nc", tmp_path / "spread.png"
+    done = call("--members", 50, "--seed", 3, "strang", *STEPS, "--samples", 21, "-o", path, "--figure", figure)
+    assert done.exit_code == 0, done.output
+    assert "strang on 50 tops (lanes): 50 ok" in done.output
+    assert f"written to {figure}" in done.output
+    wanted = symtop.ensemble(
+        symtop.population(50, seed=3), "strang", per_nutation=30, nutations=2, samples=21, quiet=True
+    )
+    with xr.open_dataset(path) as data:
+        assert data.load().identical(wanted)
+    with Image.open(figure) as picture:
+        assert np.asarray(picture.convert("L")).std() > 10.0
+
+
+def test_json_has_outcomes_and_errors_and_a_finer_step_has_smaller_ones():
+    coarse, fine = (
+        json.loads(call("--members", 40, "strang", "--per-nutation", per, "--nutations", 2, "--json").output)
+        for per in (30, 300)
+    )
+    assert coarse["outcomes"] == {"ok": 40}
+    assert fine["largest_errors"]["axis"]["0.5"] < 0.02 * coarse["largest_errors"]["axis"]["0.5"]
+    assert fine["steps"] == 10 * coarse["steps"]
+
+
+def test_members_that_fail_are_counted_and_drawn(tmp_path):
+    done = call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21, "--figure", tmp_path / "f.png")
+    assert done.exit_code == 0, done.output
+    assert "left_chart" in done.output
+    assert (tmp_path / "f.png").stat().st_size > 5000
+    done = call("--members", 20, "--kind", "grazing", "stormer-verlet", *STEPS, "--json")
+    assert done.exit_code == 3, done.output  # all have failed
+    assert json.loads(done.output)["largest_errors"]["axis"] == dict.fromkeys(("0.01", "0.1", "0.5", "0.9", "0.99"))
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [(["strang", *STEPS, "--members", 0], "n must be"), (["strang"], "needs --step-size or --per-nutation"),
+     (["strong", *STEPS], "did you mean strang"), (["strang", *STEPS, "--kind", "quick"], "kind"),
+     (["strang", *STEPS, "--figure", "x.jpg"], "ends in .png"), (["strang", *STEPS, "--seed", -1], "seed"),
+     (["strang", "--step-size", 0.1, *STEPS], "not both"), (["strang", *STEPS, "-o", "/proc/no/x.nc"], "in a folder"),
+     (["strang", "--step-size", 0.1], "no horizon of their own"), (["strang", *STEPS, "--threads", 0], "threads"),
+     (["midpoint[attitude]", *STEPS], "known: angles"), (["taylor", *STEPS, "--members", 3], "chooses its own steps")],
+)  # fmt: skip
+def test_bad_input_is_one_sentence_and_code_2(words, says):
+    done = call(*words)
+    assert done.exit_code == 2, done.output
+    assert says in done.output
+    assert "Traceback" not in done.output

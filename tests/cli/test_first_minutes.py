@@ -1,0 +1,211 @@
+"""What somebody new meets in the first minutes: each point was a complaint of a trial, and stays mended."""
+
+import json
+import re
+import time
+
+import pytest
+from click.testing import CliRunner
+from terminal import recorded
+
+import symtop
+from symtop.cli import completion
+from symtop.cli.main import main
+from symtop.measure.verdicts import ACCURATE
+from symtop.run.guard import EXPECTED
+
+AXIS_ONLY = """\
+import symtop
+
+rk4 = symtop.integrator("rk4").solvers["axis"]
+symtop.register(
+    symtop.Integrator(
+        name="on-the-axis", family="other", summary="rk4 on the axis alone", solvers={"axis": rk4}, order=4,
+        implementation="python",
+    )
+)
+"""
+
+
+def call(*words, **environment):
+    return CliRunner().invoke(main, [str(word) for word in words], env=environment)
+
+
+@pytest.fixture(scope="module")
+def axis_only(tmp_path_factory):
+    """A plug-in; a file is loaded once, so that all tests share it."""
+    file = tmp_path_factory.mktemp("plugin") / "axis_only.py"
+    file.write_text(AXIS_ONLY, encoding="utf-8")
+    return file
+
+
+def test_the_guard_warns_of_what_the_verdict_calls_wrong():
+    assert EXPECTED == ACCURATE
+    wrong = call("run", "spheroid", "midpoint", "--step-size", "0.01")
+    assert "expect an axis error" in wrong.stderr
+    assert "judged against the truth: bounded but wrong, the axis error passed 0.01 rad" in wrong.stdout
+    right = call("run", "spheroid", "midpoint", "--step-size", "0.002")
+    assert right.stderr == ""
+    assert "judged against the truth: accurate to" in right.stdout
+
+
+def test_a_method_on_the_axis_alone_runs_and_is_judged(axis_only):
+    """Negative control: the attitude is still refused, with the word that helps."""
+    done = call("run", "spheroid", "on-the-axis", "--step-size", "0.01", "--plugin", axis_only)
+    assert done.exit_code == 0, done.output
+    assert "angle between axes" in done.output
+    refused = call(
+        "run", "spheroid", "on-the-axis", "--step-size", "0.01", "--observe", "attitude", "--plugin", axis_only
+    )
+    assert refused.exit_code == 2
+    assert "cannot show the attitude: observe axis" in refused.stderr
+    runs = symtop.ensemble(["spheroid"], "on-the-axis", step_size=0.01, samples=5)
+    assert runs["outcome"].values.tolist() == ["ok"]
+
+
+def test_one_method_alone_takes_part_in_a_study(axis_only, tmp_path):
+    words = ["study", "convergence", "--quick", "--only", "on-the-axis", "--results", tmp_path, "--plugin", axis_only]
+    done = call(*words)
+    assert done.exit_code == 0, done.output
+    lines = done.output.splitlines()
+    assert lines[0].startswith("convergence: ")
+    assert lines[1].startswith("  - ")  # a finding
+    assert f"next: symtop report --results {tmp_path / 'quick' / 'only'}" in lines[-1]
+    assert (tmp_path / "quick" / "only" / "convergence.nc").is_file()
+    assert not (tmp_path / "quick" / "convergence.nc").exists()
+    state = call(*words, "--status")
+    assert state.output.strip() == f"convergence: {lines[0].split()[1]} done"
+    assert call("study", "convergence", "--only", "no-such").exit_code == 2
+    nothing = call("study", "truth", "--quick", "--only", "on-the-axis", "--plugin", axis_only)
+    assert nothing.exit_code == 2
+    assert "study truth has no case of on-the-axis" in nothing.stderr
+
+
+def test_the_status_counts():
+    """A line for what is stale and one for what is missing, however many cases there are."""
+    done = call("study", "convergence", "--status", "--results", "no-such-folder", COLUMNS="80")
+    lines = done.output.splitlines()
+    assert re.fullmatch(r"convergence: \d+ missing", lines[0])
+    assert len(lines) < 8
+    assert max(map(len, lines)) <= 80
+
+
+def test_advice_ends_with_the_lines_to_copy():
+    advice = symtop.recommend("goldstein", accuracy=1e-3, horizon=20.0)
+    *_, command, line = str(advice).splitlines()
+    assert command == f"Run it: {advice.command}"
+    assert line == f"In Python: {advice.python}"
+    run = eval(advice.python, {"symtop": symtop})  # a line that is printed to be run
+    assert float(symtop.errors(run)["axis"].max()) <= 1e-3
+    words = advice.command.replace('"', "").split()[1:]
+    done = call(*words, "--json")
+    assert json.loads(done.stdout)["errors"]["axis"]["largest"] <= 1e-3
+    scene = symtop.scene("goldstein")
+    own = symtop.Scene("goldstein", scene.top, scene.start, horizon=30.0)  # no scene of the catalogue has this name
+    assert symtop.recommend(own, accuracy=1e-3).command == ""
+
+
+def test_advice_says_that_a_method_in_plain_python_was_not_tried(axis_only):
+    done = call("recommend", "goldstein", "--accuracy", "1e-3", "--horizon", "20", "--plugin", axis_only)
+    assert "Not tried, as only compiled methods are timed: on-the-axis." in done.output
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["run", "spheroid", "midpoint"], "needs --step-size, for example 0.007"),
+        (["run", "spheroid", "gauss-8"], "needs --step-size, for example 0.1"),
+        (["run", "spheroid", "rk45"], "needs a tolerance, for example 1e-6"),
+        (["run", "spheroid", "midpoint", "--step-size", "1e-12"], "(see --budget)"),
+        (["run", "spheroid", "midpoint", "--tolerance", "1e-3"], "give --step-size, not --tolerance = 0.001"),
+        (["run", "spheroid", "rk45", "--step-size", "1"], "give --tolerance, not --step-size = 1.0"),
+        (["run", "spheroid", "taylor", "--horizon", "-3"], "symtop: --horizon must be above zero"),
+        (["ensemble", "strang", "--horizon", "1"], "needs --step-size or --per-nutation"),
+        (["run", "spherod", "midpoint", "--step-size", "1"], "did you mean spheroid? (symtop scenes lists all)"),
+        (["run", "spheroid", "midpint", "--step-size", "1"], "(symtop integrators lists all)"),
+        (["run", "spheroid", "taylor", "--figure", "no-such/x.png"], "--figure must be a file in a folder"),
+        (["run", "spheroid", "taylor", "--figure", "x.jpg"], "that ends in .png or .svg or .pdf"),
+        (["run", "spheroid", "taylor", "--output", "no-such/x.nc"], "--output must be a file in a folder"),
+    ],
+)  # fmt: skip
+def test_errors_name_the_options_and_propose(words, says, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = call(*words)
+    assert done.exit_code == 2
+    assert says in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_proposed_step_is_of_use():
+    """The error that it leads to is between a tenth and ten times the 1e-3 rad that it is proposed for."""
+    for name in ("midpoint", "strang", "rk4", "gauss-4"):
+        done = call("run", "spheroid", name)
+        step = float(done.stderr.split("for example ")[1])
+        error = float(symtop.errors(symtop.simulate("spheroid", name, step_size=step, guard=False))["axis"].max())
+        assert 1e-5 < error < 1e-2
+
+
+@pytest.mark.parametrize(("ending", "head"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_figures_come_in_three_kinds_and_are_the_same_again(ending, head, tmp_path):
+    files = [tmp_path / f"{name}.{ending}" for name in "ab"]
+    for file in files:
+        assert call("run", "spheroid", "strang", "--step-size", "0.005", "--figure", file).exit_code == 0
+    assert files[0].read_bytes().startswith(head)
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_completion_lists_names_once_and_again_if_a_file_changes(tmp_path, monkeypatch):
+    monkeypatch.setattr(completion, "cache_root", lambda: tmp_path)
+    heard = []
+    listed = completion._listed
+    monkeypatch.setattr(completion, "_listed", lambda: heard.append(1) or listed())
+    first = completion.names()
+    assert completion.names() == first == listed()
+    assert len(heard) == 1
+    (tmp_path / "names.json").write_text("{", encoding="utf-8")  # damaged
+    assert completion.names() == first
+    monkeypatch.setattr(completion, "__version__", "0")
+    completion.names()
+    assert len(heard) == 3
+
+
+def test_a_cold_kernel_is_announced_once(monkeypatch):
+    import numpy as np
+
+    from symtop.base import compiled
+
+    heard = []
+    monkeypatch.setattr(compiled, "on_cold", [lambda: heard.append(1)])
+
+    def kernel(x):
+        return x + float(np.pi) * COLD
+
+    assert compiled.compile_kernel(kernel)(0.0) > 0.0
+    assert heard == [1]
+    assert compiled.compile_kernel(kernel)(0.0) > 0.0  # from the disk
+    assert heard == [1]
+
+
+COLD = time.time()  # a constant that no kernel on disk was compiled with
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["run", "spheroid", "midpoint", "--step-size", "0.01"],
+        ["ensemble", "strang", "--members", "20", "--per-nutation", "50", "--nutations", "2"],
+        ["scenes"],
+        ["integrators", "--engines"],
+        ["study", "convergence", "--quick", "--status", "--results", "no-such-folder"],
+    ],
+)
+def test_nothing_wraps_on_a_terminal(words):
+    recording = recorded(words)
+    assert recording.code == 0, recording.text
+    assert recording.text
+    assert recording.widest <= 80
+
+
+def test_a_recording_sees_what_wraps():
+    """Negative control: a table of every column does."""
+    assert recorded(["scenes", "--wide"]).widest > 80

@@ -1,0 +1,202 @@
+"""A plug-in of integrators that misbehave, each in one way. All are the midpoint rule otherwise."""
+
+import os
+import signal
+import sys
+import warnings
+
+import numpy as np
+
+import symtop
+from symtop.methods.plan import Run
+
+midpoint = symtop.integrator("midpoint").solvers["angles"]
+
+
+class UnprintableError(Exception):
+    """Cannot say what is wrong."""
+
+    def __str__(self):
+        raise ValueError("no words")
+
+    __repr__ = __str__
+
+
+class OwnBaseError(BaseException):
+    """Passes every ``except Exception``."""
+
+
+class Unprintable:
+    """Nothing that a sentence could name."""
+
+    def __repr__(self):
+        raise ValueError("no words")
+
+
+class UnprintableOutcome(str):
+    """An outcome that nobody knows, and that cannot be compared."""
+
+    __slots__ = ()
+
+    def __eq__(self, other):
+        raise ValueError("no words")
+
+    __hash__ = str.__hash__
+
+
+def raising(error):
+    """Raise it in place of a run."""
+
+    def solve(top, start, plan):
+        raise error
+
+    return solve
+
+
+def returning(value):
+    """Return it in place of a run."""
+    return lambda top, start, plan: value
+
+
+def changed(**fields):
+    """A good run but for these fields, each a function of the good one."""
+
+    def solve(top, start, plan):
+        run = midpoint(top, start, plan)
+        return run._replace(**{name: change(getattr(run, name)) for name, change in fields.items()})
+
+    return solve
+
+
+def leaves_early(top, start, plan):
+    """Ends its process, as a plug-in might that was a script."""
+    sys.exit(0)
+
+
+def interrupts(top, start, plan):
+    """Raises what Ctrl-C raises."""
+    raise KeyboardInterrupt
+
+
+def changes_arguments(top, start, plan):
+    """Writes into the times and marks that it was given, and into the top."""
+    run = midpoint(top, start, plan)
+    plan.times[:] = -7.0
+    plan.marks[:] = 0
+    object.__setattr__(top, "I1", 1e9)
+    object.__setattr__(start, "theta", 3.0)
+    return run
+
+
+def recurses(top, start, plan):
+    """Never comes to an end of its own calls."""
+    return recurses(top, start, plan)
+
+
+def warns(top, start, plan):
+    """Runs well, and makes every warning an error from then on."""
+    run = midpoint(top, start, plan)
+    warnings.simplefilter("error")
+    return run
+
+
+def keeps_its_array(top, start, plan, kept=[]):  # noqa: B006
+    """Returns states that it changes in the next call."""
+    run = midpoint(top, start, plan)
+    for states in kept:
+        states[:] = np.nan
+    kept[:] = [run.states]
+    return run
+
+
+def drops_errstate(top, start, plan):
+    """Runs well, and makes NumPy raise from then on."""
+    np.seterr(all="raise")
+    return midpoint(top, start, plan)
+
+
+def signals_itself(top, start, plan):
+    """Sends its own process what Ctrl-C sends."""
+    os.kill(os.getpid(), signal.SIGINT)
+    return midpoint(top, start, plan)
+
+
+REFUSED = {
+    "returns-none": returning(None),
+    "returns-list": returning([1.0, 2.0]),
+    "returns-tuple": returning((np.zeros((2, 4)),)),
+    "returns-text": returning("ok"),
+    "returns-object": returning(object()),
+    "returns-unprintable": returning(Unprintable()),
+    "returns-states": lambda top, start, plan: midpoint(top, start, plan).states,
+    "returns-plain-tuple": lambda top, start, plan: tuple(midpoint(top, start, plan)),
+    "returns-generator": lambda top, start, plan: iter(midpoint(top, start, plan)),
+    "returns-class": returning(Run),
+    "states-none": changed(states=lambda _: None),
+    "states-list-of-text": changed(states=lambda states: [["x"] * 4] * len(states)),
+    "states-ragged": changed(states=lambda states: [[1.0]] * (len(states) - 1) + [[1.0, 2.0]]),
+    "states-complex": changed(states=lambda states: states + 0j),
+    "states-objects": changed(states=lambda states: np.full(states.shape, None)),
+    "states-object-text": changed(states=lambda states: np.full(states.shape, "x", dtype=object)),
+    "states-text": changed(states=lambda states: states.astype(str)),
+    "states-dates": changed(states=lambda states: np.zeros(states.shape, "datetime64[s]")),
+    "states-short": changed(states=lambda states: states[:-1]),
+    "states-wide": changed(states=lambda states: np.hstack([states, states])),
+    "states-turned": changed(states=lambda states: states.T),
+    "states-scalar": changed(states=lambda _: 1.0),
+    "states-unprintable": changed(states=lambda _: Unprintable()),
+    "p-phi-none": changed(p_phi=lambda _: None),
+    "p-phi-text": changed(p_phi=lambda values: ["x"] * len(values)),
+    "p-phi-complex": changed(p_phi=lambda values: values + 1j),
+    "p-phi-scalar": changed(p_phi=lambda values: float(values[0])),
+    "p-phi-objects": changed(p_phi=lambda values: np.full(values.shape, object())),
+    "p-psi-dict": changed(p_psi=lambda _: {"p_psi": 1.0}),
+    "p-psi-short": changed(p_psi=lambda values: values[1:]),
+    "outcome-unknown": changed(outcome=lambda _: "splendid"),
+    "outcome-none": changed(outcome=lambda _: None),
+    "outcome-number": changed(outcome=lambda _: 0),
+    "outcome-list": changed(outcome=lambda _: ["ok"]),
+    "outcome-array": changed(outcome=lambda _: np.array(["ok", "ok"])),
+    "outcome-unprintable": changed(outcome=lambda _: UnprintableOutcome("ok")),
+    "reached-text": changed(reached=lambda _: "the end"),
+    "reached-none": changed(reached=lambda _: None),
+    "steps-text": changed(steps=lambda _: "many"),
+    "steps-none": changed(steps=lambda _: None),
+    "evaluations-complex": changed(force_evaluations=lambda _: 1j),
+    "iterations-object": changed(newton_iterations=lambda _: object()),
+    "raises-value-error": raising(ValueError("one\ntwo")),
+    "raises-key-error": raising(KeyError("x")),
+    "raises-memory-error": raising(MemoryError()),
+    "raises-stop-iteration": raising(StopIteration()),
+    "raises-generator-exit": raising(GeneratorExit()),
+    "raises-unprintable": raising(UnprintableError()),
+    "raises-base": raising(OwnBaseError("of its own")),
+    "raises-system-exit": leaves_early,
+    "raises-system-exit-text": raising(SystemExit("bye")),
+    "raises-interrupt": interrupts,
+    "recurses": recurses,
+    "takes-two": lambda top, start: None,
+    "takes-none": lambda: None,
+    "changes-arguments": changes_arguments,
+}  # each must end in one sentence and code 2
+TOLERATED = {
+    "states-float32": changed(states=lambda states: states.astype(np.float32)),
+    "states-long-double": changed(states=lambda states: states.astype(np.longdouble)),
+    "states-nested-list": changed(states=lambda states: states.tolist()),
+    "states-fortran": changed(states=np.asfortranarray),
+    "states-read-only": changed(states=lambda states: np.broadcast_to(states, states.shape)),
+    "states-masked": changed(states=np.ma.masked_invalid),
+    "p-phi-list": changed(p_phi=lambda values: values.tolist()),
+    "steps-float": changed(steps=float),
+    "keeps-its-array": keeps_its_array,
+    "drops-errstate": drops_errstate,
+    "warns": warns,
+}  # each is a run like another
+BROKEN = {
+    "states-nan": changed(states=lambda states: states * np.nan),
+    "states-infinite": changed(states=lambda states: states + np.inf),
+    "reached-nan": changed(outcome=lambda _: "not_finite", reached=lambda _: np.nan),
+}  # each is a run that failed, exit code 3
+
+for name, solve in {**REFUSED, **TOLERATED, **BROKEN, "signals-itself": signals_itself}.items():
+    symtop.register(symtop.Integrator(name, "other", "misbehaves", {"angles": solve}, implementation="python"))

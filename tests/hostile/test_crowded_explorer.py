@@ -1,0 +1,95 @@
+"""The explorer under a crowd: aborted requests, many at once, and clients that never finish a sentence."""
+
+import json
+import os
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+SCRIPT = (
+    "from symtop.explore.server import serve\ns = serve(0)\nprint(s.server_address[1], flush=True)\ns.serve_forever()\n"
+)
+QUESTION = json.dumps({
+    "I1": 2.0, "I3": 1.0, "mgl": 1.0, "theta": 0.5, "phi": 0, "psi": 0, "theta_dot": 0, "phi_dot": 0, "psi_dot": 5.0,
+    "horizon": 5.0, "integrator": "midpoint", "step_size": 0.01,
+}).encode()  # fmt: skip
+
+
+@pytest.fixture
+def crowd(tmp_path):
+    """The port of an explorer in a process of its own, and the file of what it says."""
+    log = tmp_path / "log"
+    with log.open("w") as said:
+        process = subprocess.Popen(
+            [sys.executable, "-c", SCRIPT], stdout=subprocess.PIPE, stderr=said, text=True, env={**os.environ}
+        )
+        try:
+            yield int(process.stdout.readline()), log
+        finally:
+            process.kill()
+            process.communicate()
+
+
+def asked(port, path, body=b"", *, leave=False, patience=60.0):
+    """The first line of an answer; with `leave` the connection is reset once the question is sent."""
+    verb = b"POST" if body else b"GET"
+    head = b"%s %s HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n"
+    with socket.create_connection(("127.0.0.1", port), timeout=patience) as link:
+        link.sendall(head % (verb, path, len(body)) + body)
+        if leave:
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            return b""
+        return link.recv(65536).partition(b"\r\n")[0]
+
+
+def at_once(count, ask):
+    """The answers of so many threads."""
+    answers = []
+
+    def work():
+        try:
+            answers.append(ask())
+        except OSError as error:
+            answers.append(repr(error))
+
+    threads = [threading.Thread(target=work) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return answers
+
+
+GOOD = b"HTTP/1.1 200 OK"
+
+
+@pytest.mark.parametrize("count", [pytest.param(20, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)])
+def test_a_crowd_is_served_and_nothing_is_said_of_those_who_leave(crowd, count):
+    port, log = crowd
+    assert asked(port, b"/run", QUESTION) == GOOD
+    at_once(count, lambda: asked(port, b"/run", QUESTION, leave=True))
+    assert at_once(count, lambda: asked(port, b"/run", QUESTION)) == [GOOD] * count
+    assert log.read_text() == ""
+
+
+def test_clients_that_never_finish_do_not_keep_others_waiting(crowd):
+    port, log = crowd
+    assert asked(port, b"/run", QUESTION) == GOOD
+    idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(100)]
+    for link in idle[:50]:
+        link.sendall(
+            b"POST /run HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\nContent-Length: 9\r\n\r\n{"
+        )
+    began = time.monotonic()
+    assert asked(port, b"/") == GOOD
+    assert asked(port, b"/run", QUESTION) == GOOD
+    assert time.monotonic() - began < 10.0
+    for link in idle:
+        link.close()
+    time.sleep(0.2)
+    assert log.read_text() == ""

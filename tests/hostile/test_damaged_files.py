@@ -1,0 +1,151 @@
+"""A byte that has flipped in a file: nothing is believed, nothing crashes, and what was computed is computed again."""
+
+import random
+import warnings
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import symtop
+from symtop.base import datasets
+from symtop.base.compiled import compile_kernel, is_kept
+from symtop.run import long_run as longrun, reference as references
+from symtop.run.kept import kept
+
+FLIPS = [pytest.param(12, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)]
+
+
+def flipped(path, draw):
+    """Flip a random bit of a random byte of a file; returns what it held."""
+    whole = path.read_bytes()
+    damaged = bytearray(whole)
+    damaged[draw.randrange(len(whole))] ^= 1 << draw.randrange(8)
+    path.write_bytes(bytes(damaged))
+    return whole
+
+
+def _tripled(x):
+    return x + x + x
+
+
+@pytest.mark.parametrize("flips", FLIPS)
+def test_a_damaged_kernel_is_compiled_again(tmp_path, monkeypatch, flips):
+    """On disk it is machine code: where one was believed, the process ended."""
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    draw, kernel = random.Random(5), compile_kernel(_tripled)
+    assert kernel(2.0) == 6.0
+    (signature,) = kernel.overloads
+    (code,), (index,) = tmp_path.rglob("*.nbc"), tmp_path.rglob("*.nbi")
+    key = kernel._cache._index_key(
+        signature.args if hasattr(signature, "args") else signature, kernel.targetctx.codegen()
+    )
+    files = kernel._cache._cache_file
+    assert files.load(key) is not None  # the control
+    for _ in range(flips):
+        whole = flipped(code, draw)
+        with pytest.raises(ValueError, match="damaged"):
+            files.load(key)
+        code.write_bytes(whole)
+    for file in (code, index, code):
+        flipped(file, draw)
+        again = compile_kernel(_tripled)
+        assert is_kept(again, signature) in (True, False)
+        assert again(2.0) == 6.0
+        assert compile_kernel(_tripled)._cache._cache_file.load(key) is not None  # it is whole on disk again
+    for k in range(flips):
+        whole = flipped(index, draw)
+        again = compile_kernel(_tripled)
+        if k < 10:
+            assert again(2.0) == 6.0
+        assert is_kept(again, signature) in (True, False)
+        index.write_bytes(whole)
+
+
+def _whole(data):
+    return data.identical(_MADE)
+
+
+_MADE = xr.Dataset({"theta": ("time", np.linspace(0.0, 1.0, 40))}, coords={"time": np.arange(40.0)})
+
+
+@pytest.mark.parametrize("flips", FLIPS)
+def test_a_damaged_reference_is_computed_again(tmp_path, flips):
+    draw, path, made = random.Random(6), tmp_path / "reference.nc", []
+
+    def compute():
+        made.append(1)
+        return _MADE.copy()
+
+    kept(path, compute, None)
+    for _ in range(flips):
+        whole = flipped(path, draw)
+        data = kept(path, compute, None)
+        assert np.array_equal(data["theta"], _MADE["theta"])
+        assert np.array_equal(data["time"], _MADE["time"])
+        path.write_bytes(whole)
+    assert len(made) > 1  # some were noticed; in the others the byte was one of no meaning
+
+
+@pytest.mark.parametrize("flips", FLIPS)
+def test_a_damaged_file_is_data_or_one_sentence(tmp_path, flips):
+    """Whoever reads it, in a runner or not: no error but SymtopError."""
+    draw, path, refused = random.Random(7), tmp_path / "case.nc", 0
+    tree = xr.DataTree.from_dict({"one": _MADE.assign_attrs(title="x"), "two": _MADE})
+    for data, read in ((_MADE, datasets.read), (tree, datasets.read_any)):
+        datasets.write(data, path)
+        for _ in range(flips):
+            whole = flipped(path, draw)
+            try:
+                read(path)
+            except symtop.SymtopError:
+                refused += 1
+            path.write_bytes(whole)
+    assert refused
+
+
+H = 0.002
+
+
+@pytest.mark.parametrize("flips", FLIPS)
+def test_a_damaged_checkpoint_is_not_gone_on_from(tmp_path, monkeypatch, flips):
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "cache"))
+    draw, scene, method = random.Random(8), symtop.scene("spheroid"), symtop.integrator("midpoint")
+    _, solver = longrun.chart_of(method)
+    par, rule, state = solver.setup(scene.top, scene.start, H)
+    start = solver.loop.begun(par, rule, state, H)
+    for file in (True, tmp_path / "own.nc"):
+        book = longrun._Book(file, "an identity")
+        book.latest = start._replace(k=7), [[0.5] * 15] * 3
+        book.save()
+        good = book.resumed(start)
+        assert (good[0].k, good[1]) == (7, [[0.5] * 15] * 3)
+        begun = refused = 0
+        for _ in range(flips):
+            whole = flipped(book.file, draw)
+            with warnings.catch_warnings(record=True) as told:
+                warnings.simplefilter("always")
+                try:
+                    at, rows = book.resumed(start)
+                except symtop.SymtopError as error:
+                    assert "remove it" in str(error)  # noqa: PT017
+                    assert file is not True
+                    refused += 1
+                else:
+                    begun += at.k == 0
+                    assert at in (good[0], start)
+                    assert rows in (good[1], [])
+                    assert (at.k == 0) == any("damaged" in str(one.message) for one in told)
+            book.file.write_bytes(whole)
+        assert begun if file is True else refused
+
+
+def test_a_damaged_reference_of_a_scene_says_so(tmp_path, monkeypatch):
+    pytest.importorskip("heyoka")
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    scene = symtop.scene("spheroid")
+    first = symtop.reference(scene, [0.5], precision="double")
+    path = references._cache_path(scene, np.array([0.5]), "double")
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.warns(symtop.SymtopWarning, match="is damaged and is computed again"):
+        assert symtop.reference(scene, [0.5], precision="double").equals(first)

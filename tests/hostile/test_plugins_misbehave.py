@@ -1,0 +1,123 @@
+"""Plug-ins that misbehave: each ends in one sentence and its exit code, whatever calls them, and spoils nothing."""
+
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import symtop
+from symtop.base.signals import InterruptedByUser, told_apart
+from symtop.cli.main import main
+from symtop.methods.calling import solve
+from symtop.methods.plan import Plan
+from symtop.runner import plugins
+from tests.commands import ended, symtop as command
+
+PLUGIN = Path(__file__).with_name("plugin.py")
+RUN = ["--step-size", "0.01", "--horizon", "2"]
+BEFORE = repr(symtop.scene("spheroid"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def misbehaving():
+    plugins.load(PLUGIN)
+    return sys.modules["symtop_plugin_plugin"]
+
+
+def said_of(words):
+    """Exit code and the lines of a command that must not end in a traceback, and must leave the scene as it was."""
+    with warnings.catch_warnings():
+        done = CliRunner().invoke(main, words)
+    assert done.exception is None or isinstance(done.exception, SystemExit), words
+    assert "Traceback" not in done.output
+    assert repr(symtop.scene("spheroid")) == BEFORE
+    return done.exit_code, done.output.splitlines()
+
+
+@pytest.mark.parametrize("guard", ["--guard", "--no-guard"])
+def test_every_refused_run_is_one_sentence(misbehaving, guard):
+    for name in misbehaving.REFUSED:
+        code, lines = said_of(["run", "spheroid", name, *RUN, guard])
+        assert (code, len(lines)) == (2, 1), (name, lines)
+        assert lines[0].startswith(f"symtop: integrator {name} "), lines
+
+
+@pytest.mark.parametrize("guard", ["--guard", "--no-guard"])
+def test_what_can_be_used_is_used(misbehaving, guard):
+    _, (_, *expected) = said_of(["run", "spheroid", "midpoint[angles]", *RUN, guard])
+    for name in misbehaving.TOLERATED:
+        code, (_, *lines) = said_of(["run", "spheroid", name, *RUN, guard])
+        assert code == 0, name
+        if "float32" not in name:
+            assert [line.split("largest")[-1] for line in lines[-5:]] == [
+                line.split("largest")[-1] for line in expected[-5:]
+            ], name
+    for name in misbehaving.BROKEN:
+        assert said_of(["run", "spheroid", name, *RUN, guard])[0] == 3, name
+
+
+def test_an_ensemble_of_them_is_one_sentence(misbehaving):
+    words = ["--members", "3", "--step-size", "0.1", "--horizon", "1"]
+    for name in misbehaving.REFUSED:
+        code, lines = said_of(["ensemble", name, *words])
+        assert code in (2, 3), (name, lines)
+        assert lines[-1].startswith(("symtop: ", "ensemble")) or code == 3, lines
+
+
+@pytest.mark.slow
+def test_the_claims_of_all_of_them_are_judged(misbehaving):
+    for name in (*misbehaving.REFUSED, *misbehaving.TOLERATED, *misbehaving.BROKEN):
+        assert said_of(["claims", name, "--quick"])[0] in (0, 1), name
+
+
+def test_a_solver_does_not_reach_the_plan_or_an_earlier_run(misbehaving):
+    scene, plan = symtop.scene("spheroid"), Plan.steps(0.01, np.arange(5))
+    with pytest.raises(symtop.SymtopError, match="must not change the top or the start"):
+        solve(symtop.integrator("changes-arguments"), "angles", scene.top, scene.start, plan)
+    assert plan.times.tolist() == [0.0, 0.01, 0.02, 0.03, 0.04]
+    keeper = symtop.integrator("keeps-its-array")
+    first = solve(keeper, "angles", scene.top, scene.start, plan)
+    solve(keeper, "angles", scene.top, scene.start, plan)
+    assert np.isfinite(first.states).all()
+
+
+def test_an_interrupt_of_the_user_is_not_that_of_a_plugin(misbehaving):
+    scene, plan = symtop.scene("spheroid"), Plan.steps(0.01, np.arange(5))
+    for name, error in (("signals-itself", InterruptedByUser), ("raises-interrupt", symtop.SymtopError)):
+        with told_apart(), pytest.raises(error):
+            solve(symtop.integrator(name), "angles", scene.top, scene.start, plan)
+
+
+@pytest.mark.slow
+def test_in_processes_of_their_own():
+    for name, code in (("raises-system-exit", 2), ("raises-interrupt", 2), ("raises-base", 2), ("signals-itself", 1)):
+        told = ended(command("run", "spheroid", name, *RUN, "--plugin", PLUGIN))
+        assert told[0] == code, told
+        assert "Aborted!" in told[2] if code == 1 else told[2].count("\n") == 1
+
+
+def test_a_study_whose_measure_exits_has_a_case_that_failed(tmp_path):
+    script = tmp_path / "leaving.py"
+    script.write_text(
+        "import sys\nfrom symtop.runner.study import Case, Study\n"
+        "class Odd(BaseException):\n    def __str__(self):\n        raise ValueError\n"
+        "def measure(case):\n    sys.exit(0) if case.settings['k'] else (_ for _ in ()).throw(Odd())\n"
+        "STUDY = Study('leaving', 't', 'q', 'h', lambda quick: [Case('spheroid', 'midpoint', {'k': k}) "
+        "for k in range(2)], measure, lambda data: [], lambda data: [])\n"
+    )
+    code, lines = said_of(["study", str(script), "--results", str(tmp_path / "r")])
+    assert code == 2
+    assert "no case could be measured" in lines[-1]
+    assert len(list((tmp_path / "r").rglob("*.failed.json"))) == 2
+
+
+@pytest.mark.parametrize("name", ["../out", "/tmp/out", "a/b", "..", "", "x\0y", "é"])
+def test_a_study_writes_nothing_beside_its_results(tmp_path, name):
+    script = tmp_path / "named.py"
+    script.write_text(f"from symtop.runner.study import Study\nSTUDY = Study({name!r}, *[None] * 7)\n")
+    code, lines = said_of(["study", str(script), "--results", str(tmp_path / "in" / "r")])
+    assert (code, len(lines)) == (2, 1)
+    assert [path.name for path in tmp_path.iterdir()] == ["named.py"]

@@ -1,0 +1,99 @@
+"""Motions that amplify their start: the guard warns of them, and the answer says what the start decides."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.model import charts
+from symtop.model.closed_form import ClosedForm
+from symtop.model.precise_form import PreciseForm
+from symtop.run import guard
+from symtop.run.departure import conditioning, departure
+from symtop.run.simulation import make_plan
+
+# I1, I3, mgl, theta, theta', psi', method, observed, tolerance, horizon: of random runs, those that nobody warned of
+SILENT = [
+    (3.066, 3.664, 20.93, 5.625e-08, 0.0, 4.259, "lsoda", "attitude", 7.1e-6, 124.0),
+    (1.013, 1.0997, 0.7126, 2.3655e-4, 0.0, 0.8863, "lsoda", "attitude", 1.74e-7, 94.0),
+    (2.9908668545839157, 4.5, 10.158360686738936, 0.8929912156902926, 1.591597688, 0.0, "dop853", "axis", 5.5e-7, 65.8),
+    (3.6568154168556344, 3.7, 38.51315691592893, 1.6200118443501565, -4.7010652464, 0.0, "dop853", "axis", 2e-8, 11.4),
+    (0.406, 0.6634, 5.0126, 0.0027228, 0.0, 1.84047, "radau", "attitude", 1.2e-3, 5.44),
+]  # fmt: skip
+
+
+def sleeper(tilt, ratio=0.9, name="sleeper"):
+    """A top let go almost upright, at a share of the spin from which it sleeps."""
+    top = symtop.SymmetricTop(1.3, 0.7, 2.1)
+    return symtop.Scene(
+        name, top, symtop.Angles(tilt, psi_dot=ratio * 2.0 * math.sqrt(top.I1 * top.mgl) / top.I3), 50.0
+    )
+
+
+@pytest.mark.parametrize("case", SILENT, ids=lambda case: f"{case[6]}-{case[3]:.1g}")
+def test_the_guard_warns_where_the_motion_grows_what_a_tolerance_leaves(case):
+    I1, I3, mgl, theta, theta_dot, psi_dot, name, observe, tolerance, horizon = case
+    top, start = symtop.SymmetricTop(I1, I3, mgl), symtop.Angles(theta, 0.3, 0.1, theta_dot, 0.0, psi_dot)
+    scene, told = symtop.Scene("unstable", top, start, horizon), []
+    run = symtop.simulate(scene, name, tolerance=tolerance, observe=observe, samples=201, guard=told.append)
+    truth = ClosedForm(top, start).axis(run["time"].values)
+    assert run.attrs["outcome"] == "ok"
+    assert charts.axis_distance(run["axis"].values, truth).max() > 0.05
+    assert len(told) == 1
+    assert "try tolerance" in told[0]
+
+
+@pytest.mark.parametrize("name", ["dop853", "lsoda", "rk45"])
+def test_it_is_silent_where_the_motion_is_stable(name):
+    for scene in (sleeper(1e-3, 1.2), symtop.scene("spheroid"), symtop.scene("goldstein")):
+        method = symtop.integrator(name)
+        plan, _ = make_plan(scene, method, tolerance=1e-8, horizon=5.0 * scene.nutation_period, samples=101)
+        assert guard.warning(scene, method, method.chart_for("axis"), plan) == ""
+
+
+@pytest.mark.parametrize("tilt", [1e-3, 1e-4, 1e-5, 1e-6])
+@pytest.mark.parametrize("ratio", [0.9, *(pytest.param(share, marks=pytest.mark.slow) for share in (0.3, 0.99))])
+def test_what_two_integrations_differ_by_is_the_start_and_not_the_closed_form(tilt, ratio):
+    """heyoka in quadruple precision, from the same doubles, is where the bound says.
+
+    From a momentum that is rounded once more, as in an integration that starts from (e, L) in doubles, it is not.
+    """
+    pytest.importorskip("heyoka")
+    from symtop.run.witnesses import integrate
+
+    scene = sleeper(tilt, ratio)
+    times = np.linspace(0.0, 2.0 * scene.nutation_period, 21)[1:]
+    truth = symtop.reference(scene, times)
+    quad, _ = integrate(scene, times, "quad")
+    apart = charts.axis_distance(charts.axis_from_quaternion(quad[:, :4].astype(float)), truth["axis"].values)
+    assert (apart <= truth["axis_error_bound"]).all()
+    rounding = np.finfo(float).eps * scene.top.I3 * scene.start.psi_dot / scene.top.I1
+    other = ClosedForm(scene.top, dataclasses.replace(scene.start, theta_dot=rounding)).axis(times)
+    moved = charts.axis_distance(other, truth["axis"].values).max()
+    factor = conditioning(scene, float(times[-1]))
+    assert moved < 10.0 * factor * np.finfo(float).eps
+    if tilt <= 1e-5:
+        assert moved > 1e2 * truth["axis_error_bound"].max()
+        assert "rounding the start anew moves the axis by" in truth.attrs["conditioning"]
+
+
+def test_conditioning_is_the_growth_of_the_motion():
+    flat, steep = conditioning(symtop.scene("spheroid"), 5.0), conditioning(sleeper(1e-6), 60.0)
+    assert 1.0 <= flat < 100.0
+    assert steep > 1e5
+    assert departure(sleeper(1e-6), 1e-9, 60.0) > 1e-5
+    assert "rounding" not in symtop.reference("spheroid", [5.0]).attrs["conditioning"]
+
+
+@pytest.mark.parametrize(
+    "I3", [1e-30, *(pytest.param(value, marks=pytest.mark.slow) for value in (1e-6, 1e-18, 1e-40))]
+)
+def test_exact_is_right_for_a_top_without_inertia_about_its_axis(I3):
+    for start in (symtop.Angles(1.0, psi_dot=2.0), symtop.Angles(2.5, 0.1, 0.2, -1.0, 0.0, -3.0)):
+        scene = symtop.Scene("needle", symtop.SymmetricTop(1.0, I3, 1.0), start, 20.0)
+        run = symtop.simulate(scene, "exact", samples=11)
+        precise = PreciseForm(scene.top, scene.start, 40)
+        true = np.array([[float(part) for part in precise.quaternion(float(t))] for t in run["time"].values])
+        assert charts.attitude_distance(run["quaternion"].values, true).max() < 4e-15

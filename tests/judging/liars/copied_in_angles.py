@@ -1,0 +1,19 @@
+"""The classical Runge-Kutta method in angles, which reports the momenta of its start and claims to keep both."""
+
+import dataclasses
+
+import numpy as np
+
+import symtop
+
+rk4 = symtop.integrator("rk4")
+
+
+def solve(top, start, plan):
+    """The family's run and momenta that are copied."""
+    run, momenta = rk4.solvers["angles"](top, start, plan), top.momenta(start)
+    return run._replace(p_phi=np.full(plan.times.size, momenta.p_phi), p_psi=np.full(plan.times.size, momenta.p_psi))
+
+
+kept = frozenset({"p_phi", "p_psi"})
+symtop.register(dataclasses.replace(rk4, name="copied-in-angles", solvers={"angles": solve}, conserves=kept))

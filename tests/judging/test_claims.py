@@ -1,0 +1,426 @@
+"""The claims ledger: it believes the honest, catches the liars for the right reason, and says what it cannot tell."""
+
+import dataclasses
+import importlib
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import symtop
+from symtop.cli.main import main
+from symtop.judging import claims_constants as constants, claims_long as long, claims_pole
+from symtop.judging.claims import judge
+from symtop.judging.claims_order import limit
+from symtop.judging.claims_series import order
+from symtop.judging.ledger import CLAIMS, VERDICTS, Finding, read
+from symtop.measure.growth import behaviour
+from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
+from symtop.methods.plan import Run
+from symtop.methods.registry import Integrator
+from symtop.model import charts
+from symtop.report import style
+from symtop.runner import plugins, run as runner
+from tests.conftest import random_scenes
+
+registry = importlib.import_module("symtop.methods.registry")
+LIARS = Path(__file__).parent / "liars"
+SPHEROID = symtop.scene("spheroid")
+CHARTS = ("angles", "axis", "attitude")
+
+
+@pytest.fixture
+def clean_registry(monkeypatch):
+    monkeypatch.setattr(registry, "_registry", registry.integrators())
+    monkeypatch.setattr(plugins, "_loaded", {})
+    monkeypatch.setattr(plugins, "_owners", {})
+
+
+# ---- the bracket -----------------------------------------------------------------------------------------------------
+
+
+def still(chart, change=lambda y: y):
+    """A method whose step changes nothing, or just what `change` does to the state."""
+
+    def solve(top, start, plan):
+        m = top.momenta(start)
+        if chart == "angles":
+            state = np.array([start.theta, top.I1 * start.theta_dot, start.phi, start.psi])
+        else:
+            state = charts.space_state(chart, top, start)
+        state = change(state)
+        n = plan.times.size
+        return Run(np.tile(state, (n, 1)), np.full(n, m.p_phi), np.full(n, m.p_psi), 1, 1, 0, "ok", plan.horizon)
+
+    return Integrator(name="still", family="other", summary="", solvers={chart: solve})
+
+
+@pytest.mark.parametrize("where", random_scenes(3, seed=41), ids=lambda s: s.name)
+@pytest.mark.parametrize("chart", CHARTS)
+def test_the_brackets_of_every_chart_are_those_of_its_variables(chart, where):
+    step = one_step(still(chart), chart, where, 0.1)
+    assert symplectic_defect(step, where.start).size < 1e-11
+    tables = bracket(chart, step.at(where.start))
+    np.testing.assert_array_equal(tables, -tables.T)
+
+
+@pytest.mark.parametrize("chart", CHARTS)
+def test_a_momentum_that_grows_by_a_millionth_a_step_is_seen_as_not_symplectic(chart):
+    def swell(state):
+        state[-3 if chart != "angles" else 1] *= 1.0 + 1e-6
+        return state
+
+    step = one_step(still(chart, swell), chart, SPHEROID, 0.1)
+    found = symplectic_defect(step, SPHEROID.start)
+    assert 1e-8 < found.size < 1e-5
+    assert found.noise < 1e-10
+
+
+@pytest.mark.parametrize(("name", "chart", "kept"), [("strang", "axis", True), ("gauss-4", "axis", False)])
+def test_only_a_real_defect_stays_as_the_differences_are_refined(name, chart, kept):
+    found = symplectic_defect(*step_map(symtop.integrator(name), chart, SPHEROID))
+    assert bool(found.raw[-1] < found.raw[0] / 100.0) is kept
+    assert (found.size < 1e-11) is kept
+
+
+def test_a_step_is_one_map_unless_it_looks_at_the_start():
+    for name, tuned in (("strang", False), ("cayley-tuned", True)):
+        step, start = step_map(symtop.integrator(name), "attitude", SPHEROID)
+        assert (restart_gap(step, start) > 1e-9) is tuned
+        assert (return_miss(step, start) > 1e-9) is tuned
+
+
+# ---- growth ----------------------------------------------------------------------------------------------------------
+
+TIME = np.linspace(0.0, 8000.0, 4001)
+WAVE = 1e-5 * np.sin(37.1 * TIME)  # not commensurate with the samples
+
+
+@pytest.mark.parametrize(
+    ("residual", "kind"),
+    [
+        (1e-14 * np.sqrt(TIME), "kept"),
+        (WAVE, "bounded"),
+        (WAVE + 1e-9 * TIME, "drift"),  # most of it below the wave
+        (1e-9 * TIME, "drift"),
+        (1e-12 * np.sqrt(TIME) * np.sin(37.1 * TIME), "random walk"),
+        (1e-7 * np.sqrt(TIME) * np.sin(37.1 * TIME), "growing"),  # too large for a walk of rounding
+        (np.full(4001, np.nan), "unknown"),
+        (np.where(TIME > 4.0, 1e-15 * 500.0 * TIME, 0.0), "drift"),  # 1e-15 a step, 2 ms each
+    ],
+)
+def test_residuals_are_classified_by_how_they_grow(residual, kind):
+    assert long.judged(TIME, residual, residual[:100], 1_000_000).kind == kind
+
+
+@pytest.mark.parametrize(
+    ("size", "slope", "interval", "kind"),
+    [
+        (1e-12, 1.0, 0.01, "kept"),
+        (1e-5, 0.02, 0.1, "bounded"),
+        (1e-5, 0.1, 0.5, "growing"),  # 0 or 1/2
+        (2e-11, 0.5, 0.2, "random walk"),
+        (2e-5, 0.5, 0.2, "growing"),  # not by rounding
+        (2e-11, 0.74, 0.28, "growing"),  # 1/2 or 1
+        (2e-11, 0.4, 0.45, "growing"),  # 0 or 1/2
+        (1e-5, 1.0, 0.1, "drift"),
+        (1e-5, 2.0, 0.1, "drift"),
+        (1e-5, 0.9, 0.45, "growing"),  # 1/2 or 1
+        (1e-5, math.nan, math.nan, "growing"),
+    ],
+)
+def test_a_law_is_named_only_if_the_interval_excludes_its_neighbours(size, slope, interval, kind):
+    assert behaviour(size, slope, interval, rounding=1e-11) == kind
+
+
+def test_a_run_too_short_for_an_exponent_is_not_called_bounded():
+    short = np.where(TIME < 4.0, WAVE + 1e-6, np.nan)  # ends before the last two decades begin
+    found = long.judged(TIME, short, short[:2], 2000)
+    assert math.isnan(found.changed.exponent)
+    assert (found.kind, found.grows) == ("unknown", None)
+
+
+def test_an_oscillation_with_noise_is_never_called_a_drift():
+    draw = np.random.default_rng(5)
+    kinds = [long.judged(TIME, WAVE + 1e-6 * draw.standard_normal(TIME.size), WAVE, 1).kind for _ in range(200)]
+    assert set(kinds) == {"bounded"}
+
+
+def test_a_claim_about_several_charts_is_judged_in_the_worst_of_them():
+    """rk4 keeps p_phi in the space frame, where it is linear in the state, and loses it to truncation in the angles."""
+    rk4 = symtop.integrator("rk4")
+    runs = {chart: long.long_run(rk4, SPHEROID, chart, quick=True) for chart in rk4.charts()}
+    kinds = {chart: run.constants["p_phi"].kind for chart, run in runs.items()}
+    assert kinds == {"angles": "drift", "axis": "kept", "attitude": "kept"}
+    found = constants.over_steps(rk4, SPHEROID, {}, quick=True)["p_phi"]
+    assert found.measured.startswith("drift")
+    assert found.why.endswith("in the angles chart")
+
+
+def test_the_cayley_energy_is_kept_by_nobody_else():
+    for name, kept in (("cayley", True), ("cayley-tuned", True), ("strang", False)):
+        run = symtop.simulate("spheroid", name, step_size=0.01, horizon=20.0, observe="axis", guard=False)
+        assert bool(np.abs(long.constants(SPHEROID, run)["cayley_energy"]).max() < 1e-13) is kept
+
+
+# ---- order -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["midpoint", "strang", "gauss-4", "rk4"])
+def test_honest_methods_converge_to_the_true_motion(name):
+    method = symtop.integrator(name)
+    found = limit(method, SPHEROID, method.order)
+    assert found.miss < 1e-12
+    assert found.doubt < 1e-12
+
+
+def test_a_method_whose_step_is_wrong_by_a_billionth_does_not_converge_to_the_true_motion():
+    good = symtop.integrator("strang")
+
+    def slow(top, start, plan):
+        late = plan._replace(step_size=plan.step_size * (1.0 - 1e-9))
+        return good.solvers["attitude"](top, start, late)
+
+    wrong = dataclasses.replace(good, name="slow", solvers={"attitude": slow})
+    assert 1e-10 < limit(wrong, SPHEROID, 2).miss < 1e-7
+
+
+# ---- cost and pole ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "declared", "verdict"),
+    [
+        ("radau", True, "undecided"),
+        ("dop853", True, "undecided"),  # rejected steps cost forces too: see test_costs
+        ("rk4", True, "confirmed"),
+        ("rk4", None, "measured"),
+        ("rk4", False, "undecided"),  # a Rosenbrock method costs as evenly
+        ("midpoint", True, "refuted"),
+    ],
+)
+def test_a_method_is_not_explicit_because_it_says_so(name, declared, verdict):
+    claiming = dataclasses.replace(symtop.integrator(name), explicit=declared)
+    assert constants._explicit(claiming, long.long_run(claiming, SPHEROID, "angles", quick=True)).verdict == verdict
+
+
+def test_the_angles_end_at_a_pole_and_the_space_frame_does_not():
+    angles, *others = claims_pole.passages(symtop.integrator("rk4"))
+    assert (angles.chart, angles.outcome, angles.passes) == ("angles", "left_chart", False)
+    assert [one.chart for one in others] == ["axis", "attitude"]
+    assert all((one.outcome, one.passes) == ("ok", True) for one in others)
+
+
+# ---- the ledger ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["midpoint", "strang", "rk4"])
+def test_honest_claims_are_confirmed(name):
+    ledger = judge(symtop.integrator(name), SPHEROID, quick=True)
+    assert [found.claim for found in ledger.findings] == list(CLAIMS)
+    assert {found.verdict for found in ledger.findings} <= set(VERDICTS) - {"refuted", "undecided"}
+    assert {ledger[claim].verdict for claim in ("order", "symplectic", "symmetric", "explicit")} == {"confirmed"}
+    assert read(ledger.dataset())[0].sentence(name) == ledger["order"].sentence(name)
+
+
+def test_what_nobody_claimed_is_measured():
+    silent = dataclasses.replace(
+        symtop.integrator("stormer-verlet"), order=None, explicit=None, symplectic=None, symmetric=None, conserves=None
+    )
+    ledger = judge(silent, SPHEROID, quick=True)
+    assert {found.verdict for found in ledger.findings} == {"measured", "inapplicable"}
+    assert not any(found.declared for found in ledger.findings)
+    assert [ledger[claim].measured.split(",")[0] for claim in ("symplectic", "symmetric", "energy")] == [
+        "yes", "yes", "bounded",
+    ]  # fmt: skip
+    assert abs(ledger["order"].value - 2.0) < 0.05
+
+
+def test_a_claim_that_denies_a_property_the_method_has_is_refuted():
+    modest = dataclasses.replace(symtop.integrator("stormer-verlet"), symmetric=False, symplectic=False)
+    ledger = judge(modest, SPHEROID, quick=True)
+    assert (ledger["symmetric"].verdict, ledger["symplectic"].verdict) == ("refuted", "refuted")
+
+
+def test_what_cannot_be_judged_says_why():
+    def broken(top, start, plan):
+        raise RuntimeError("no luck " * 100)
+
+    said = {
+        "order": 2,
+        "explicit": True,
+        "symmetric": False,
+        "conserves": frozenset({"energy", "p_phi", "cayley_energy"}),
+    }
+    ledger = judge(Integrator(name="broken", family="other", summary="", solvers={"axis": broken}, **said), SPHEROID)
+    judged = [found for found in ledger.findings if found.verdict != "inapplicable"]
+    assert {found.verdict for found in judged} == {"undecided"}
+    assert all("no luck" in found.why and len(found.why) < 260 for found in judged)
+    assert {found.claim: found.declared for found in judged if found.declared} == {
+        "order": "2", "symmetric": "no", "energy": "kept", "p_phi": "kept", "invariant": "cayley_energy",
+        "explicit": "yes", "pole": "no pole",
+    }  # fmt: skip
+    odd = dataclasses.replace(symtop.integrator("stormer-verlet"), conserves=frozenset({"cayley_energy"}))
+    assert "no formula for cayley_energy" in judge(odd, SPHEROID, quick=True)["invariant"].why
+
+
+def test_an_energy_error_that_is_no_claim_is_refused():
+    with pytest.raises(symtop.SymtopError, match="energy_error must be"):
+        dataclasses.replace(symtop.integrator("strang"), energy_error="tiny")
+
+
+def test_a_method_whose_every_step_is_exact_is_judged_by_its_errors():
+    found = order(symtop.integrator("exact-discrete"), SPHEROID, {}, quick=True)
+    assert (found.declared, found.verdict) == ("exact", "confirmed")
+    assert found.value < 1e-12
+    liar = dataclasses.replace(symtop.integrator("srkn-14-6"), order=None, exact_steps=True)
+    found = order(liar, SPHEROID, {}, quick=True)
+    assert found.verdict == "refuted"
+    assert found.value > 1e-5
+    with pytest.raises(symtop.SymtopError, match="exact_steps"):
+        dataclasses.replace(symtop.integrator("rk4"), exact_steps=True)
+
+
+# ---- liars -----------------------------------------------------------------------------------------------------------
+
+# file: what is refuted first of all, and in which words
+CAUGHT = {
+    "wrong_start": ("order", r"another power of the step: slopes attitude 1\.0"),
+    "symplectic_rk4": ("symplectic", r"defect of the bracket \d\.\de-0[23] \(it goes from (.e-0[23]) to \1"),
+    "coefficients_swapped": ("order", r"another power of the step: slopes attitude (0\.9|1\.0)"),
+    "hidden_kick": ("symmetric", r"a step forth and back misses the start by \d\.\de-0"),
+    "one_newton": (
+        "energy",
+        r"drifting by -?[23]\.\de-09 a step",
+    ),  # of the energy of the nutation; of the whole, 3e-10
+    "coefficient_off": ("order", r"goes to zero it goes to a motion that is wrong by \d\.\de-09"),
+    "verlet_swapped": ("order", r"goes to zero it goes to a motion that is wrong by \d\.\de-01"),
+    "leaking_momentum": ("p_phi", r"growth exponent 1\.00 .* drifting by 8\.\de-12 a step"),
+    "leaking_chart": ("p_phi", r"growth exponent 1\.00 .* a step, in the attitude chart"),
+    "reported_leak": ("reported", r"other momenta than its states have: p_phi differs by \d\.\de-03"),
+    "copied_momenta": ("p_psi", r"growth exponent \d\.\d\d .* drifting by -?\d\.\de-\d+ a step"),
+    "copied_in_angles": (
+        "reported",
+        r"other momenta than its states have: p_(phi|psi) differs by \d\.\de-0\d more at the end",
+    ),
+    "rounded_triple": (
+        "order",
+        r"^its table misses a condition of order 3 by 3\.2e-08 .*; the h\^3 term .* of itself \(noise \de-1\d\)",
+    ),
+    "adaptive_implicit": ("explicit", r"reports \d\.\d\d iterations a step, in the angles chart"),
+}
+# what follows from the lie, and what a liar that looks at its start leaves open
+FOLLOWS = {
+    "symplectic_rk4": {"energy"},
+    "coefficients_swapped": set(),
+    "one_newton": {"symplectic", "symmetric"},
+    "coefficient_off": {"symmetric"},
+    "verlet_swapped": {"symplectic", "symmetric", "energy"},
+    "leaking_chart": {"energy", "p_psi", "reported"},
+    "copied_momenta": {"reported"},
+    "leaking_momentum": {"order", "energy", "p_psi", "pole", "symmetric"},
+}
+OWN_KERNEL = {"one_newton", "coefficient_off", "verlet_swapped", "leaking_momentum"}  # seconds to compile
+
+
+def test_every_file_of_false_claims_is_tested():
+    assert {path.stem for path in LIARS.glob("*.py")} == set(CAUGHT)
+
+
+def run_claims(*arguments):
+    done = CliRunner().invoke(main, ["claims", *arguments], catch_exceptions=False)
+    return done.exit_code, done.output
+
+
+@pytest.mark.parametrize("liar", [pytest.param(n, marks=pytest.mark.slow if n in OWN_KERNEL else []) for n in CAUGHT])
+def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
+    code, output = run_claims(
+        "--plugin", str(LIARS / f"{liar}.py"), "--json", *([] if liar in OWN_KERNEL else ["--quick"])
+    )
+    claim, why = CAUGHT[liar]
+    findings = {row.pop("claim"): row for row in json.loads(output)}
+    assert code == 1
+    assert findings[claim]["verdict"] == "refuted"
+    assert re.search(why, findings[claim]["why"]), findings[claim]["why"]
+    refuted = {name for name, row in findings.items() if row["verdict"] == "refuted"}
+    assert refuted <= {claim} | FOLLOWS.get(liar, set())
+
+
+def test_the_coefficient_that_is_off_is_refused_where_it_can_be():
+    off = (1.3512071919596577 + 1e-9, -1.7024143839193153, 1.3512071919596577)
+    with pytest.raises(symtop.SymtopError, match="drift coefficients must sum to 1"):
+        symtop.composition("off", off, (0.5, 0.0, 0.0, 0.5), chart="space")
+
+
+# ---- false alarms ----------------------------------------------------------------------------------------------------
+
+HONEST = [
+    "midpoint", "stormer-verlet", "strang", "cayley", "rk4", "gauss-4", "takahashi-imada", "yoshida-4", "gauss-2",
+    "galerkin-simpson", "trapezoidal", "chin-4a", "srkn-6-4", "suzuki-4", "rk45-compiled", "gauss-6", "srkn-11-6",
+    "midpoint-unreduced", "cayley-tuned", "aba-8-6-4",
+]  # fmt: skip
+RANDOM = list(zip(HONEST, random_scenes(len(HONEST), seed=2024), strict=True))
+
+
+@pytest.mark.parametrize(
+    ("name", "where"),
+    [pytest.param(name, where, marks=[] if k < 3 else pytest.mark.slow) for k, (name, where) in enumerate(RANDOM)],
+)
+def test_no_false_alarm_on_random_tops(name, where):
+    ledger = judge(symtop.integrator(name), where, quick=name in HONEST[:3])
+    assert [found.sentence(name) for found in ledger.findings if found.verdict == "refuted"] == []
+
+
+@pytest.mark.slow
+def test_no_registered_integrator_is_refuted_and_few_claims_stay_open():
+    ledgers = [judge(method, SPHEROID) for method in symtop.integrators().values()]
+    judged = [
+        (ledger.integrator, found) for ledger in ledgers for found in ledger.findings if found.verdict != "inapplicable"
+    ]
+    assert [found.sentence(name) for name, found in judged if found.verdict == "refuted"] == []
+    assert sum(found.verdict == "undecided" for _, found in judged) <= len(judged) / 10
+    assert all(found.why for _, found in judged)
+    assert all(math.isfinite(found.resolution) for _, found in judged if found.verdict == "confirmed")
+
+
+# ---- command and study -----------------------------------------------------------------------------------------------
+
+
+def test_the_command_prints_one_sentence_for_each_claim():
+    code, output = run_claims("stormer-verlet", "--quick")
+    assert code == 0
+    lines = output.strip().splitlines()
+    assert len(lines) == len(CLAIMS)
+    assert all(line.startswith("stormer-verlet, ") and line.endswith(".") for line in lines)
+    assert "order: claims 2; confirmed: its table meets the conditions up to order 2 to 1e-16; slopes att" in lines[0]
+
+
+@pytest.mark.parametrize("arguments", [("verlett",), ("midpoint", "--scene", "moon"), ("--plugin", "nothing.py")])
+def test_bad_input_to_the_command(arguments):
+    done = CliRunner().invoke(main, ["claims", *arguments])
+    assert done.exit_code == 2
+    assert done.output.startswith("symtop: ")
+
+
+def test_the_study_shows_a_refuted_claim(tmp_path, clean_registry, monkeypatch):
+    plugins.load(LIARS / "symplectic_rk4.py")
+    study = runner.load("claims")
+    mine = dataclasses.replace(
+        study, cases=lambda quick: [case for case in study.cases(quick) if case.integrator in ("symplectic-rk4", "rk4")]
+    )
+    found = runner.run(mine, tmp_path, quick=True, jobs=1, quiet=True, save=style.save)
+    assert found["failures"] == []
+    assert any("symplectic-rk4, symplectic: claims yes; refuted" in line for line in found["verdict"])
+    cells = next(row for row in found["tables"][0]["rows"] if row[0] == "symplectic-rk4")
+    assert cells[1 + CLAIMS.index("symplectic")].startswith("✗ yes | no")
+    assert cells[1 + CLAIMS.index("order")].startswith("✓ 4 | ")
+    assert (tmp_path / "figures" / "claims-ledger.png").is_file()
+
+
+def test_a_finding_without_a_number_is_valid_json():
+    plain = Finding("pole", "", "", "undecided", "nothing was seen").plain()
+    assert json.loads(json.dumps(plain, allow_nan=False))["value"] is None

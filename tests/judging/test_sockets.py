@@ -1,0 +1,319 @@
+"""Sockets: what fits is judged; what hangs, crashes, raises or keeps something is told so and takes nobody along."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import RK23
+
+import symtop
+from symtop.cli.judge import FORMS as OFFERED
+from symtop.judging.battery import STAGES
+from symtop.judging.ledger import CLAIMS, VERDICTS, read
+from symtop.judging.pulse import pulse
+from symtop.judging.screen import described
+from symtop.judging.sockets.opening import FORMS, opened
+from symtop.judging.sockets.python_step import PythonStep
+from symtop.judging.sockets.rotation import RotationStep, to_body, to_space
+from symtop.judging.sockets.separable import SeparableStep
+from symtop.judging.sockets.socket import integrator, label_of
+
+SPHEROID = symtop.scene("spheroid")
+needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
+
+
+def midpoint(f, t, y, h):
+    return y + h * f(t + h / 2, y + h / 2 * f(t, y))
+
+
+def run_of(stepper, steps=200):
+    method = integrator(stepper)
+    return symtop.simulate(SPHEROID, method, step_size=0.8 / steps, horizon=0.8, samples=5, observe="axis", guard=False)
+
+
+# ---- what fits -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("chart", ["angles", "axis", "attitude"])
+def test_a_python_step_makes_the_steps_of_the_tableau_that_it_is(chart):
+    tableau = symtop.runge_kutta("midpoint-tableau", ((), (0.5,)), (0.0, 1.0))
+    ours = symtop.simulate(
+        SPHEROID, tableau.row(chart), step_size=0.004, horizon=0.8, samples=5, observe="axis", guard=False
+    )
+    mine = run_of(PythonStep(midpoint, chart))
+    np.testing.assert_allclose(mine["axis"].values, ours["axis"].values, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(mine["p_psi"].values, ours["p_psi"].values, rtol=1e-12)
+
+
+def test_a_scipy_class_makes_the_steps_that_it_is_told_to():
+    class Mine(RK23):
+        pass
+
+    run = run_of(opened(Mine, None, "axis"))
+    assert run.attrs["steps"] == 200
+    assert run.attrs["force_evaluations"] == pytest.approx(600, abs=5)  # it has one in hand at each end
+    finer = run_of(opened(Mine, None, "axis"), 400)
+    truth = symtop.reference(SPHEROID, run["time"].values)
+    misses = [float(np.abs(one["axis"].values - truth["axis"].values).max()) for one in (run, finer)]
+    assert misses[0] / misses[1] == pytest.approx(8.0, rel=0.1)
+
+
+def test_a_rotation_is_that_of_the_top():
+    start, body = np.array([0.9, 0.3, -0.2, 0.25]), np.array([0.3, -0.7, 1.1])
+    q = start / np.linalg.norm(start)
+    np.testing.assert_allclose(to_body(q, to_space(3.0 * q, body)), body, atol=1e-15)
+    stepper = RotationStep(lambda q, w, h, inertia, torque: (q, w))
+    par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
+    shown = stepper.form.present(par, np.zeros(1), np.array([state]))[0]
+    at = symtop.simulate(SPHEROID, "strang[attitude]", step_size=0.1, horizon=0.2, samples=2, guard=False).isel(time=0)
+    np.testing.assert_allclose(np.abs(shown[:4] @ at["quaternion"].values), 1.0, atol=1e-14)
+    p_phi, p_psi = stepper.form.momenta(par, np.array([state]))
+    np.testing.assert_allclose([p_phi[0], p_psi[0]], SPHEROID.top.momenta(SPHEROID.start)[:2], rtol=1e-14)
+
+
+def verlet(state, h, dT, dV):
+    theta, p = state
+    p = p - h / 2 * dV(theta)
+    theta = theta + h * dT(p)
+    return theta, p - h / 2 * dV(theta)
+
+
+def test_a_separable_step_makes_the_steps_of_the_splitting_that_it_is():
+    ours = symtop.simulate(
+        SPHEROID, "stormer-verlet", step_size=0.004, horizon=0.8, samples=2, observe="nutation", guard=False
+    ).isel(time=-1)
+    stepper = SeparableStep(verlet)
+    par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
+    done = stepper.march(SPHEROID.top, par, np.array(state), 0.004, np.array([200]))
+    np.testing.assert_allclose(done.states[0], [float(ours["theta"]), float(ours["p_theta"])], rtol=1e-12)
+    assert done.evaluations == 400
+
+
+def half_a_kick_short(state, h, dT, dV):
+    theta, p = verlet(state, h, dT, dV)
+    return theta, p + 1e-9 * h * dV(theta)
+
+
+def shrinks(state, h, dT, dV):
+    theta, p = verlet(state, h, dT, dV)
+    return theta, p * (1.0 - 1e-2 * h * h * h)
+
+
+@pytest.mark.parametrize(
+    ("step", "verdicts", "words"),
+    [
+        (verlet, dict.fromkeys(("order", "symplectic", "symmetric", "energy"), "confirmed"), "yes"),
+        (half_a_kick_short, {"order": "refuted", "symplectic": "confirmed"}, "0 by its h^1 term"),
+        (shrinks, {"order": "confirmed", "symplectic": "refuted"}, "no, "),
+    ],
+)  # fmt: skip
+def test_a_separable_step_is_judged_in_the_plane(step, verdicts, words):
+    ledger = symtop.judge(step, form="separable", quick=True, order=2, symplectic=True, symmetric=True)
+    assert {claim: ledger[claim].verdict for claim in verdicts} == verdicts, str(ledger)
+    assert words in ledger["order"].measured + ledger["symplectic"].measured
+    assert "nutation chart" in str(ledger)
+
+
+def test_a_claim_that_a_form_cannot_show_is_told_so():
+    ledger = symtop.judge(verlet, form="separable", quick=True, conserves=["p_phi"])
+    assert ledger["p_phi"].verdict == "inapplicable"
+    assert "the nutation chart has no such constant" in str(ledger)
+
+
+LIBRARY = """
+void step(double *y, double h, const double *par, long n) {
+    for (long k = 0; k < n; k++) { y[3] -= h * par[2] * y[1]; y[4] += h * par[2] * y[0]; BODY }
+}
+void other(double *y, double h, const double *par, long n) { y[0] += n; }
+"""
+
+
+def library(folder, body=""):
+    target = folder / "my.so"
+    (folder / "my.c").write_text(LIBRARY.replace("BODY", body))
+    subprocess.run(["gcc", "-O2", "-shared", "-fPIC", str(folder / "my.c"), "-o", str(target)], check=True)
+    return str(target)
+
+
+@needs_compiler
+def test_a_library_is_asked_for_so_many_steps(tmp_path):
+    stepper = opened(library(tmp_path), None, "axis")
+    par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
+    states, _ = stepper.march(SPHEROID.top, par, np.array(state), 0.5, np.array([0, 1, 4]))
+    np.testing.assert_array_equal(states[0], state)
+    np.testing.assert_allclose(states[:, 4] - state[4], np.array([0, 1, 4]) * 0.5 * SPHEROID.top.mgl * state[0])
+    assert opened(f"{tmp_path / 'my.so'}:other", None, "axis").name == "my-other"
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("body", "words"), [("y[6] = 1;", "beyond the 6 numbers"), ("((double *)par)[0] = 1;", "into its para")]
+)
+def test_a_library_that_writes_where_it_must_not_is_told_so(tmp_path, body, words):
+    with pytest.raises(symtop.SymtopError, match=words):
+        run_of(opened(library(tmp_path, body), None, "axis"))
+
+
+def program(folder, body):
+    file = folder / "engine.py"
+    file.write_text(f"import sys\nnumbers = sys.stdin.readline().split()\n{body}\n")
+    return f"{sys.executable} {file}"
+
+
+def test_a_program_gets_one_line_and_writes_states(tmp_path):
+    echo = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): print(*numbers[6:12])"
+    stepper = opened(program(tmp_path, echo), None, "axis")
+    par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
+    states, _ = stepper.march(SPHEROID.top, par, np.array(state), 0.5, np.array([0, 6, 9]))
+    np.testing.assert_array_equal(states, [state] * 3)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("print(1, 2, 3)", "must write 4 states of 6 numbers .* 24 in all, not 3"),
+        ("print('moved to', *numbers)", "must write numbers, as text or as raw doubles, not 'moved to"),
+        ("sys.exit('no licence')", "ended with code 1: no licence"),
+    ],
+)
+def test_a_program_that_writes_anything_else_is_told_so(tmp_path, body, words):
+    stepper = opened(program(tmp_path, body), None, "axis")
+    with pytest.raises(symtop.SymtopError, match=words):
+        stepper.march(SPHEROID.top, None, np.zeros(6), 0.1, np.array([0, 1, 2, 3]))
+
+
+# ---- what does not fit -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("target", "options", "words"),
+    [
+        ("nothing.py:step", {}, "FILE.py:NAME with a file that is there"),
+        ("nothing.so", {}, "must be a file that is there"),
+        ("no-such-program-anywhere -x", {}, "must be a command that can be run"),
+        (midpoint, {"form": "rotation"}, r"must take \(q, w, h, inertia, torque\), not \(f, t, y, h\)"),
+        (lambda y, h: y, {"form": "separable"}, r"must take \(state, h, dT, dV\), not \(y, h\)"),
+        (lambda y, h: y, {}, r"must take \(f, t, y, h\), not \(y, h\)"),
+        (midpoint, {"form": "od"}, "form 'od' is unknown; did you mean ode"),
+        (midpoint, {"chart": "body"}, "chart 'body' is unknown"),
+        (midpoint, {"order": 0}, "order must be a whole number"),
+        (midpoint, {"conserves": ["momentum"]}, "an entry of conserves 'momentum' is unknown"),
+        (midpoint, {"energy": "tiny"}, "energy must be 'kept', 'bounded' or None, not 'tiny'"),
+        (midpoint, {"adaptive": True}, "need a class derived from OdeSolver"),
+        (dict, {}, "must be derived from scipy.integrate.OdeSolver, not dict"),
+        (midpoint, {"scene": "moon"}, "scene 'moon' is unknown"),
+    ],
+)
+def test_what_cannot_be_judged_is_refused_in_one_sentence(target, options, words):
+    with pytest.raises(symtop.SymtopError, match=words):
+        symtop.judge(target, quick=True, **options)
+
+
+def test_a_file_that_fails_and_a_name_that_is_not_there(tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text("def leap(f, t, y, h):\n    return y\n")
+    with pytest.raises(symtop.SymtopError, match="must have a function 'step'; it has leap"):
+        opened(str(file), None, "axis")
+    file.write_text("import nothing_of_that_name\n")
+    with pytest.raises(symtop.SymtopError, match=r"the file mine\.py failed: ModuleNotFoundError"):
+        opened(str(file), None, "axis")
+    assert label_of("./my engine (new)") == "my-engine-new"
+
+
+# ---- what misbehaves -------------------------------------------------------------------------------------------------
+
+
+def hangs(f, t, y, h):
+    while True:
+        time.sleep(0.01)
+
+
+def hangs_backwards(f, t, y, h):
+    while h < 0:
+        time.sleep(0.01)
+    return midpoint(f, t, y, h)
+
+
+def crashes(f, t, y, h):
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def raises(f, t, y, h):
+    raise RuntimeError("no luck")
+
+
+def returns_nothing(f, t, y, h):
+    y += h * f(t, y)
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr("symtop.judging.pulse.QUICK_PATIENCE", 0.5)
+
+
+@pytest.mark.parametrize(
+    ("step", "words"),
+    [
+        (hangs, r"a step of h = \d.* had not returned after \d+ s"),
+        (crashes, r"its process was ended by SIGSEGV in a step of h = "),
+        (raises, r"a step of h = .* raises RuntimeError: no luck"),
+        (returns_nothing, "step must return the new state, 6 real numbers, not None"),
+        (lambda f, t, y, h: y[:3], r"6 real numbers, not ndarray of shape \(3,\)"),
+        (lambda f, t, y, h: y * 1j, "6 real numbers, not ndarray .* complex128"),
+    ],
+)
+def test_a_step_that_never_works_cannot_be_judged(step, words, impatient):
+    with pytest.raises(symtop.SymtopError, match=words):
+        symtop.judge(step, quick=True)
+
+
+def test_a_step_that_hangs_backwards_is_judged_forwards(impatient):
+    ledger = symtop.judge(hangs_backwards, quick=True, order=2)
+    assert (ledger["calls"].measured, ledger["order"].verdict) == ("forward only", "confirmed")
+    assert "a step of -h did not return" in ledger["calls"].why
+    assert ledger["symplectic"].measured.startswith("no")
+    assert not pulse.look().inside
+
+
+def changes_its_input(f, t, y, h):
+    y += h / 2 * f(t, y)
+    return y + h / 2 * f(t + h / 2, y)
+
+
+def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset():
+    told = []
+    ledger = symtop.judge(changes_its_input, quick=True, tell=told.append)
+    assert told[0].name == "changes_its_input"
+    assert told[1:] == list(ledger.findings)
+    assert [one.claim for one in ledger.findings] == [claim for claims in STAGES.values() for claim in claims]
+    assert {one.claim for one in ledger.findings} > set(CLAIMS) - {"reported"}
+    assert {one.verdict for one in ledger.findings} <= set(VERDICTS) - {"refuted", "confirmed"}
+    assert "writes to its input" in ledger["calls"].why
+    data = ledger.dataset()
+    assert read(data) == list(ledger.findings) or str(read(data)) == str(list(ledger.findings))  # NaN is not itself
+    assert data.attrs["name"] == "changes_its_input"
+    screen = str(ledger).splitlines()
+    assert screen[0].startswith("changes_its_input in the axis chart on spheroid, ")
+    assert screen[-1] == "No claims were made."
+    assert described(ledger.findings).startswith("order 1, not symplectic, not reversible, keeps p_phi; not the energy")
+    assert all(len(line) <= 100 for line in screen)
+
+
+def test_a_library_in_a_folder_of_its_own(tmp_path):
+    (tmp_path / "helper.py").write_text("def slope(f, t, y):\n    return f(t, y)\n")
+    (tmp_path / "mine.py").write_text(
+        "from helper import slope\n\n\ndef step(f, t, y, h):\n    return y + h * slope(f, t, y)\n"
+    )
+    stepper = opened(str(tmp_path / "mine.py"), None, "axis")
+    assert stepper.name == "mine"
+    assert Path(stepper.function.__code__.co_filename).name == "mine.py"
+
+
+def test_the_command_knows_every_form():
+    assert OFFERED == FORMS

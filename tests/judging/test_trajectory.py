@@ -1,0 +1,115 @@
+"""A trajectory without a method: what is found is that of the run it was made by."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+import symtop
+from symtop.base import datasets
+from symtop.cli.main import main
+from symtop.judging.sockets.opening import opened
+from symtop.methods.formulations import FORMULATIONS
+
+SPHEROID = symtop.scene("spheroid")
+H, STRIDE, SAMPLES = 0.01, 10, 1001
+
+
+def midpoint(f, t, y, h):
+    return y + h * f(t + h / 2, y + h / 2 * f(t, y))
+
+
+@pytest.fixture(scope="module")
+def table():
+    """Times, axes and angular momenta of a run of the midpoint tableau, shape (1001, 7)."""
+    stepper = opened(midpoint, None, "axis")
+    par, state = FORMULATIONS["axis"].prepare(SPHEROID.top, SPHEROID.start)
+    marks = STRIDE * np.arange(SAMPLES)
+    states = stepper.march(SPHEROID.top, par, np.array(state), H, marks).states
+    states[:, :3] /= np.linalg.norm(states[:, :3], axis=1)[:, None]
+    return np.column_stack([marks * H, states])
+
+
+def text(table, head="time,ex,ey,ez,Lx,Ly,Lz"):
+    return head + "\n" + "\n".join(",".join(map(repr, row)) for row in table.tolist()) + "\n"
+
+
+def test_a_csv_file_has_the_errors_and_the_drift_of_its_states(table, tmp_path):
+    file = tmp_path / "run.csv"
+    file.write_text(text(table), encoding="utf-8")
+    ledger = symtop.judge(file, conserves=["p_phi", "p_psi"], energy="bounded")
+    truth = symtop.errors({"time": table[:, 0], "axis": table[:, 1:4]}, SPHEROID)
+    assert ledger["axis_error"].value == pytest.approx(float(truth["axis"].max()), rel=1e-6)
+    L, e, top = table[:, 4:], table[:, 1:4], SPHEROID.top
+    energy = (L**2).sum(1) / (2 * top.I1) + (L * e).sum(1) ** 2 * (1 / top.I3 - 1 / top.I1) / 2 + top.mgl * e[:, 2]
+    assert ledger["energy"].value == pytest.approx(np.abs(energy - energy[0]).max() / SPHEROID.energy_scale, rel=1e-6)
+    assert ledger["energy"].measured.startswith("drift")
+    assert (ledger["p_phi"].verdict, ledger["energy"].verdict) == ("confirmed", "refuted")
+    assert str(ledger).startswith("run on spheroid\n")
+
+
+def test_a_netcdf_file_a_mapping_and_blanks_are_the_same(table, tmp_path):
+    given = {"time": table[:, 0], "axis": table[:, 1:4], "momentum": table[:, 4:]}
+    plain = symtop.judge(given)
+    (tmp_path / "run.txt").write_text("# " + text(table).replace(",", "  "), encoding="utf-8")
+    names = {"axis": ("time", "component"), "momentum": ("time", "component")}
+    data = xr.Dataset({name: (names[name], given[name]) for name in names}, {"time": given["time"]})
+    datasets.write(data, tmp_path / "run.nc")
+    for file in ("run.txt", "run.nc"):
+        found = symtop.judge(str(tmp_path / file))
+        assert [one.value for one in found.findings] == [one.value for one in plain.findings]
+
+
+def test_reported_constants_do_not_hide_those_of_the_states(table):
+    copied = {"time": table[:, 0], "axis": table[:, 1:4], "momentum": table[:, 4:], "p_psi": np.full(SAMPLES, 0.1)}
+    assert symtop.judge(copied, conserves=["p_psi"])["p_psi"].verdict == "refuted"
+    del copied["momentum"]
+    alone = symtop.judge(copied)
+    assert [one.claim for one in alone.findings] == ["axis_error", "theta_error", "p_psi"]
+
+
+def test_the_true_motion_keeps_everything():
+    truth = symtop.reference(SPHEROID, np.linspace(0.0, 60.0, 801))
+    names = ("axis", "quaternion", "energy", "p_phi", "p_psi")
+    given = {"time": truth["time"].values} | {name: truth[name].values for name in names}
+    ledger = symtop.judge(given, conserves=["p_phi", "p_psi"], energy="kept")
+    assert ledger.refuted == []
+    assert {ledger[name].verdict for name in ("energy", "p_phi", "p_psi")} == {"confirmed"}
+    assert max(ledger[f"{name}_error"].value for name in ("axis", "attitude", "theta")) < 1e-13
+
+
+def test_the_command_takes_a_file(table, tmp_path):
+    file = tmp_path / "run.csv"
+    file.write_text(text(table), encoding="utf-8")
+    done = CliRunner().invoke(main, ["judge", str(file), "--energy", "kept", "--json"])
+    assert done.exit_code == 1
+    assert {row["claim"]: row["verdict"] for row in json.loads(done.output)}["energy"] == "refuted"
+    done = CliRunner().invoke(main, ["judge", str(file), "--card", str(tmp_path / "card.html")])
+    assert done.exit_code == 2
+    assert "a card shows a method" in done.output
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("time,x\n0,1\n", "must begin with a line of names"),
+        ("ex,ey,ez\n0,0,1\n", "must begin with a line of names"),
+        ("time,theta\n0,0.4\n1\n", "2 numbers a line, and row 2 has 1"),
+        ("time,theta\n0,high\n", "must hold numbers"),
+        ("time,energy\n0,1\n", "one of axis, quaternion, theta"),
+        ("", "it is no text, or empty"),
+    ],
+)
+def test_what_is_no_trajectory_is_told(tmp_path, content, words):
+    (tmp_path / "run.csv").write_text(content, encoding="utf-8")
+    with pytest.raises(symtop.SymtopError, match=words):
+        symtop.judge(str(tmp_path / "run.csv"))
+
+
+def test_a_trajectory_has_no_order():
+    with pytest.raises(symtop.SymtopError, match="a trajectory shows no order"):
+        symtop.judge({"time": [0.0], "theta": [0.4]}, order=4)
+    with pytest.raises(symtop.SymtopError, match="cannot be read: No such file"):
+        symtop.judge("nothing.csv")

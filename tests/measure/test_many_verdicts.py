@@ -1,0 +1,81 @@
+"""Verdicts in one compiled pass against `verdict`, run by run."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from symtop.measure.many_verdicts import judge_runs, truths
+from symtop.measure.verdicts import VERDICTS, verdict
+from symtop.methods.calling import solve
+from symtop.methods.plan import Plan
+from symtop.methods.registry import integrator
+from symtop.model.charts import axis_distance
+from symtop.model.scenes import closed_form, grazing, scene
+from symtop.model.view import View
+
+SAMPLES = 41
+
+
+def run_of(scene_, name, chart, step, count):
+    """A run with its times, and the dataset that `verdict` reads."""
+    h = step * scene_.nutation_period
+    plan = Plan.steps(h, np.unique(np.rint(np.linspace(0, count, SAMPLES)).astype(np.int64)))
+    run = solve(integrator(name), chart, scene_.top, scene_.start, plan)
+    seen = View(chart, scene_.top, run.states, run.p_phi, run.p_psi)
+    shown = {name: ("time", getattr(seen, name)) for name in ("theta", "energy", "p_phi", "p_psi")}
+    return plan.times, run, seen, xr.Dataset(shown, attrs={"outcome": run.outcome})
+
+
+def one_pass(scene_, times, states, momenta, followed=True):
+    """The verdict and the error of one run, by arrays of one row and one column."""
+    phases, outcome = times[None] / scene_.nutation_period, np.zeros((1, 1), dtype=np.int64)
+    judged = judge_runs(
+        truths([scene_]), phases, np.array([followed]), states[None, None], momenta[None, None], outcome
+    )
+    return VERDICTS[judged.verdict[0, 0]], judged.axis_error[0, 0]
+
+
+@pytest.mark.parametrize(
+    ("name", "chart", "step", "word"),
+    [
+        ("strang", "axis", 0.03, "accurate"),
+        ("strang", "axis", 0.12, "bounded_but_wrong"),
+        ("stormer-verlet", "angles", 0.03, "accurate"),
+        ("stormer-verlet", "angles", 0.1, "bounded_but_wrong"),
+        ("rk4", "axis", 0.1, "drifting"),
+        ("rk4", "axis", 0.5, "wrong_regime"),
+        ("rk4", "attitude", 0.08, "drifting"),
+        ("rk4", "attitude", 0.1, "wrong_regime"),
+        ("rk4", "angles", 0.15, "drifting"),
+    ],
+)
+def test_one_pass_says_what_verdict_says(name, chart, step, word):
+    cusp = scene("cusp")
+    times, run, seen, shown = run_of(cusp, name, chart, step, 400)
+    error = axis_distance(seen.axis, closed_form(cusp).axis(times))
+    momenta = np.stack([run.p_phi, run.p_psi], axis=-1)
+    mapped, largest = one_pass(cusp, times, run.states, momenta)
+    assert mapped == verdict(cusp, shown, error) == word
+    assert largest == pytest.approx(error.max(), rel=1e-9)
+    early, some = one_pass(cusp, times, run.states, momenta, followed=False)
+    assert early == word
+    assert some <= largest
+    assert (some <= 1e-2) == (word == "accurate")
+
+
+def test_a_state_that_is_not_finite_and_a_pole_on_the_wrong_side_are_seen():
+    near, times = grazing(1e-3), np.linspace(0.0, 4.0, SAMPLES)
+    states, p_phi, p_psi = closed_form(near).run(times)
+    momenta = np.stack([p_phi, p_psi], axis=-1)
+    assert one_pass(near, times, states, momenta) == ("accurate", pytest.approx(0.0, abs=1e-14))
+    late = states.copy()
+    late[-1, 5] = math.nan
+    word, error = one_pass(near, times, late, momenta)
+    assert word == "not_finite"
+    assert math.isnan(error)
+    turned = states.copy()  # by half a turn about the vertical
+    turned[:, :4] = states[:, [3, 2, 1, 0]] * np.array([-1.0, -1.0, 1.0, 1.0])
+    assert one_pass(near, times, turned, momenta)[0] == "bounded_but_wrong"
+    assert one_pass(near, times, turned, momenta - np.array([2e-3, 0.0]))[0] == "wrong_regime"

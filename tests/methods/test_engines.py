@@ -1,0 +1,241 @@
+"""The maps of physics engines: formulas, reference values, what they follow and where rounding stops them."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import symtop
+from symtop.judging.claims import judge
+from symtop.measure.settings import compared
+from symtop.methods import registry
+from symtop.methods.calling import solve
+from symtop.methods.engines import SINGLE
+from symtop.methods.many import members_of
+from symtop.methods.plan import Plan
+from symtop.model import charts
+from symtop.model.top import flat
+from symtop.runner.grid import grid_rows
+from tests.conftest import random_scenes
+from tests.methods import engine_formulas
+
+GOLDSTEIN = symtop.scene("goldstein")
+AXIS_ERROR = {  # rad, the largest at a hundred samples of 10 s with h = 0.025
+    "no-gyro": 1.5673, "no-gyro-linear": 1.5716, "mujoco-euler": 0.61079, "mujoco-implicit": 0.38563,
+    "bullet": 0.20959, "jolt": 0.57414, "physx": 0.29945, "rapier": 0.049537, "ode": 2.0531, "lammps-rigid": 3.7530e-3,
+    "no-squish": 8.6827e-4, "yade": 0.14976, "fincham": 3.6370e-3, "mujoco3-rk4": 4.4663e-3, "rkmk4": 8.1624e-6,
+    "jsbsim-buss2": 0.045686, "jsbsim-default": 0.97945,
+}  # fmt: skip
+ENERGY = {  # relative to |E| + mgl, after 1000 s with h = 0.025
+    "mujoco-implicit": -0.22, "bullet": -0.073, "jolt": 2.1, "physx": -0.49, "rapier": -0.40, "ode": -0.15,
+    "lammps-rigid": 0.0104, "yade": 2.8, "rkmk4": -8.8e-6, "jsbsim-buss2": 0.046,
+}  # fmt: skip
+ROUNDED = tuple(name.removesuffix(SINGLE) for name in registry.engines() if name.endswith(SINGLE))
+
+
+def axis_error(row, steps, scene=GOLDSTEIN, horizon=10.0, against=None):
+    """The largest angle (rad) between a run's axis and the true one, or that of another closed form."""
+    run = symtop.simulate(
+        scene, row, step_size=horizon / steps, horizon=horizon, samples=101, guard=False,
+        observe="axis" if row.endswith("[axis]") else "attitude",
+    )  # fmt: skip
+    if against is None:
+        return float(symtop.errors(run)["axis"].max())
+    there, true = run["axis"].values, against.axis(run["time"].values)
+    return float(np.arctan2(np.linalg.norm(np.cross(there, true), axis=1), np.sum(there * true, axis=1)).max())
+
+
+def one_step(name, scene, h, chart="attitude"):
+    """The state of a chart after one step."""
+    return solve(symtop.integrator(name), chart, scene.top, scene.start, Plan.steps(h, [1])).states[-1]
+
+
+# ---- formulas --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", AXIS_ERROR)
+def test_a_step_is_the_engines_formula_in_body_axes(name):
+    """Kernels on the axis, with equations solved by hand, against matrices in body axes: the same to rounding."""
+    formula = getattr(engine_formulas, name.replace("-", "_"))
+    for scene in (GOLDSTEIN, *random_scenes(6, seed=3)):
+        top, h = scene.top, 0.013
+        state = charts.space_state("attitude", top, scene.start)
+        attitude, inertia = Rotation.from_quat(np.roll(state[:4], -1)), np.diag([top.I1, top.I1, top.I3])
+        w = attitude.apply(np.linalg.solve(inertia, attitude.inv().apply(state[4:])))
+
+        def tau(at, mgl=top.mgl):
+            return mgl * np.cross([0.0, 0.0, 1.0], at.as_matrix()[:, 2])
+
+        new, w = formula(attitude, w, h, inertia, tau)
+        L = new.apply(inertia @ new.inv().apply(w))
+        done = one_step(name, scene, h)
+        assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-13
+        np.testing.assert_allclose(done[4:], L, rtol=0.0, atol=2e-14 * np.linalg.norm(L) + 1e-14)
+        if "axis" in symtop.integrator(name).charts():
+            np.testing.assert_allclose(
+                one_step(name, scene, h, "axis"), [*new.as_matrix()[:, 2], *L], atol=2e-14 * (1.0 + np.linalg.norm(L))
+            )
+
+
+@pytest.mark.parametrize(("one", "other"), [("jolt", "physx"), ("yade", "fincham"), ("mujoco3-rk4", "rkmk4")])
+def test_maps_that_differ_in_one_line_differ_after_one_step(one, other):
+    assert np.abs(one_step(one, GOLDSTEIN, 0.025) - one_step(other, GOLDSTEIN, 0.025)).max() > 1e-7
+
+
+@pytest.mark.parametrize(("name", "value"), AXIS_ERROR.items())
+def test_the_reference_values(name, value):
+    """Five digits tell an exponential from a linear rotation: the latter has 1.5716 without a gyroscopic term."""
+    for chart in symtop.integrator(name).charts():
+        assert axis_error(f"{name}[{chart}]", 400) == pytest.approx(value, rel=6e-5)
+
+
+@pytest.mark.parametrize(("name", "value"), ENERGY.items())
+def test_the_energy_after_a_thousand_seconds(name, value):
+    run = symtop.simulate(GOLDSTEIN, name, step_size=0.025, horizon=1000.0, samples=40001, guard=False)
+    energy = run["energy"].values
+    gain = (energy[-200:].mean() - energy[0]) / (abs(energy[0]) + GOLDSTEIN.top.mgl)
+    assert gain == pytest.approx(value, rel=0.03)
+
+
+@pytest.mark.parametrize(("name", "time"), [("mujoco-euler", 91.5), ("jsbsim-default", 84.7)])
+def test_explicit_maps_fly_apart(name, time):
+    run = symtop.simulate(GOLDSTEIN, name, step_size=0.025, horizon=120.0, samples=4801, guard=False)
+    energy = np.nan_to_num(run["energy"].values, nan=np.inf)
+    assert run["time"].values[np.argmax(np.abs(energy) > 1e6)] == pytest.approx(time, abs=0.2)
+
+
+@pytest.mark.parametrize(("name", "order"), [("mujoco3-rk4", 2), ("rkmk4", 4), ("yade", 1), ("fincham", 2)])
+def test_one_line_is_worth_an_order(name, order):
+    errors = [axis_error(f"{name}[axis]", steps) for steps in (3200, 6400)]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.07)
+
+
+# ---- without the gyroscopic term -------------------------------------------------------------------------------------
+
+
+def test_without_the_gyroscopic_term_an_engine_follows_the_spherical_top():
+    """Agreement of order h with the closed form of the top with I3 := I1, none with its own."""
+    top = GOLDSTEIN.top
+    spherical = symtop.ClosedForm(symtop.SymmetricTop(top.I1, top.I1, top.mgl), GOLDSTEIN.start)
+    counts = (400, 800, 1600, 3200, 6400)
+    there = [axis_error("no-gyro[axis]", steps, against=spherical) for steps in counts]
+    assert axis_error("no-gyro[axis]", 4000, against=spherical) == pytest.approx(3.6e-4, rel=0.02)
+    slopes = np.log2(np.array(there[:-1]) / there[1:])
+    np.testing.assert_allclose(slopes, 1.0, atol=0.05)
+    assert min(axis_error("no-gyro[axis]", steps) for steps in counts) > 1.5
+    with_term = [axis_error("mujoco-euler[axis]", steps, against=spherical) for steps in counts]
+    assert min(with_term) > 1.0
+
+
+def test_no_test_of_conservation_sees_that_it_is_another_top():
+    run = symtop.simulate(GOLDSTEIN, "no-gyro", step_size=0.0025, horizon=100.0, samples=2001, guard=False)
+    scale = abs(float(run["energy"][0])) + GOLDSTEIN.top.mgl
+    assert float(abs(run["energy"] - run["energy"][0]).max()) < 1e-4 * scale
+    assert float(abs(run["p_psi"] - run["p_psi"][0]).max()) < 1e-12
+    assert float(symtop.errors(run)["axis"].max()) > 1.5
+    wobble = float(abs(run["p_phi"] - run["p_phi"][0]).max()) / 5.0
+    assert wobble == pytest.approx(0.10, abs=0.01)  # L_z alone shows it, and nobody looks
+
+
+# ---- charts and momenta ----------------------------------------------------------------------------------------------
+
+
+def _spun(scene, psi):
+    return symtop.Scene("spun", scene.top, dataclasses.replace(scene.start, psi=psi), scene.horizon)
+
+
+@pytest.mark.parametrize("name", [name for name in AXIS_ERROR if name != "no-squish"])
+def test_a_turn_about_the_axis_changes_no_map_on_the_axis(name):
+    axes = [charts.axis_from_quaternion(one_step(name, _spun(GOLDSTEIN, psi), 0.02)[:4]) for psi in (0.0, 0.7)]
+    np.testing.assert_allclose(axes[0], axes[1], atol=1e-15)
+
+
+def test_no_squish_depends_on_where_the_transverse_axes_are_put():
+    assert symtop.integrator("no-squish").charts() == ("attitude",)
+    axes = [charts.axis_from_quaternion(one_step("no-squish", _spun(GOLDSTEIN, psi), 0.02)[:4]) for psi in (0.0, 0.7)]
+    assert np.abs(axes[0] - axes[1]).max() > 1e-8
+    with pytest.raises(symtop.SymtopError, match="chart of no-squish"):
+        symtop.simulate(GOLDSTEIN, "no-squish[axis]", step_size=0.1)
+
+
+@pytest.mark.parametrize("name", ["jolt", "physx", "ode"])
+def test_a_fast_top_ends_flat_where_the_length_of_L_is_all_that_is_kept(name):
+    """922 steps a second at 100 rad/s, 8 s: more than half of the spin is gone."""
+    fast = symtop.scene("fast")
+    h = fast.nutation_period / 116
+
+    def spin_left(method):
+        run = symtop.simulate(fast, method, step_size=h, horizon=64 * 116 * h, samples=65, guard=False)
+        return float(run["p_psi"][-1] / run["p_psi"][0])
+
+    assert abs(spin_left(name)) < 0.5
+    assert spin_left("strang") == pytest.approx(1.0, abs=1e-12)
+    assert spin_left("bullet") == pytest.approx(1.0, abs=1e-12)  # it damps the wobble instead
+
+
+@pytest.mark.parametrize("name", ["jsbsim-buss2", "jolt-float32", "no-squish", "lammps-rigid"])
+def test_a_run_in_stretches_has_the_bits_of_the_run_in_one(name):
+    solver = symtop.integrator(name).solvers["attitude"]
+    par, rule, state = solver.setup(GOLDSTEIN.top, GOLDSTEIN.start, 0.01)
+    whole = solver.loop(par, rule, state, 0.01, np.array([700]))
+    at = solver.loop.begun(par, rule, state, 0.01)
+    _, at = solver.loop.advance(par, rule, at, 0.01, np.array([311]))
+    rest, _ = solver.loop.advance(par, rule, at, 0.01, np.array([700]))
+    np.testing.assert_array_equal(rest.states, whole.states)
+
+
+@pytest.mark.parametrize("name", ["jsbsim-buss2[axis]", "jolt-float32[attitude]", "rapier[axis]", "no-squish"])
+def test_a_member_of_an_ensemble_has_the_bits_of_the_run_alone(name):
+    numbers = np.array([flat(scene.top, scene.start) for scene in (GOLDSTEIN, *random_scenes(4, seed=5))])
+    h, marks = np.linspace(0.01, 0.02, len(numbers)), np.tile([0, 30, 77], (len(numbers), 1))
+    (solver,) = symtop.integrator(name).solvers.values()
+    done = solver.many(numbers, h, marks)
+    for i, (top, start) in enumerate(members_of(numbers)):
+        np.testing.assert_array_equal(done.states[i], solver(top, start, Plan.steps(h[i], marks[i])).states)
+
+
+# ---- single precision ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ROUNDED)
+def test_in_single_precision_a_step_is_the_same_but_for_rounding(name):
+    exact, rounded = (one_step(one, GOLDSTEIN, 0.01) for one in (name, name + SINGLE))
+    size = np.abs(exact).max()
+    assert 1e-9 < np.abs(rounded - exact).max() / size < 2e-6  # rapier rounds four times
+    assert (rounded[:4] == rounded[:4].astype(np.float32)).all()
+    assert (exact[:4] != exact[:4].astype(np.float32)).any()
+
+
+@pytest.mark.parametrize(
+    ("name", "best", "error"), [("jolt", 25_600, 5.4e-3), ("rapier", 6_400, 7.6e-3), ("physx", 204_800, 3.7e-4),
+                                ("bullet", 51_200, 2.0e-3)],
+)  # fmt: skip
+def test_in_single_precision_there_is_a_best_step(name, best, error):
+    """Error and step of the engines' own runs: the map meets the error within a factor of 2.5, and then gets worse."""
+    counts = [best // 8, best, 32 * best if name != "bullet" else 64 * best]
+    coarse, fine, finest = (axis_error(f"{name}{SINGLE}[attitude]", steps) for steps in counts)
+    assert error / 2.5 < fine < 2.5 * error
+    assert fine < coarse
+    assert finest > 1.5 * fine
+    assert axis_error(f"{name}[attitude]", counts[2]) < 0.2 * finest  # in double it goes on
+
+
+# ---- among the other integrators -------------------------------------------------------------------------------------
+
+
+def test_comparisons_and_recommendations_leave_engines_out():
+    engines = registry.engines()
+    assert len(engines) == len(AXIS_ERROR) + len(ROUNDED)
+    assert {entry.family for entry in engines.values()} == {"engine"}
+    assert not set(engines) & set(registry.methods())
+    assert set(engines) | set(registry.methods()) == set(symtop.integrators())
+    for rows in (registry.rows(), compared("axis"), compared("attitude"), grid_rows("nutation", attitude=True)):
+        assert not {row.method for row in rows} & set(engines)
+
+
+@pytest.mark.parametrize("name", registry.engines())
+def test_no_claim_of_a_map_is_refuted(name):
+    ledger = judge(symtop.integrator(name), symtop.scene("spheroid"), quick=True)
+    assert [found.sentence(name) for found in ledger.findings if found.verdict == "refuted"] == []

@@ -1,0 +1,270 @@
+"""Members that step side by side in lanes have the bits of runs alone, whatever stands beside them."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.measure.timing import timings
+from symtop.methods import blocks, lanes, loop as loops
+from symtop.methods.blocks import ALIKE, LEAST, divided, turns
+from symtop.methods.fixed_step import FixedStep, inside
+from symtop.methods.lanes import W
+from symtop.methods.many import Many, members_of
+from symtop.methods.outcomes import OUTCOMES
+from symtop.methods.plan import Plan
+from symtop.methods.registry import rows
+from symtop.methods.runge_kutta import runge_kutta
+from symtop.methods.space import on_axis
+from symtop.methods.splitting import composition
+from symtop.methods.splitting_space import march_axis
+from symtop.model.top import flat
+
+SOLVERS = {row.name: solver for row in rows() for solver in filter(None, map(inside, row.solvers.values()))}
+IN_LANES = [name for name, solver in SOLVERS.items() if solver.in_lanes]
+A_FEW = ("strang[axis]", "takahashi-imada[attitude]", "cayley[axis]", "srkn-14-6[attitude]", "stormer-verlet[angles]",
+         "rk4[attitude]", "exact-discrete[attitude]", "series[axis]", "series[attitude]")  # fmt: skip
+FAR, LOST = slice(3, None, 17), slice(5, None, 41)  # members whose step turns too far for lanes; whose numbers overflow
+
+
+def members(count=1000, samples=4, seed=0):
+    """Random tops, starts, steps and marks, each of its own; some turn too far in a step, and some overflow."""
+    draw = np.random.default_rng(seed)
+    I1 = 10.0 ** draw.uniform(-2, 2, count)
+    rate = 10.0 ** draw.uniform(-1, 1, count)  # of the motion
+    turns = rate[:, None] * draw.normal(size=(count, 3))
+    mgl = I1 * rate**2 * draw.choice([-1.0, 0.0, 1.0, 1.0, 1.0], count) * draw.uniform(0.1, 10.0, count)
+    numbers = np.column_stack(
+        [I1, I1 * draw.uniform(0.01, 2.0, count), mgl, np.arccos(draw.uniform(-1, 1, count)),
+         draw.uniform(-9.0, 9.0, (count, 2)), turns]
+    )  # fmt: skip
+    h = 10.0 ** draw.uniform(-3.0, -1.2, count) / rate
+    h[FAR] *= 300.0
+    h[LOST] *= 1e200
+    steps = np.cumsum(draw.integers(1, 60, (count, samples)), axis=1)
+    steps[::2] -= steps[::2, :1]  # every other one shows its start
+    return numbers, h, steps
+
+
+def assert_runs_alone(solver, numbers, h, marks, done):
+    """Every member has the bits of a run alone, and its counts."""
+    for i, (top, start) in enumerate(members_of(numbers)):
+        run = solver(top, start, Plan.steps(float(h[i]), marks[i]))
+        assert done.states[i].tobytes() == run.states.tobytes()  # a zero has a sign
+        assert done.momenta[i].T.tobytes() == np.array((run.p_phi, run.p_psi)).tobytes()
+        evaluations, iterations = solver.counts(done.steps[i], done.work[i])
+        assert (done.steps[i], evaluations, iterations, OUTCOMES[done.outcome[i]]) == run[3:7]
+
+
+def left_alone(solver, numbers, h, marks):
+    """The members that the lanes give back."""
+    whole = solver._whole
+    done = Many.begun(len(h), marks.shape[1], whole.size)
+    return whole.blocks().run(np.arange(len(h)), numbers, whole.table, h, marks, done, loops.BLOCK)
+
+
+@pytest.mark.parametrize("name", A_FEW)
+def test_members_have_the_bits_of_runs_alone(name):
+    given = members()
+    done = SOLVERS[name].many(*given)
+    assert_runs_alone(SOLVERS[name], *given, done)
+    failed = {"not_finite", "left_chart"} if "angles" in name else {"not_finite"}
+    assert {OUTCOMES[k] for k in done.outcome} == {"ok", *failed}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", IN_LANES)
+def test_members_of_every_method_with_lanes_have_the_bits_of_runs_alone(name):
+    for seed in (1, 2):
+        given = members(samples=9, seed=seed)
+        assert_runs_alone(SOLVERS[name], *given, SOLVERS[name].many(*given))
+
+
+def test_methods_that_have_lanes():
+    splitting = {row.name for row in rows() if row.family == "splitting"}
+    assert splitting - set(IN_LANES) == {"cayley-tuned[axis]", "cayley-tuned[attitude]"}  # fitted by Python, one by one
+    assert {"rk4[angles]", "rk4[axis]", "rk4[attitude]"} <= set(IN_LANES)
+    assert {f"{name}[{chart}]" for name in ("exact-discrete", "series") for chart in ("axis", "attitude")} <= set(
+        IN_LANES
+    )
+    assert not any(name.startswith(("exact[", "rk45", "taylor", "series-adaptive")) for name in IN_LANES)
+
+
+def test_lanes_finish_what_needs_no_branch_and_give_back_the_others():
+    numbers, h, marks = members()
+    far, lost = (set(range(1000)[part]) for part in (FAR, LOST))
+    left = left_alone(SOLVERS["strang[axis]"], numbers, h, marks).tolist()
+    assert len(left) == len(set(left)) < 200
+    assert lost < set(left)
+    assert len(far & set(left)) > 0.8 * len(far)
+    cayley = left_alone(SOLVERS["cayley[axis]"], numbers, h, marks).tolist()
+    assert lost - set(cayley) <= set(np.flatnonzero(numbers[:, 2] == 0.0))
+    assert len(cayley) < 60  # a Cayley drift may turn as far as it likes
+
+
+@pytest.mark.parametrize("count", [1, LEAST - 1, LEAST, W - 1, W, W + 1, 2 * W + LEAST])
+def test_blocks_that_are_not_full(count):
+    given = members(count, seed=3)
+    assert_runs_alone(SOLVERS["strang[axis]"], *given, SOLVERS["strang[axis]"].many(*given))
+
+
+def test_a_member_does_not_see_its_neighbours():
+    """Bits of the members that were not touched; the one that was differs (the negative control)."""
+    numbers, h, marks = members(200)
+    solver = SOLVERS["srkn-14-6[attitude]"]
+    before = solver.many(numbers, h, marks)
+    numbers[100, 5], h[101], numbers[102, 8] = numbers[100, 5] + 1.0, 1e200, np.nan
+    after = solver.many(numbers, h, marks)
+    assert OUTCOMES[after.outcome[102]] == "not_finite"
+    moved = [i for i in range(200) if not np.array_equal(before.states[i], after.states[i], equal_nan=True)]
+    assert moved == [100, 101, 102]
+
+
+def test_kicks_that_a_table_leaves_out_change_no_bit():
+    """Lanes carry out a kick by 0, alone it is skipped: inside a table, at its ends, and all of them for a free top."""
+    method = composition("gaps", (0.25, 0.25, 0.5), (0.0, 0.5, 0.0, 0.5), chart="space")
+    numbers, h, marks = members(200)
+    numbers[::3, 2], numbers[::7, 5:] = 0.0, -0.0  # and some that stand still
+    for chart in ("axis", "attitude"):
+        solver = method.solvers[chart]
+        assert_runs_alone(solver, numbers, h, marks, solver.many(numbers, h, marks))
+
+
+@pytest.mark.parametrize(
+    ("a", "b"), [(((),), (1.0,)), (((), (1 / 3,), (0.0, 2 / 3)), (0.25, 0.0, 0.75))], ids=["euler", "heun-3"]
+)
+def test_tableaux_of_any_number_of_stages(a, b):
+    """A coefficient of 0 is carried out like any other: a slope that overflows makes NaN of the sum, as alone."""
+    solver = runge_kutta("any", a, b).solvers["axis"]
+    given = members(200, seed=6)
+    assert_runs_alone(solver, *given, solver.many(*given))
+
+
+def test_runs_of_a_few_steps_at_a_time_are_the_same(monkeypatch):
+    given = members(300)
+    solver = SOLVERS["takahashi-imada[attitude]"]
+    whole = solver.many(*given)
+    monkeypatch.setattr(loops, "BLOCK", 250)  # back to Python eight steps of a block at a time
+    monkeypatch.setattr(blocks, "BATCH", 2 * W)
+    for one, other in zip(whole, solver.many(*given), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_long_run_in_which_lanes_are_given_up_between_samples():
+    """The marks lie further apart than the steps after which a block looks for lanes that were given up."""
+    numbers, h, _ = members(W, seed=4)
+    marks = np.tile([0, 2 * lanes.STRETCH + 7], (W, 1)) + np.arange(W)[:, None]
+    assert_runs_alone(SOLVERS["strang[axis]"], numbers, h, marks, SOLVERS["strang[axis]"].many(numbers, h, marks))
+
+
+@pytest.mark.parametrize("count", [1, 8, 31, 32, 1000, 100_003])
+def test_what_lanes_step_begins_with_a_line_of_the_cache(count):
+    room = blocks.aligned(count)
+    assert room.shape == (count,)
+    assert room.ctypes.data % 64 == 0
+    assert room.flags.c_contiguous
+    room[:] = 1.0
+    assert room.sum() == count
+
+
+def test_members_stand_in_the_order_of_their_steps_and_uneven_blocks_are_left():
+    steps = np.concatenate([np.full(40, 100), [1000, 10_000], np.arange(1, 30)])
+    chosen, left = divided(np.arange(len(steps)), steps)
+    assert sorted((*chosen, *left)) == list(range(len(steps)))
+    assert (np.diff(steps[chosen]) >= 0).all()
+    assert {40, 41} <= set(left)  # beside the others they would keep a block waiting
+    assert set(range(20)) <= set(chosen) | set(left)
+    assert [part.size for part in divided(np.arange(0), steps)] == [0, 0]
+    assert divided(np.arange(LEAST - 1), np.full(9, 7))[0].size == 0
+    assert divided(np.arange(LEAST), np.full(9, 7))[1].size == 0
+
+
+def test_members_with_as_many_steps_stand_in_the_order_of_their_turns():
+    """Without turns they stand as they came (the negative control); with them, unlike steps still stand apart."""
+    count, draw = 8 * W, np.random.default_rng(0)
+    turn, everybody = draw.uniform(size=count), np.arange(count)
+    turn[7] = np.nan  # a member whose step overflows: beside the largest
+    chosen, left = divided(everybody, np.full(count, 100), turn)
+    assert left.size == 0
+    np.testing.assert_array_equal(chosen, np.argsort(turn))
+    np.testing.assert_array_equal(divided(everybody, np.full(count, 100))[0], everybody)
+    steps = draw.choice([100, 103, 1000], count)
+    chosen, left = divided(everybody, steps, turn)
+    assert sorted((*chosen, *left)) == list(everybody)
+    short = chosen[steps[chosen] < 1000]
+    np.testing.assert_array_equal(short, chosen[: len(short)])
+    assert (np.diff(turn[short[turn[short] >= 0]]) > 0).all()
+    assert max(100, 103) / 100 < ALIKE < 1000 / 103
+    assert divided(np.arange(LEAST), np.zeros(9, dtype=int), turn)[0].size == LEAST  # no step at all
+
+
+def test_turns_are_those_of_a_sleeping_top_and_of_a_pendulum():
+    still, spinning, far = np.zeros((3, 9))
+    still[:3], spinning[:3], far[:3] = (2.0, 1.0, 18.0), (2.0, 1.0, 0.0), (2.0, 1.0, 1.0)
+    spinning[8], far[6] = 4.0, 1e200
+    angle = turns(np.array([still, spinning, far]), np.array([-0.1, 0.5, 1e200]))
+    np.testing.assert_allclose(angle[:2], [0.1 * 3.0, 0.5 * 2.0])
+    assert angle[2] == np.inf
+
+
+def test_members_that_turn_alike_take_as_many_iterations():
+    """What the order is for: 32 members in order differ less in their work than 32 as they came."""
+    numbers, h, _ = members(seed=5)
+    marks = np.tile([0, 50], (1000, 1))
+    done = SOLVERS["midpoint[angles]"].many(numbers, h, marks)
+    ended = np.flatnonzero(done.steps == 50)
+    slowest = [
+        done.work[part[: len(part) // W * W].reshape(-1, W)].max(axis=1).mean()
+        for part in (ended[np.argsort(turns(numbers, h)[ended])], ended)
+    ]
+    assert slowest[0] < 0.8 * slowest[1]
+
+
+def test_an_exact_step_of_several_parts_is_run_alone():
+    """Next to a separatrix a long step is divided; its neighbours in the block are not."""
+    scene, solver = symtop.scene("separatrix"), SOLVERS["exact-discrete[axis]"]
+    numbers, h, marks = members(2 * W, seed=8)
+    numbers[7], h[7] = flat(scene.top, scene.start), scene.horizon / 4.0
+    marks[:] = marks[0]
+    assert left_alone(solver, numbers, h, marks).tolist().count(7) == 1
+    done = solver.many(numbers, h, marks)
+    assert done.work[7] > done.steps[7]
+    assert_runs_alone(solver, numbers, h, marks, done)
+
+
+def test_a_rule_that_is_a_table_of_stages_runs_in_lanes():
+    """Stages that are multiplied out by hand, as a script has them."""
+    scene, strang = symtop.scene("spheroid"), SOLVERS["strang[axis]"]
+    h = scene.nutation_period / 100
+    solver = FixedStep(march_axis, strang.rule(scene.top, scene.start, h), on_axis, 1, implicit=False)
+    numbers, steps = np.tile(flat(scene.top, scene.start), (40, 1)), np.full(40, h)
+    numbers[:, 4] = np.linspace(0.0, 1.0, 40)
+    marks = np.tile([0, 10, 50], (40, 1))
+    for one, other in zip(solver.many(numbers, steps, marks), strang.many(numbers, steps, marks), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_threads_get_the_bits_of_one():
+    given = members(300)
+    alone = SOLVERS["strang[axis]"].many(*given)
+    with ThreadPoolExecutor(4) as pool:
+        for made in pool.map(lambda _: SOLVERS["strang[axis]"].many(*given), range(8)):
+            for one, other in zip(made, alone, strict=True):
+                np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["strang[axis]", "srkn-14-6[attitude]"])
+def test_lanes_are_faster_than_members_one_after_another(name):
+    """At least three times in any case: what LLVM does not turn into vectors gains nothing (`make bench` measures)."""
+    numbers, h, _ = members(256, seed=5)
+    healthy = np.setdiff1d(np.arange(256), left_alone(SOLVERS[name], numbers, h, np.tile([0, 50], (256, 1))))[:128]
+    numbers, h, marks = numbers[healthy], h[healthy], np.tile([0, 1000], (128, 1))
+    whole = SOLVERS[name]._whole
+    done = Many.begun(128, 2, whole.size)
+    together, alone = timings(
+        [lambda: whole.blocks().run(np.arange(128), numbers, whole.table, h, marks, done, loops.BLOCK),
+         lambda: whole.many()(np.arange(128), numbers, whole.rule, h, marks, *done)], batches=9, batch=0.02,
+    )  # fmt: skip
+    assert alone.best > 3.0 * together.best

@@ -1,0 +1,249 @@
+"""The own Taylor series: coefficients, orders, agreement with the closed form, tolerance, and the vectors beneath."""
+
+import math
+
+import numpy as np
+import pytest
+from numba import njit, types
+from numba.extending import intrinsic
+
+import symtop
+from symtop.base.registers import Components, Vectors
+from symtop.base.validate import SymtopError
+from symtop.methods.attitude_series import attitude_sum
+from symtop.methods.axis_series import axis_sum
+from symtop.methods.plan import Plan
+from symtop.methods.series import series
+from symtop.methods.series_steps import ORDERS, order_for
+from symtop.model import charts
+from symtop.model.closed_form import ClosedForm
+from symtop.model.scenes import closed_form
+
+CHARTS = ("axis", "attitude")
+ADAPTIVE = [(chart, symtop.integrator("series-adaptive")) for chart in CHARTS]
+
+
+def gaps(chart, states, form, times):
+    """Errors of states against the closed form, rad."""
+    truth = form.quaternion(times)
+    if chart == "axis":
+        return charts.axis_distance(states[:, :3], charts.axis_from_quaternion(truth))
+    return charts.attitude_distance(states[:, :4], truth)
+
+
+def worst_gap(chart, method, scene, per_nutation, nutations=10.0):
+    """Largest error of a run with a fixed step at eleven samples."""
+    h = scene.nutation_period / per_nutation
+    plan = Plan.steps(h, np.linspace(0, round(nutations * per_nutation), 11).astype(int))
+    done = method.solvers[chart](scene.top, scene.start, plan)
+    assert done.outcome == "ok"
+    return gaps(chart, done.states, closed_form(scene), plan.times).max()
+
+
+def called(function, *arguments):
+    """What an intrinsic returns, which only compiled code can call."""
+
+    def call(given):
+        return function(*given)
+
+    return njit(call)(arguments)
+
+
+# ---- vectors ---------------------------------------------------------------------------------------------------------
+
+
+def test_vectors_compute_what_scalars_compute():
+    def everything(typing, a, b):
+        def emit(context, builder, signature, arguments):
+            v = Vectors(builder)
+            x, y = v.pack(*arguments, *arguments), v.pack(arguments[1])
+            swapped = v.shuffled(x, 1, 0, 3, 2)
+            product = v.dot([(x, y), (swapped, v.constant(2.0)), (x, x)])
+            total = v.total([product, x, v.constant(1.0, 2.0, 3.0, 4.0)])
+            return v.array([v.lane(v.fma(total, y, x), k) for k in range(4)])
+
+        return types.UniTuple(types.float64, 4)(a, b), emit
+
+    seen = called(intrinsic(everything), 3.0, 5.0)
+    x, other = np.array([3.0, 5.0, 3.0, 5.0]), np.array([5.0, 3.0, 5.0, 3.0])
+    total = x * 5.0 + 2.0 * other + x * x + x + np.array([1.0, 2.0, 3.0, 4.0])
+    assert seen == tuple(total * 5.0 + x)
+
+
+@pytest.mark.parametrize(("of_order", "size"), [(axis_sum, 6), (attitude_sum, 7)])
+def test_components_compute_what_vectors_compute(of_order, size):
+    """To the last bit, as lanes need it; another order is another sum."""
+    state = tuple(np.random.default_rng(2).normal(size=size).tolist())
+    seen = called(of_order(16, Components), state, 0.1, 0.2)
+    assert seen == called(of_order(16), state, 0.1, 0.2)
+    assert seen != called(of_order(12), state, 0.1, 0.2)
+
+
+# ---- coefficients ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_sum_of_the_axis_is_that_of_the_first_terms_of_the_equations(order):
+    """The coefficients by the plain recurrence of e' = L x e/I1, L' = mgl z x e, in NumPy."""
+    scene = symtop.scene("spheroid")
+    h, (I1, mgl) = 0.2, (scene.top.I1, scene.top.mgl)
+    state = charts.space_state("axis", scene.top, scene.start)
+    e, L = [state[:3]], [state[3:]]
+    for n in range(order + 1):
+        turned = sum(np.cross(L[k], e[n - k]) for k in range(n + 1))
+        L.append(h * mgl * np.array([-e[n][1], e[n][0], 0.0]) / (n + 1))
+        e.append(h / I1 * turned / (n + 1))
+    seen = called(axis_sum(order), tuple(state.tolist()), h / I1, h * mgl)
+    assert seen[:3] == pytest.approx(sum(e[1 : order + 1]), rel=1e-11)
+    assert seen[3:5] == pytest.approx(sum(L[1 : order + 1])[:2], rel=1e-11)
+    for n, square in ((order, seen[5]), (order - 1, seen[6])):
+        assert math.sqrt(square) == pytest.approx(np.linalg.norm([*e[n - 1][:2], e[n][2]]), rel=1e-9)
+    assert seen[:3] != pytest.approx(sum(e[1:order]), rel=1e-10)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_attitudes_sum_shows_the_axis_of_the_axis_sum(order):
+    scene = symtop.scene("hairer-lubich-wanner")
+    h, (I1, mgl) = 0.02, (scene.top.I1, scene.top.mgl)
+    state = charts.space_state("attitude", scene.top, scene.start)
+    seen = called(attitude_sum(order), tuple(state.tolist()), h / I1, h * mgl)
+    axis = charts.space_state("axis", scene.top, scene.start)
+    theirs = called(axis_sum(order), tuple(axis.tolist()), h / I1, h * mgl)
+    moved = state[:4] + np.array(seen[:4])
+    assert charts.axis_from_quaternion(moved) == pytest.approx(axis[:3] + np.array(theirs[:3]), abs=1e-13)
+    assert seen[4:6] == pytest.approx(theirs[3:5], rel=1e-12)
+    assert np.linalg.norm(moved) == pytest.approx(1.0, abs=1e-13)
+
+
+# ---- orders ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("chart", CHARTS)
+@pytest.mark.parametrize(("order", "window"), [(8, (14, 60)), (12, (9, 25)), (16, (7, 12)), (20, (6, 8))])
+def test_the_error_of_a_step_falls_with_one_power_more_than_the_order(chart, order, window):
+    scene, method = symtop.scene("spheroid"), series("trial", order)
+    steps = scene.nutation_period / np.geomspace(*window, 9)
+    runs = [method.solvers[chart](scene.top, scene.start, Plan.steps(h, [1])).states for h in steps]
+    errors = [gaps(chart, state, closed_form(scene), np.array([h]))[0] for h, state in zip(steps, runs, strict=True)]
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(order + 1, abs=0.7)
+    assert method.order == order
+
+
+@pytest.mark.parametrize("chart", CHARTS)
+@pytest.mark.parametrize("name", ["spheroid", "goldstein", "fast", "grazing", "sleeping-unstable"])
+def test_long_runs_are_right_to_rounding_where_the_truncation_is_below_it(chart, name):
+    scene = symtop.scene(name)
+    per_nutation = 400.0 if name == "sleeping-unstable" else 25.0
+    bound = 3e-9 if name == "sleeping-unstable" else 3e-12
+    assert worst_gap(chart, series("trial", 20), scene, per_nutation, 100.0 if bound < 1e-10 else 10.0) < bound
+    assert worst_gap(chart, series("trial", 8), scene, per_nutation / 4.0) > 1e-9
+
+
+def test_constants_of_the_present_state_keep_a_long_run_at_rounding():
+    scene = symtop.scene("spheroid")
+    method = symtop.integrator("series")
+    h = scene.nutation_period / 30.1
+    done = method.solvers["axis"](scene.top, scene.start, Plan.steps(h, np.arange(0, 1_000_001, 10_000)))
+    e, L = done.states[:, :3], done.states[:, 3:]
+    energy = 0.5 * (L * L).sum(axis=1) / scene.top.I1 + scene.top.mgl * e[:, 2]
+    assert np.abs(energy / energy[0] - 1.0).max() < 3e-12
+    assert np.ptp(done.p_phi) == 0.0
+    assert np.abs(done.p_psi / done.p_psi[0] - 1.0).max() < 3e-12
+
+
+# ---- tolerance -------------------------------------------------------------------------------------------------------
+
+
+def test_the_order_follows_from_the_tolerance():
+    assert [order_for(tolerance) for tolerance in (1e-3, 1e-6, 1e-9, 1e-12, 1e-16)] == [8, 12, 16, 20, 20]
+
+
+@pytest.mark.parametrize(("chart", "method"), ADAPTIVE)
+@pytest.mark.parametrize("name", ["spheroid", "fast", "grazing", "sleeping", "separatrix", "steady"])
+def test_the_error_follows_the_tolerance(chart, method, name):
+    scene = symtop.scene(name)
+    times = np.linspace(0.0, min(scene.horizon, 10.0 * scene.time_scale()), 41)
+    form = closed_form(scene)
+    for tolerance in (1e-5, 1e-8, 1e-11):
+        done = method.solvers[chart](scene.top, scene.start, Plan.until(times, tolerance))
+        assert done.outcome == "ok"
+        growth = 1e4 if name in ("separatrix", "sleeping") else 1e2
+        assert gaps(chart, done.states, form, times).max() < growth * tolerance
+    strict = method.solvers[chart](scene.top, scene.start, Plan.until(times, 1e-17))
+    loose = method.solvers[chart](scene.top, scene.start, Plan.until(times, 1e-5))
+    assert strict.steps > loose.steps
+    p_psi = scene.top.momenta(scene.start).p_psi
+    assert strict.p_psi == pytest.approx(np.full(41, p_psi), rel=1e-11)
+
+
+@pytest.mark.parametrize(("chart", "method"), ADAPTIVE)
+def test_samples_do_not_change_the_steps_and_a_budget_ends_a_run(chart, method):
+    scene = symtop.scene("goldstein")
+    times = [np.linspace(0.0, 40.0, count) for count in (2, 401)]
+    few, many = (method.solvers[chart](scene.top, scene.start, Plan.until(grid, 1e-10)) for grid in times)
+    assert few.steps == many.steps
+    assert few.states[-1] == pytest.approx(many.states[-1], abs=0.0)
+    short = method.solvers[chart](scene.top, scene.start, Plan.until(np.linspace(0.0, 400.0, 41), 1e-10, budget=500.0))
+    assert short.outcome == "out_of_budget"
+    assert 0.0 < short.reached < 400.0
+    assert np.isnan(short.states[-1]).all()
+
+
+def test_blocks_of_series_join_without_a_seam(monkeypatch):
+    from symtop.methods import series_steps
+
+    scene = symtop.scene("goldstein")
+    plan = Plan.until(np.linspace(0.0, 40.0, 41), 1e-10)
+    for chart, method in ADAPTIVE:
+        whole = method.solvers[chart](scene.top, scene.start, plan)
+        monkeypatch.setattr(series_steps, "BLOCK", 7)
+        parts = method.solvers[chart](scene.top, scene.start, plan)
+        monkeypatch.undo()
+        assert np.array_equal(whole.states, parts.states)
+        assert whole.steps == parts.steps
+
+
+def test_a_free_top_and_one_at_rest_and_bad_input():
+    with pytest.raises(SymtopError, match="order"):
+        series("trial", 10)
+    for chart, method in ADAPTIVE:
+        top, start = symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(0.7, 0.2, 0.1, 0.3, -0.8, 1.1)
+        times = np.linspace(0.0, 30.0, 11)
+        done = method.solvers[chart](top, start, Plan.until(times, 1e-12))
+        assert done.outcome == "ok"
+        assert gaps(chart, done.states, ClosedForm(top, start), times).max() < 1e-10
+        rest = method.solvers[chart](top, symtop.Angles(0.7, 0.2, 0.1, 0.0, 0.0, 0.0), Plan.until(times, 1e-12))
+        assert rest.outcome == "ok"
+        with pytest.raises(SymtopError, match="tolerance"):
+            symtop.simulate("spheroid", method, tolerance=1e-25, observe="axis")
+        with pytest.raises(SymtopError, match="step_size"):
+            symtop.simulate("spheroid", method, step_size=0.1, observe="axis")
+
+
+def test_series_axis_and_series_attitude_are_names_of_rows():
+    for chart in CHARTS:
+        for name in (f"series-{chart}", f"series[{chart}]"):
+            assert symtop.integrator(name).name == f"series[{chart}]"
+            assert symtop.integrators()[name].charts() == (chart,)
+        run = symtop.simulate("spheroid", f"series-{chart}", step_size=0.05, horizon=2.0, samples=5)
+        assert run.attrs["integrator"] == f"series[{chart}]"
+    assert symtop.integrator("galerkin-simpson-angles").name == "galerkin-simpson[angles]"
+    for wrong in ("series-angles", "series-", "axis", "-axis"):
+        with pytest.raises(SymtopError):
+            symtop.integrator(wrong)
+    with pytest.raises(KeyError):
+        symtop.integrators()["serious-axis"]
+
+
+def test_a_user_makes_a_series_of_any_of_its_orders():
+    scene = symtop.scene("spheroid")
+    plan = Plan.steps(scene.nutation_period / 20, [20])
+    errors = []
+    for order in ORDERS:
+        method = symtop.series(f"mine-{order}", order)
+        assert method.order == order
+        done = method.solvers["axis"](scene.top, scene.start, plan)
+        errors.append(charts.axis_distance(done.states[:, :3], closed_form(scene).axis(plan.times))[0])
+    assert errors[0] > 100 * errors[1] > 1e4 * errors[-1]
+    with pytest.raises(symtop.SymtopError, match="order must be one of 8, 12, 16, 20, not 9"):
+        symtop.series("mine", 9)

@@ -1,0 +1,111 @@
+"""Starts and tops from what other programs hold: there and back, at the poles too, and bad input in one sentence."""
+
+import math
+
+import numpy as np
+import pytest
+from conftest import random_scenes
+
+import symtop
+from symtop.model import charts, starts
+
+POLES = [((1.0, 0.0, 0.0, 0.0), 0.0), ((0.0, 1.0, 0.0, 0.0), math.pi), ((0.6, 0.0, 0.0, 0.8), 0.0)]
+
+
+def body_rates(at):
+    """The angular velocity in the body frame, by Goldstein's formulas."""
+    c, s = math.cos(at.psi), math.sin(at.psi)
+    swing = at.phi_dot * math.sin(at.theta)
+    return np.array([at.theta_dot * c + swing * s, swing * c - at.theta_dot * s, at.spin])
+
+
+def matrix(q):
+    """The rotation from body to space."""
+    w, x, y, z = q
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize("scene", random_scenes(20, seed=5))
+def test_a_start_goes_to_a_quaternion_and_back(scene):
+    at, top = scene.start, scene.top
+    q, body = charts.quaternion_from_angles(at.theta, at.phi, at.psi), body_rates(at)
+    for kind, omega in (("omega_body", body), ("omega_space", matrix(q) @ body)):
+        back = symtop.Angles.from_quaternion(q, **{kind: omega})
+        for name in ("theta", "theta_dot", "phi_dot", "psi_dot"):
+            assert getattr(back, name) == pytest.approx(getattr(at, name), abs=1e-12)
+        for name in ("phi", "psi"):
+            assert math.remainder(getattr(back, name) - getattr(at, name), 2.0 * math.pi) == pytest.approx(0, abs=1e-12)
+    wrong = symtop.Angles.from_quaternion(q, omega_body=matrix(q) @ body)  # the frame matters
+    assert abs(wrong.theta_dot - at.theta_dot) + abs(wrong.phi_dot - at.phi_dot) > 1e-6
+    state = charts.space_state("axis", top, at)
+    same = symtop.Angles.from_axis(top, state[:3], state[3:])
+    assert top.energy(same) == pytest.approx(top.energy(at), rel=1e-13)
+    np.testing.assert_allclose(charts.space_state("axis", top, same), state, atol=1e-12)
+
+
+@pytest.mark.parametrize(("quaternion", "theta"), POLES)
+def test_a_start_on_a_pole_keeps_its_motion(quaternion, theta):
+    """The rates hold the whole angular velocity, and the attitude is the one that was given."""
+    omega = np.array([0.3, -0.4, 5.0])
+    at = symtop.Angles.from_quaternion(quaternion, omega_body=omega)
+    assert at.theta == theta
+    q = charts.quaternion_from_angles(at.theta, at.phi, at.psi)
+    assert float(charts.attitude_distance(q, np.array(quaternion))) < 1e-15
+    np.testing.assert_allclose(body_rates(at), omega, atol=1e-14)
+    top = symtop.SymmetricTop(2.0, 1.0, 1.0)
+    L = matrix(quaternion) @ (omega * [2.0, 2.0, 1.0])
+    state = charts.space_state("axis", top, symtop.Angles.from_axis(top, matrix(quaternion)[:, 2], L))
+    np.testing.assert_allclose(state[3:], L, atol=1e-14)
+
+
+def test_a_foreign_run_is_judged_from_its_first_sample():
+    """What an own simulator has: a quaternion and a body rate. The run that follows is the scene's."""
+    scene = symtop.scene("spheroid")
+    q = charts.quaternion_from_angles(scene.start.theta, scene.start.phi, scene.start.psi)
+    start = symtop.Angles.from_quaternion(q, omega_body=body_rates(scene.start))
+    mine = symtop.Scene("mine", scene.top, start, 8.0)
+    run = symtop.simulate("spheroid", "gauss-8", step_size=0.002)
+    assert float(symtop.errors({"time": run["time"], "quaternion": run["quaternion"]}, mine)["attitude"].max()) < 1e-9
+
+
+def test_a_body_from_its_moments_about_the_centre_is_the_spheroid():
+    mass, polar, equatorial, arm = 1.3, 0.2, 0.1, 0.25
+    wanted = symtop.SymmetricTop.from_spheroid(mass, polar, equatorial, pivot_distance=arm)
+    across, along = mass * (polar**2 + equatorial**2) / 5.0, 0.4 * mass * equatorial**2
+    made = symtop.SymmetricTop.from_inertia(mass, across, along, arm)
+    assert (made.I1, made.I3, made.mgl) == pytest.approx((wanted.I1, wanted.I3, wanted.mgl), rel=1e-15)
+    assert symtop.SymmetricTop.from_inertia(mass, across, along, -arm).mgl == -made.mgl
+    assert symtop.SymmetricTop.from_inertia(mass, across, along, arm, gravity=1.62).mgl == pytest.approx(
+        mass * 1.62 * arm
+    )
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: symtop.Angles.from_quaternion([1, 1, 0, 0]), "quaternion must have unit length, not 1.414"),
+        (lambda: symtop.Angles.from_quaternion([1, 0, 0]), "quaternion must be 4 numbers, not 3"),
+        (lambda: symtop.Angles.from_quaternion("x"), "quaternion must be a row of numbers"),
+        (lambda: symtop.Angles.from_quaternion([1, 0, 0, 0], omega_body=[1]), "omega_body must be 3 numbers, not 1"),
+        (
+            lambda: symtop.Angles.from_quaternion([1, 0, 0, 0], omega_body=[1, 1, 1], omega_space=[1, 1, 1]),
+            "give omega_body or omega_space, not both",
+        ),
+        (lambda: symtop.Angles.from_axis(symtop.SymmetricTop(1, 1, 1), [0, 0, 2], [0, 0, 1]), "axis must have unit"),
+        (lambda: symtop.SymmetricTop.from_inertia(1, 1, 3, 1), "axial must be at most 2 at_centre"),
+        (lambda: symtop.SymmetricTop.from_inertia(0, 1, 1, 1), "mass must be above zero"),
+        (lambda: symtop.SymmetricTop.from_inertia(1, 1, 1, math.nan), "distance must be a finite number"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_sentence(call, says):
+    with pytest.raises(symtop.SymtopError, match=says):
+        call()
+
+
+def test_a_vector_is_turned_as_its_matrix_says():
+    q = np.array([0.5, -0.5, 0.1, math.sqrt(0.49)])
+    np.testing.assert_allclose(starts.body_frame(q, (1.0, 2.0, -3.0)), matrix(q).T @ [1.0, 2.0, -3.0], atol=1e-15)

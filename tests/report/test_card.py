@@ -1,0 +1,75 @@
+"""The card and the badge of a judged step."""
+
+import re
+import xml.etree.ElementTree as ET
+
+import pytest
+
+import symtop
+from symtop.judging.judge_step import Judged
+from symtop.judging.ledger import Finding
+from symtop.judging.watched import About
+from symtop.report.card import badge, card, figures, write_badge
+
+
+def midpoint(f, t, y, h):
+    return y + h * f(t + h / 2, y + h / 2 * f(t, y))
+
+
+@pytest.fixture(scope="module")
+def ledger():
+    return symtop.judge(midpoint, quick=True, order=2, symplectic=True)
+
+
+def handmade(*findings, name="mine"):
+    return Judged(name, "spheroid", findings, {}, About(name, "axis", "python", 0.0))
+
+
+def test_the_card_is_one_page_with_two_figures_and_every_verdict(ledger, tmp_path):
+    page = card(ledger, tmp_path / "folder" / "card.html").read_text(encoding="utf-8")
+    assert not re.search(r'(src|href)="http', page.replace('xmlns:xlink="http', ""))
+    assert page.count("<svg") == 3  # the badge, two drawings
+    for finding in ledger.findings:
+        if finding.verdict != "inapplicable":
+            assert f" {finding.verdict}</td>" in page
+    assert page.count('<td class="refuted">✗ refuted') == len(ledger.refuted) == 2
+    left, right = (figure.axes[0] for figure in figures(ledger))
+    assert left.get_title() == f"order: {ledger['order'].measured}"
+    assert right.get_title().startswith("energy: drift, ")
+    slopes = [line for line in left.lines if line.get_label() == "h^2, as claimed"]
+    (guide,) = slopes
+    rise = guide.get_ydata()[1] / guide.get_ydata()[0]
+    assert rise == pytest.approx((guide.get_xdata()[1] / guide.get_xdata()[0]) ** 2)
+
+
+def test_the_energy_of_the_card_is_that_of_the_long_run(ledger):
+    data = ledger.dataset()
+    assert float(data["energy_change"].max()) == pytest.approx(ledger["energy"].value, rel=0.02)
+    assert float(data["long_nutations"].max()) == pytest.approx(float(data["nutations_run"]), rel=0.05)
+
+
+def test_a_card_without_measurements_says_why(tmp_path):
+    nothing = handmade(
+        Finding("order", "4", "", "undecided", "no <luck>"), Finding("energy", "", "", "undecided", "it stopped")
+    )
+    page = card(nothing, tmp_path / "card.html").read_text(encoding="utf-8")
+    assert "no &lt;luck&gt;" in page
+    assert "<luck>" not in page
+    assert [figure.axes[0].texts[0].get_text() for figure in figures(nothing)] == ["no <luck>", "it stopped"]
+
+
+def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):
+    file = write_badge(ledger, tmp_path / "badge.svg")
+    root = ET.fromstring(file.read_text(encoding="utf-8"))
+    words = [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert words == ["symtop", "refuted: symplectic, energy"]
+    good = handmade(Finding("order", "2", "2.000 +- 0.001", "confirmed", "a <b>", 2.0, 0.05), name="<mine>")
+    assert "order 2" in badge(good)
+    assert "refuted" not in badge(good)
+    ET.fromstring(badge(good))
+    assert root.get("width").isdigit()
+
+
+def test_a_card_that_cannot_be_written_is_told(ledger, tmp_path):
+    with pytest.raises(symtop.SymtopError, match="it is a folder"):
+        card(ledger, tmp_path)

@@ -1,0 +1,153 @@
+"""Bounds from arithmetic notice a wrong closed form, and certificates are made once, kept, and contradict a lie."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+import symtop
+from benchmarks.families import tops
+from symtop.model import charts, closed_form as forms, motion_layout as at
+from symtop.model.closed_form import ClosedForm
+from symtop.model.scenes import Scene, closed_form, scene, scenes
+from symtop.model.top import Angles, SymmetricTop
+from symtop.run import bounds as bounds_module, certificate as module
+from symtop.run.bounds import ROUNDING, SUSPICIOUS, closed_bounds, closed_values, disagreement
+from symtop.run.certificate import Certificate, certificate
+from symtop.run.witnesses import MAP_STEPS, iterated, iterated_with_error
+
+TIMES = np.array([0.3, 17.0, 1e3, 1e6])
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    module._on_disk.cache_clear()
+    return tmp_path
+
+
+def test_views_and_integrals_agree_in_every_regime():
+    """Rounding stays three digits below what is called suspicious, next to the poles as well."""
+    forms.compile_now()
+    for where in [*(Scene("drawn", *pair, 1.0) for pair in tops(20, seed=41)), *scenes().values()]:
+        apart = disagreement(closed_form(where), TIMES, closed_values(where, TIMES))
+        assert apart.max() < 1e-2 * SUSPICIOUS, where
+
+
+@pytest.mark.parametrize(
+    ("place", "share"),
+    [(at.PHI_LINE + 2, 1e-9), (at.PHI_TURNS + 2, 1e-9), (at.DOWN_TURNS + 2, 1e-9), (at.UP_TURNS, 1e-9),
+     (at.P_PSI, 1e-9), (at.ENERGY, 1e-9), (at.P_PHI, 1e-9), (at.FLOOR + at.STEEPNESS, 1e-9), (at.BEND, 1e-9),
+     (at.TWIST_UP, 1e-9), (at.FLOOR + at.FAR_REAL, 1e-9), (at.CROWN + at.NEAR_IMAG, 1e-9)],
+)  # fmt: skip
+def test_a_wrong_constant_is_noticed_at_the_times_asked_for(monkeypatch, place, share):
+    where = Scene("wrong", scene("spheroid").top, scene("spheroid").start, 8.0)
+    form = ClosedForm(where.top, where.start)
+    monkeypatch.setattr(bounds_module, "closed_form", lambda _: form)
+    assert closed_bounds(where, TIMES, closed_values(where, TIMES))["axis"].max() < 3e-15
+    form._constants[place] *= 1.0 + share
+    wrong = closed_bounds(where, TIMES, closed_values(where, TIMES))
+    assert wrong["axis"].max() == wrong["phi"].max() == math.pi
+
+
+def test_bounds_grow_with_the_phase_when_that_is_visible():
+    where = scene("spheroid")
+    bounds = closed_bounds(where, np.array([1.0, 1e16]), closed_values(where, np.array([1.0, 1e16])))
+    assert bounds["axis"][0] == pytest.approx(ROUNDING["axis"], rel=1e-9)
+    assert 1e-12 < bounds["axis"][1] < 1e-10
+
+
+def test_a_certificate_is_made_once_and_the_better_one_is_told(cache, monkeypatch):
+    where = scene("goldstein")
+    assert certificate(where) is None
+    digits = certificate(where, "digits")
+    assert certificate(where)[:3] == digits[:3]
+    assert digits.kind == certificate(where).kind == "digits"
+    assert digits.reach == pytest.approx(1e6 * where.nutation_period)
+    iterated = certificate(where, "discrete-map")
+    assert certificate(where).kind == iterated.kind == "discrete-map"
+    integration = certificate(where, "integration")
+    assert integration.kind == "integration"
+    assert (integration.share, integration.reach) == (digits.share, digits.reach)
+    monkeypatch.setattr(module, "_compared", pytest.fail)  # nothing is computed again
+    module._on_disk.cache_clear()  # as in a new process
+    assert certificate(where) == certificate(where, "integration") == integration
+    assert certificate(scene("spheroid")) is None
+    assert len(list(cache.glob("reference/*.nc"))) == 3
+
+
+def test_a_certificate_without_heyoka_is_not_taken_for_one_with_it(cache, monkeypatch):
+    with monkeypatch.context() as hidden:
+        hidden.setitem(sys.modules, "heyoka", None)
+        assert certificate(scene("goldstein"), "integration").kind == "discrete-map"
+    assert certificate(scene("goldstein"), "integration").kind == "integration"
+
+
+@pytest.mark.parametrize(
+    "where",
+    [scene("steady"), scene("separatrix"), scene("bruls-cardona-arnold"), scene("sleeping-unstable"),
+     Scene("climbing", SymmetricTop(1.0, 0.5, -1.0), Angles(0.0, theta_dot=2.0), 5.0),
+     Scene("free", SymmetricTop(1.0, 0.5, 0.0), Angles(1.0, 0.1, 0.2, 0.3, 0.4, 0.5), 5.0)],
+    ids=lambda where: where.name,
+)  # fmt: skip
+def test_motions_of_every_kind_can_be_certified(cache, where):
+    made = certificate(where, "integration")
+    assert 0.0 < made.share < 1.0
+    assert made.apart < 1e-13
+    assert made.map_apart < 1e-12
+    assert (made.factor, made.doubt) == (1.0, 0.0)
+
+
+def test_a_certificate_shows_a_form_that_is_wrong(cache, monkeypatch):
+    """A rate of the phase that is wrong by 1e-15 shows against 40 digits; formulas of another top do in motion."""
+    where = scene("spheroid")
+    honest = closed_form(where)
+    wrong = ClosedForm(where.top, where.start)
+    wrong._constants[at.QUARTERS] *= 1.0 + 4e-16
+    for holder in (bounds_module, module, sys.modules["symtop.run.witnesses"]):
+        monkeypatch.setattr(holder, "closed_form", lambda _: wrong)
+    made = certificate(where, "integration")
+    assert made.share > 1e3
+    assert made.factor > 1e3
+    assert certificate(where).factor == made.factor
+    assert honest is closed_form(where)
+    other = ClosedForm(SymmetricTop(where.top.I1, where.top.I3, where.top.mgl * (1.0 + 1e-9)), where.start)
+    monkeypatch.setattr(module, "closed_form", lambda _: other)
+    assert module._against_integration(where)[1] > 1e-9
+    assert module._against_map(where)[1] > 1e-9
+
+
+def test_the_discrete_map_as_a_witness_knows_its_own_error_and_is_no_echo(monkeypatch):
+    """It needs no other witness; a map of another top is seen, and so is one whose two steps disagree."""
+    where = scene("spheroid")
+    times = where.nutation_period * np.array([0.3, 7.7, 100.0])
+    truth = closed_form(where).quaternion(times)
+    attitudes, steps = iterated(where, times)
+    assert charts.attitude_distance(attitudes, truth).max() < 1e-12
+    assert steps == sum(math.ceil(nutations * MAP_STEPS[0]) for nutations in (0.3, 7.7, 100.0))
+    other = Scene("other", SymmetricTop(where.top.I1, where.top.I3, where.top.mgl * (1.0 + 1e-9)), where.start, 8.0)
+    assert module._against_map(where)[1] < SUSPICIOUS
+    monkeypatch.setattr(module, "iterated_with_error", lambda _, times: iterated_with_error(other, times))
+    assert module._against_map(where)[1] > 1e-9
+    made = Certificate(1.0, 1, 0.1, 1.0, module._against_map(where)[1], 0.0)
+    assert made.doubt == made.map_apart
+
+
+def test_words_of_a_certificate():
+    assert str(Certificate(1e6, 30, 0.25, math.nan, math.nan, math.nan)) == (
+        "40 digits at 30 times up to t = 1e+06, largest error 0.25 of its bound"
+    )
+    assert str(Certificate(1e6, 30, 0.25, 100.0, 0.0, math.nan)).endswith(
+        "; discrete map up to t = 100, no further apart than its own error"
+    )
+    integrated = str(Certificate(1e6, 30, 0.25, 100.0, 0.0, 8e-16))
+    assert integrated.endswith("; long double integration up to t = 100, 8e-16 rad apart")
+
+
+def test_a_damaged_certificate_is_made_again(cache):
+    made = symtop.reference("spheroid", [1.0], certify="digits").attrs["certificate"]
+    (path,) = cache.glob("reference/*.nc")
+    path.write_bytes(path.read_bytes()[:100])
+    module._on_disk.cache_clear()
+    assert symtop.reference("spheroid", [1.0]).attrs["certificate"] == made

@@ -1,0 +1,127 @@
+"""Each stratum does what its line says, by the closed form; the same seed is the same population, wherever it ends."""
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.base.datasets import content_hash
+from symtop.model.closed_forms import NUMBERS, ClosedForms
+from symtop.run import population as populations
+from symtop.run.population import STRATA, population, sine_cosine
+
+COUNT = 3000
+HASH = "8afda6e1ae62a77eabc29ef01ffbbb0c0777d931e63e1ed78ae8aed761d678b2"  # of 1000 members of seed 1
+
+
+class Motion:
+    """What the closed forms say of one stratum, without units."""
+
+    def __init__(self, kind, seed=1):
+        self.data = population(COUNT, seed=seed, kind=kind)
+        numbers = np.stack([self.data[name].values for name in NUMBERS], axis=1)
+        forms = ClosedForms(numbers)
+        I1, I3, mgl, self.theta, _, _, theta_dot, phi_dot, psi_dot = numbers.T
+        unit = np.sqrt(I1 / np.abs(mgl))
+        self.a = I3 * (psi_dot + phi_dot * np.cos(self.theta)) * unit / I1
+        self.sigma = np.abs(self.a) / 2.0
+        self.kinetic = 0.5 * unit**2 * (theta_dot**2 + (phi_dot * np.sin(self.theta)) ** 2)
+        self.period = forms.nutation_period / unit
+        self.low, self.high = forms.theta_range.T
+        self.gap = np.minimum(self.low, np.pi - self.high)
+
+
+def test_a_slow_top_is_below_the_sleeping_threshold_at_any_energy():
+    slow = Motion("slow")
+    assert slow.sigma.max() < 1.0
+    assert (slow.sigma < 0.05).mean() > 0.2
+    assert slow.kinetic.max() < 8.001
+    assert (slow.kinetic < 0.1).mean() > 0.05
+    assert (slow.kinetic > 4.0).mean() > 0.2
+
+
+def test_a_fast_top_nutates_little_and_at_the_rate_of_its_spin():
+    fast = Motion("fast")
+    assert fast.sigma.min() >= 1.99
+    assert ((fast.high - fast.low) * fast.a**2).max() < 10.0
+    assert np.abs(2.0 * np.pi / (fast.period * np.abs(fast.a)) - 1.0).max() < 0.2
+    slowest = 2.0 * np.pi / Motion("slow").period
+    assert (slowest > 1.5 * np.abs(Motion("slow").a)).mean() > 0.5  # the negative control
+
+
+def test_a_grazing_top_passes_one_of_the_poles_as_near_as_it_says_and_fast():
+    grazing = Motion("grazing")
+    assert grazing.gap.min() > 2.0**-15
+    assert grazing.gap.max() < 2.0**-4
+    assert (grazing.gap < 2.0**-11).mean() > 0.2
+    upper = grazing.low < grazing.gap * 1.0001
+    assert 0.45 < upper.mean() < 0.55
+    assert grazing.period.max() < 8.0
+    assert (Motion("slow").gap > 2.0**-4).mean() > 0.7  # the negative control
+
+
+def test_a_top_near_the_separatrix_hovers_at_the_upper_pole():
+    """Its period grows as the logarithm of the gap: 2 ln(1/gap)/r and some, r the rate at which it leaves the pole."""
+    near = Motion("near-separatrix")
+    assert near.low.min() > 2.0**-17
+    assert near.low.max() < 2.0**-5.9
+    assert near.sigma.max() < 0.9
+    growth = np.sqrt(1.0 - near.sigma**2)
+    assert (near.period * growth > 2.0 * np.log(1.0 / near.low)).all()
+    assert near.period.min() > 1.5 * Motion("grazing").period.max()
+
+
+def test_a_hanging_top_stays_below_the_horizontal():
+    hanging = Motion("hanging")
+    assert (hanging.data.mgl < 0.0).all()
+    assert hanging.high.max() < np.pi / 2.0
+    assert (hanging.high > 1.3).mean() > 0.01
+    assert all((population(200, kind=kind).mgl > 0.0).all() for kind in STRATA if kind != "hanging")
+
+
+def test_a_sleeping_top_stays_where_it_was_let_go():
+    sleeping = Motion("sleeping")
+    assert sleeping.sigma.min() >= 1.0 + 2.0**-5 - 1e-12
+    assert sleeping.theta.max() < 2.0**-4 + 1e-12
+    assert (sleeping.high / sleeping.theta).max() < np.sqrt(3.0) * 1.01
+    assert (Motion("near-separatrix").high / 0.1 > 3.0).all()  # the negative control: too slow, and it falls
+
+
+def test_the_mixture_has_its_shares_and_spreads_over_units_and_bodies():
+    data = population(20_000, seed=2)
+    for name, (share, _) in STRATA.items():
+        assert float((data.stratum == name).mean()) == pytest.approx(share, abs=0.012)
+    ratio = data.I3 / data.I1
+    assert 0.02 < ratio.min() < 0.03
+    assert 1.97 < ratio.max() < 1.98
+    assert data.I1.min() < 2e-3
+    assert data.I1.max() > 5e2
+    assert abs(float((data.theta_dot > 0.0).mean()) - 0.5) < 0.1
+    assert abs(float((data.psi_dot > 0.0).mean()) - 0.5) < 0.05
+
+
+def test_a_population_is_the_beginning_of_a_larger_one(monkeypatch):
+    large = population(3000, seed=7)
+    assert population(1000, seed=7).drop_attrs().identical(large.isel(member=slice(0, 1000)).drop_attrs())
+    assert not np.array_equal(population(1000, seed=8).theta, large.theta[:1000])
+    monkeypatch.setattr(populations, "BLOCK", 128)
+    assert population(3000, seed=7).identical(large)
+
+
+def test_the_same_seed_is_the_same_population_everywhere():
+    """A hash that was written down: nothing hangs on the machine's sine, its vectors or NumPy's distributions."""
+    assert content_hash(population(1000, seed=1)) == HASH
+
+
+def test_sine_and_cosine_by_series_are_those_of_the_library():
+    angle = np.linspace(0.0, np.pi, 2001)
+    for ours, theirs in zip(sine_cosine(angle), (np.sin(angle), np.cos(angle)), strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=2e-15)
+
+
+@pytest.mark.parametrize(
+    ("bad", "reason"),
+    [({"n": 0}, "at least 1"), ({"n": 2.5}, "whole"), ({"seed": -1}, "at least 0"), ({"kind": "fsat"}, "mean fast")],
+)
+def test_bad_input_is_refused(bad, reason):
+    with pytest.raises(symtop.SymtopError, match=reason):
+        symtop.population(**{"n": 3, **bad})

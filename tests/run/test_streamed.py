@@ -1,0 +1,183 @@
+"""An ensemble that goes to a file is the one in memory, and one that was killed ends as the same file, to the byte."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import symtop
+from symtop.run import ensemble as ensembles, pieces, streamed
+
+SOME = symtop.population(60, seed=5)
+ASKED = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
+MILLION = """
+import resource, sys
+import symtop
+n, path = int(sys.argv[1]), sys.argv[2]
+symtop.ensemble(symtop.population(n, seed=2), "strang[axis]", per_nutation=50, nutations=2, samples=3, path=path)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.fixture
+def small_pieces(monkeypatch):
+    monkeypatch.setattr(pieces, "PIECE", 21 * 7)
+
+
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [("strang[attitude]", {}), ("stormer-verlet", {}), ("strang[axis]", {"variables": ["energy", "p_phi"]}),
+     ("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01}),
+     ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0})],
+)  # fmt: skip
+def test_the_file_holds_the_ensemble_in_memory(tmp_path, small_pieces, name, asked):
+    wanted = symtop.ensemble(SOME, name, **ASKED | asked)
+    with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **ASKED | asked) as data:
+        assert data.load().identical(wanted)
+    assert [file.name for file in tmp_path.iterdir()] == ["runs.nc"]
+
+
+def test_times_that_all_share_are_a_row_in_the_file_as_well(tmp_path, small_pieces):
+    scenes, asked = ["spheroid"] * 40, {"step_size": 0.05, "samples": 21, "quiet": True}
+    with symtop.ensemble(scenes, "strang", path=tmp_path / "runs.nc", **asked) as data:
+        assert data["time"].dims == ("time",)
+        assert data.load().identical(symtop.ensemble(scenes, "strang", **asked))
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_path, small_pieces, monkeypatch, threads):
+    calm, path = tmp_path / "calm.nc", tmp_path / "runs.nc"
+    symtop.ensemble(SOME, "strang[axis]", path=calm, **ASKED).close()
+    made, keep = [], streamed.Stream.keep
+
+    def interrupted(stream, piece, columns):
+        if len(made) == 4:
+            raise KeyboardInterrupt
+        made.append(piece.start)
+        keep(stream, piece, columns)
+
+    monkeypatch.setattr(streamed.Stream, "keep", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **ASKED)
+    assert {file.name for file in (tmp_path / "runs.nc.parts").glob("*.npz")} == {
+        f"{first}-{first + 7}.npz" for first in made
+    }
+    assert not path.exists()
+    again = []
+    monkeypatch.setattr(streamed.Stream, "keep", lambda *given: again.append(given[1].start) or keep(*given))
+    symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **ASKED).close()
+    assert (made, again) == ([0, 7, 14, 21], [28, 35, 42, 49, 56])
+    assert path.read_bytes() == calm.read_bytes()
+
+
+def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_path, small_pieces, monkeypatch):
+    path, folder = tmp_path / "runs.nc", tmp_path / "runs.nc.parts"
+    monkeypatch.setattr(streamed.Stream, "finish", lambda *_: xr.Dataset())
+    symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
+    for changed in ({"samples": 20}, {"per_nutation": 21}, {"variables": ["axis"]}):
+        with pytest.raises(symtop.SymtopError, match="beginning of another ensemble"):
+            symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED | changed)
+    with pytest.raises(symtop.SymtopError, match="beginning of another ensemble"):
+        symtop.ensemble(SOME, "cayley[axis]", path=path, **ASKED)
+    monkeypatch.undo()
+    monkeypatch.setattr(pieces, "PIECE", 21 * 7)
+    (folder / "7-14.npz").write_bytes((folder / "7-14.npz").read_bytes()[:-300])
+    with pytest.raises(symtop.SymtopError, match=r"7-14.npz is damaged .*: remove it"):
+        symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
+    (folder / "7-14.npz").unlink()
+    with symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED) as data:
+        assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **ASKED))
+
+
+def test_what_a_process_has_computed_before_does_not_make_it_another_ensemble(tmp_path, monkeypatch):
+    monkeypatch.setattr(streamed.Stream, "finish", lambda *_: xr.Dataset())
+    for name in ("strang[attitude]", "gauss-4[axis]", "rk45-compiled[axis]"):
+        asked = {"nutations": 2, "samples": 11, "quiet": True}
+        asked |= {"tolerance": 1e-6} if name.startswith("rk45") else {"per_nutation": 20}
+        for _ in range(3):
+            symtop.ensemble(SOME, name, path=tmp_path / f"{name}.nc", **asked)
+            symtop.ensemble(SOME, name, **asked)
+            symtop.simulate("spheroid", "rk4[axis]", step_size=0.1, guard=False)
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_any_step(tmp_path):
+    for path in (tmp_path, "/proc/no/such/runs.nc"):
+        with pytest.raises(symtop.SymtopError, match="cannot write"):
+            symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
+
+
+def test_what_does_not_fit_into_memory_needs_a_path(tmp_path, monkeypatch):
+    monkeypatch.setattr(ensembles, "MOST_VALUES", 60 * 21 * 4)
+    symtop.ensemble(SOME, "strang[axis]", variables=["axis"], **ASKED)
+    with pytest.raises(symtop.SymtopError, match="give a path to stream them to a netCDF file"):
+        symtop.ensemble(SOME, "strang[axis]", variables=["axis", "energy"], **ASKED)
+    symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "runs.nc", **ASKED).close()
+
+
+@pytest.mark.slow
+def test_a_million_members_take_little_memory_and_survive_a_kill(tmp_path):
+    """Memory beyond that of the population (132 bytes a member) and of what is asked for does not grow with members."""
+    calm, path, peak = tmp_path / "calm.nc", tmp_path / "runs.nc", {}
+    for n, file in ((100_000, tmp_path / "few.nc"), (1_000_000, calm)):
+        begun = time.monotonic()
+        command = [sys.executable, "-c", MILLION, str(n), str(file)]
+        peak[n] = int(subprocess.run(command, capture_output=True, text=True, check=True).stdout) / 1024
+        print(f"{n} members: {time.monotonic() - begun:.1f} s, {peak[n]:.0f} MB at most")
+    assert peak[1_000_000] - peak[100_000] < 500
+    killed = subprocess.Popen([*command[:-1], str(path)], stdout=subprocess.DEVNULL)
+    while len(list((tmp_path / "runs.nc.parts").glob("*.npz"))) < 15:
+        time.sleep(0.02)
+        assert killed.poll() is None
+    killed.send_signal(signal.SIGKILL)
+    killed.wait()
+    assert not path.exists()
+    subprocess.run([*command[:-1], str(path)], capture_output=True, check=True)
+    assert path.read_bytes() == calm.read_bytes()
+    with xr.open_dataset(path) as data:
+        assert (data.outcome == "ok").mean() > 0.999
+        last = symtop.ensemble(
+            symtop.population(1_000_000, seed=2).isel(member=slice(-5, None)), "strang[axis]", per_nutation=50,
+            nutations=2, samples=3, quiet=True,
+        )  # fmt: skip
+        np.testing.assert_array_equal(data.axis[-5:], last.axis)
+
+
+INTERRUPTED = """
+import atexit, os, signal, threading, time
+import symtop
+members, asked_at = symtop.population(4000, seed=1), []
+def run(nutations):
+    symtop.ensemble(members, NAME, quiet=True, threads=THREADS, nutations=nutations, SETTING)
+def interrupt():
+    asked_at.append(time.monotonic())
+    os.kill(os.getpid(), signal.SIGINT)
+def say():
+    print(time.monotonic() - asked_at[0])
+run(1)
+threading.Timer(0.7, interrupt).start()
+atexit.register(say)  # called once all threads have ended
+try:
+    run(LONG)
+except KeyboardInterrupt:
+    say()
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "setting", "long", "threads"),
+    [("strang[axis]", "per_nutation=200", 20_000, 1), ("strang[axis]", "per_nutation=200", 20_000, 2),
+     ("gauss-12[attitude]", "per_nutation=50", 2000, 2), ("rk45-compiled[axis]", "tolerance=1e-9", 10_000, 2)],
+)  # fmt: skip
+def test_an_interrupt_is_heard_within_a_second(name, setting, long, threads):
+    code = INTERRUPTED.replace("NAME", repr(name)).replace("THREADS", str(threads))
+    code = code.replace("SETTING", setting).replace("LONG", str(long))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    heard, ended = map(float, done.stdout.split())
+    print(f"{name}: heard after {heard:.2f} s, ended after {ended:.2f} s")
+    assert heard < 1.0
+    assert ended < 4.0

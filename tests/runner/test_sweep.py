@@ -1,0 +1,152 @@
+"""sweep(): one dataset of errors, work and outcomes; kept in a file, resumed from it, and drawn."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import symtop
+from symtop.base import datasets
+from symtop.measure.accuracy import error_row
+from symtop.runner import sweep as module
+
+STEPS = [0.02, 0.01, 0.005]
+METHODS = ["strang", "rk4[axis]", "rk45-compiled", "exact"]
+ASKED = {"step_size": STEPS, "tolerance": [1e-4, 1e-6], "horizon": 2.0, "quiet": True}
+
+
+@pytest.fixture(scope="module")
+def data():
+    return symtop.sweep(["spheroid", "goldstein"], METHODS, **ASKED)
+
+
+def test_each_entry_is_that_of_one_run(data):
+    assert dict(data.sizes) == {"scene": 2, "integrator": 4, "setting": 3}
+    for scene in ("spheroid", "goldstein"):
+        row = error_row(symtop.scene(scene), symtop.integrator("strang"), 0.01, 2.0)
+        cell = data.sel(scene=scene, integrator="strang").isel(setting=1)
+        for name in ("axis", "attitude_end", "energy_bound", "force_evaluations", "step_size", "outcome"):
+            assert cell[name].values == row[name]
+
+
+def test_settings_belong_to_those_who_have_them(data):
+    adaptive, formula = (data.sel(integrator=name, scene="spheroid") for name in ("rk45-compiled", "exact"))
+    assert adaptive["outcome"].values.tolist() == ["ok", "ok", "not_run"]
+    assert adaptive["tolerance"].values[:2].tolist() == [1e-4, 1e-6]
+    assert np.isnan(adaptive["step_size"].values[:2]).all()
+    assert formula["outcome"].values.tolist() == ["ok", "not_run", "not_run"]
+    slope = np.diff(np.log(data.sel(integrator="rk4[axis]", scene="spheroid")["axis"].values)) / math.log(0.5)
+    assert slope == pytest.approx([4.0, 4.0], abs=0.3)
+    assert data["axis"].attrs["long_name"] == "angle between axes (rad), largest over the run"
+
+
+def test_one_thread_and_many_and_a_file_give_the_same(data, tmp_path):
+    file = tmp_path / "sweep.nc"
+    for options in ({"threads": 1}, {"path": file}):
+        again = symtop.sweep(["spheroid", "goldstein"], METHODS, **ASKED, **options)
+        xr.testing.assert_identical(again.drop_attrs(), data.drop_attrs())
+    xr.testing.assert_identical(datasets.read(file).drop_attrs(), data.drop_attrs())
+
+
+def test_a_sweep_that_was_stopped_goes_on_from_its_file(tmp_path, monkeypatch):
+    """Killed after three cells of eight, it computes the other five; a changed setting computes its own cells only."""
+    file, table, ran = tmp_path / "sweep.nc", module._table, []
+
+    def counted(cell):
+        ran.append((cell.scene.name, cell.method.name))
+        return table(cell)
+
+    def stopping(cell):
+        if len(ran) == 3:
+            raise KeyboardInterrupt
+        return counted(cell)
+
+    call = {**ASKED, "path": file, "threads": 1}
+    monkeypatch.setattr(module, "_table", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        symtop.sweep(["spheroid", "goldstein"], METHODS, **call)
+    ran.clear()
+    monkeypatch.setattr(module, "_table", counted)
+    whole = symtop.sweep(["spheroid", "goldstein"], METHODS, **call)
+    assert len(ran) == 5
+    assert (whole["made_of"] != "").all()
+    ran.clear()
+    symtop.sweep(["spheroid", "goldstein"], METHODS, **call)
+    assert ran == []
+    symtop.sweep(["spheroid", "goldstein"], METHODS, **{**call, "tolerance": [1e-5]})
+    assert ran == [("spheroid", "rk45-compiled"), ("goldstein", "rk45-compiled")]
+
+
+def test_failures_are_rows():
+    """A run that leaves its chart, and a method that raises, beside one that is well."""
+
+    def broken(top, start, plan):
+        raise ZeroDivisionError("of its own")
+
+    bad = symtop.Integrator(name="broken", family="other", summary="raises", solvers={"axis": broken})
+    data = symtop.sweep("spheroid", [bad, "stormer-verlet", "strang"], step_size=[1.0, 0.01], horizon=8.0, quiet=True)
+    outcomes = data["outcome"].values[0]
+    assert outcomes[0].tolist() == ["raised", "raised"]
+    assert "ZeroDivisionError: of its own" in str(data["message"].values[0, 0, 0])
+    assert data["step_size"].values[0, 0].tolist() == [1.0, 0.01]
+    assert outcomes[1].tolist() == ["left_chart", "ok"]
+    assert outcomes[2].tolist() == ["ok", "ok"]
+    assert np.isnan(data["axis"].values[0, 0]).all()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ({}, "strang has a fixed step: give step_size or per_nutation"),
+        ({"step_size": 0.1, "per_nutation": 9}, "give step_size or per_nutation"),
+        ({"step_size": [0.1, -1]}, "step_size must be above zero, not -1.0"),
+        ({"step_size": 99.0}, "step_size must be at most the horizon"),
+        ({"step_size": 0.1, "integrators": "rk45"}, "rk45 is adaptive: give tolerance"),
+        ({"step_size": 0.1, "integrators": []}, "integrators must be one or more, each once"),
+        ({"step_size": 0.1, "scenes": ["spheroid", "spheroid"]}, "scenes must be one or more, each once"),
+        ({"step_size": 0.1, "scenes": "sferoid"}, "did you mean spheroid"),
+        ({"step_size": 0.1, "threads": 0}, "threads must be a whole number"),
+    ],
+)
+def test_bad_input_is_one_sentence(words, says):
+    with pytest.raises(symtop.SymtopError, match=says):
+        symtop.sweep(**{"scenes": "spheroid", "integrators": "strang", **words})
+
+
+def test_a_file_of_something_else_is_refused(tmp_path):
+    file = tmp_path / "run.nc"
+    symtop.simulate("spheroid", "strang", step_size=0.01).to_netcdf(file)
+    before = file.read_bytes()
+    with pytest.raises(symtop.SymtopError, match="path must be a new file or that of a sweep"):
+        symtop.sweep("spheroid", "strang", step_size=0.01, path=file)
+    assert file.read_bytes() == before
+
+
+def test_steps_a_nutation_are_those_of_each_scene():
+    data = symtop.sweep(["spheroid", "goldstein"], "strang", per_nutation=[50], horizon=2.0, quiet=True)
+    for name in ("spheroid", "goldstein"):
+        steps = 2.0 / round(2.0 * 50 / symtop.scene(name).nutation_period)
+        assert data.sel(scene=name)["step_size"].item() == pytest.approx(steps)
+
+
+def test_everything_can_be_drawn_on_given_axes(data):
+    import matplotlib.pyplot as plt
+
+    _, ax = plt.subplots()
+    assert symtop.plot(data, ax) is ax
+    assert ax.get_xlabel() == "force evaluations"  # steps and tolerances share no axis
+    assert symtop.plot(data.sel(integrator=["strang"]), quantity="energy").get_xlabel() == "step size"
+    run = symtop.simulate("spheroid", "strang", step_size=0.01)
+    drawn = symtop.plot(run).get_lines()[0].get_ydata()
+    assert drawn == pytest.approx(symtop.errors(run)["axis"].values[1:])
+    assert symtop.plot(run, quantity="phi").get_ylabel() == "phi (rad)"
+    tops = symtop.population(20, seed=1)
+    runs = symtop.ensemble(tops, "strang", per_nutation=50, nutations=2)
+    assert len(symtop.plot(runs, members=tops, quantity="energy").collections) == 2
+    for words, says in (
+        ({"data": runs}, "plot needs members"), ({"data": 3}, "data must be a dataset"),
+        ({"data": run, "quantity": "axs"}, "did you mean axis"), ({"data": data, "x": "speed"}, "x 'speed' is unknown"),
+    ):  # fmt: skip
+        with pytest.raises(symtop.SymtopError, match=says):
+            symtop.plot(**words)

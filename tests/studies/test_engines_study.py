@@ -1,0 +1,160 @@
+"""The study of engines: errors against closed forms, orders and floors read off, sentences, and labels."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from symtop_studies.engines import documentation, figures, listed, study, tables, words
+
+import symtop
+from symtop.methods.registry import engines, integrator
+
+GOLDSTEIN = symtop.scene("goldstein")
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """Two maps and a method of the catalogue on both tops and on twenty tops of the population."""
+    names = ("mujoco-euler[axis]", "rapier-float32[attitude]", "no-gyro[axis]", "strang[axis]")
+    settings = {"steps": 1e4, "long": 20.0}
+    by_row = [
+        xr.concat(
+            [study.measure(study.Case(scene, name, settings, group="tops")) for scene in tables.SCENES], "scene",
+            join="outer",
+        )
+        for name in names
+    ]  # fmt: skip
+    many = [study.measure(study.Case("population", name, {"members": 20, "seed": 1}, group="pop")) for name in names]
+    tops = xr.concat(by_row, "integrator", join="outer").assign_coords(
+        scene=list(tables.SCENES), integrator=list(names)
+    )
+    drawn = (
+        xr.concat(many, "integrator").expand_dims("scene").assign_coords(scene=["population"], integrator=list(names))
+    )
+    return xr.DataTree.from_dict({"tops": tops, "population": drawn})
+
+
+def test_every_map_of_an_engine_has_a_row_that_shows_the_axis():
+    names = study.row_names()
+    assert {integrator(name).method for name in names} == {*engines(), *(row.split("[")[0] for row in study.COMPARED)}
+    assert not any(name.endswith("[angles]") for name in names)
+
+
+@pytest.mark.parametrize(("name", "value"), [("mujoco-euler[axis]", 0.61079), ("rkmk4[axis]", 8.1624e-6)])
+def test_the_error_of_a_run_is_the_reference_value(name, value):
+    made = tables.judged(GOLDSTEIN, integrator(name), 0.025, 10.0)
+    assert made["axis"] == pytest.approx(value, rel=1e-4)
+
+
+def test_energy_and_spin_are_those_of_simulate():
+    made = tables.judged(GOLDSTEIN, integrator("yade[axis]"), 0.025, 10.0)
+    run = symtop.simulate(GOLDSTEIN, "yade[axis]", step_size=0.025, horizon=10.0, guard=False, observe="axis")
+    scale = abs(float(run["energy"][0])) + GOLDSTEIN.top.mgl
+    assert made["energy"] == pytest.approx(float(run["energy"][-1] - run["energy"][0]) / scale, rel=1e-9)
+    largest = max(abs(float(run[name][0])) for name in ("p_phi", "p_psi"))
+    assert made["spin"] == pytest.approx(float(run["p_psi"][-1] - run["p_psi"][0]) / largest, rel=1e-9)
+
+
+def test_a_run_that_ended_is_as_far_off_as_can_be():
+    made = tables.judged(symtop.scene("fast"), integrator("mujoco-euler[axis]"), 1.0 / 60.0, 100.0)
+    assert made["axis"] == math.pi
+    assert words.change(made["energy"]) == "a number that is not finite"
+
+
+def test_orders_walls_and_floors_are_read_off(measured):
+    assert words.facts(measured, "mujoco-euler[axis]").order == pytest.approx(1.0, abs=0.15)
+    assert words.facts(measured, "strang[axis]").order == pytest.approx(2.0, abs=0.05)
+    wall = words.facts(measured, "no-gyro[axis]")
+    assert abs(wall.order) < 0.05
+    assert wall.best > 1.5
+    assert words.facts(measured, "rapier-float32[attitude]").best > 1e-3
+
+
+def test_each_engine_has_a_sentence_and_what_is_beside_them_has_none(measured):
+    said = words.verdict(measured)
+    assert len(said) == 2 + 1 + 3 + 1  # the field twice, the spherical top, the engines, what it does not say
+    assert "at every step" in words.sentence(measured, "no-gyro[axis]")
+    assert "at every step" not in words.sentence(measured, "mujoco-euler[axis]")
+    assert not any(one.startswith("strang") for one in said)
+    assert said[-1].startswith("What this does not say")
+
+
+@pytest.mark.parametrize("rate", [2.5, -0.7])
+def test_the_azimuth_is_counted_over_whole_turns_and_in_both_directions(rate):
+    time = np.linspace(0.0, 40.0, 400)
+    tilt = 0.6 + 0.1 * np.sin(3.0 * time)
+    e = np.stack([np.sin(tilt) * np.cos(rate * time), np.sin(tilt) * np.sin(rate * time), np.cos(tilt)], axis=1)
+    assert tables.azimuth(e) == pytest.approx(40.0 * rate, rel=1e-12)
+    assert math.isnan(tables.azimuth(np.vstack([e, np.full(3, np.nan)])))
+
+
+def test_a_fast_top_without_the_gyroscopic_term_precesses_at_the_rate_of_a_spherical_one():
+    """mgl/(I3 w3) becomes mgl/(I1 w3): half of it, as I1 = 2 I3; with the term it is the rate of the top."""
+    fast = symtop.scene("fast")
+    ratio = fast.top.I3 / fast.top.I1 - 1.0
+    off = {
+        name: tables.judged(fast, integrator(f"{name}[axis]"), 1e-3, 10.0)["precession"]
+        for name in ("no-gyro", "strang")
+    }
+    assert off["no-gyro"] == pytest.approx(ratio, abs=2e-3)
+    assert abs(off["strang"]) < 1e-4
+
+
+def test_at_the_same_cost_a_method_of_four_evaluations_takes_a_quarter_of_the_steps():
+    made = tables.frames(GOLDSTEIN, integrator("rkmk4[axis]"), (10.0, 11.0))
+    alone = tables.frames(GOLDSTEIN, integrator("mujoco-implicit[axis]"), (10.0, 11.0))
+    assert float(made["forces_a_step"]) == 4.0
+    assert float(made["level_axis"].sel(rate=240.0, horizon=10.0)) == float(
+        made["frame_axis"].sel(rate=60.0, horizon=10.0)
+    )
+    assert float(alone["forces_a_step"]) == 1.0
+    assert alone["level_axis"].values.tolist() == alone["frame_axis"].values.tolist()
+
+
+def test_without_the_term_the_spherical_top_is_followed_by_order_h_and_with_it_not_at_all(measured):
+    (said,) = words.spherical(measured)
+    assert said.startswith("no-gyro[axis]")
+    assert "a difference of order 1.00" in said
+    off = [
+        [words.frame(measured, row, "spherical", rate) for rate in tables.FREQUENCIES] for row in words.rows(measured)
+    ]
+    near = {row for row, values in zip(words.rows(measured), off, strict=True) if max(values) < 0.01}
+    assert near == {"no-gyro[axis]"}
+
+
+def test_every_table_has_a_cell_below_each_heading_and_every_engine_a_source(measured):
+    for table in listed.tables(measured):
+        assert {len(row) for row in table.rows} == {len(table.header)}
+    assert all(one.says.endswith(".") and one.source for one in documentation.STATEMENTS)
+    assert len({one.engine for one in documentation.STATEMENTS}) == len(documentation.STATEMENTS)
+
+
+def test_the_figures_name_every_row(measured):
+    error, cost, shares = figures.pictures(measured)
+    assert {text.get_text() for text in error.figure.axes[0].texts} >= set(words.rows(measured))
+    for picture in (cost, shares):
+        assert {label.get_text() for label in picture.figure.axes[0].get_yticklabels()} == set(words.rows(measured))
+
+
+def test_shares_count_tops_within_five_degrees(measured):
+    off = measured["population"]["off"].sel(scene="population", integrator="strang[axis]").values
+    assert words.share(measured, "strang[axis]") == np.mean(np.degrees(off) <= 5.0)
+    assert words.share(measured, "strang[axis]") > words.share(measured, "no-gyro[axis]")
+
+
+@pytest.mark.parametrize("places", [[0.5] * 10, [0.0, 0.01, 0.99, 1.0, 1.0], [0.2, 0.9, 0.4]])
+def test_labels_keep_their_order_and_their_distance(places):
+    placed = figures.spread(places, 0.05)
+    assert np.all(np.diff(np.sort(placed)) >= 0.05 - 1e-12)
+    assert max(placed) <= 1.0 + 1e-12
+    for one, other in ((0, 1), (1, 2)):
+        assert (places[one] < places[other]) <= (placed[one] < placed[other])
+    assert figures.spread([0.1, 0.5], 0.05) == [0.1, 0.5]
+
+
+def test_numbers_in_words():
+    assert words.angle(math.pi) == "180 degrees"
+    assert words.angle(1e-6) == "1.0e-06 rad"
+    assert words.change(-0.022) == "-2.2%"
+    assert words.change(1e-12) == "+1e-12"
