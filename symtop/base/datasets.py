@@ -24,6 +24,7 @@ import xarray as xr
 
 from symtop import __version__
 from symtop.base.fingerprint import version
+from symtop.base.signals import deferred
 from symtop.base.strangers import words_of
 from symtop.base.validate import SymtopError
 
@@ -166,7 +167,7 @@ def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
 
 def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
     """Write a netCDF file so that it is whole or not there, whatever happens meanwhile; a tree as netCDF groups."""
-    with replacing(path) as partial:
+    with deferred(), replacing(path) as partial:
         try:
             parts = {f"/{name}": _encoding(group) for name, group in groups(data).items()}
             with _one_thread:
@@ -210,7 +211,7 @@ def content_hash(data: xr.Dataset) -> str:
 def _netcdf(path: str | os.PathLike[str]) -> Iterator[None]:
     """Hold the netCDF library, and say in a sentence what it could not read."""
     try:
-        with _one_thread:
+        with deferred(), _one_thread:
             yield
     except Exception as error:  # (a damaged file: HDF5's errors, and those of names and times that make no sense)
         raise SymtopError(f"cannot read {path} as netCDF: {words_of(error)}") from error

@@ -1,6 +1,10 @@
 """Requests of the user, heard as exceptions of their own: to end (SIGTERM), and to interrupt (SIGINT).
 
 Partial files, workers and checkpoints are seen to. An exception of its own tells a request from what a plug-in raises.
+
+An exception may start between any two instructions, also between taking a lock and entering the block that gives it
+back. Where a library does so (xarray's lock of HDF5: one in twenty writes that were interrupted left it taken, and the
+next write waited for ever), a request is `deferred` until the library is done.
 """
 
 import contextlib
@@ -53,6 +57,28 @@ def ending_on_sigterm() -> contextlib.AbstractContextManager[None]:
 def told_apart() -> contextlib.AbstractContextManager[None]:
     """Raise InterruptedByUser on SIGINT, in the main thread: no KeyboardInterrupt of a plug-in passes for it."""
     return _handling(signal.SIGINT, signal.default_int_handler, _interrupt)
+
+
+@contextlib.contextmanager
+def deferred() -> Iterator[None]:
+    """Hear SIGINT and SIGTERM at the end of the block, in the main thread; where they end the process, they still do.
+
+    For calls of milliseconds: until one is over, Ctrl-C has no effect.
+    """
+    heard: list[int] = []
+    usual = {}
+    if threading.current_thread() is threading.main_thread():
+        usual = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        usual = {number: handler for number, handler in usual.items() if callable(handler)}
+    try:
+        for number in usual:
+            signal.signal(number, lambda number, _frame: heard.append(number))
+        yield
+    finally:
+        for number, handler in usual.items():
+            signal.signal(number, handler)
+        if heard:
+            signal.raise_signal(heard[0])
 
 
 def is_of_user(error: BaseException) -> bool:
