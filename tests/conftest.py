@@ -19,30 +19,23 @@ from symtop.methods import registry
 from symtop.model import scenes
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.runner import plugins, scripts
+from symtop.runner import plugins, scripts, store
 
 scripts.install()  # tests import `symtop_studies`
 
 
-STORED = Path(__file__).resolve().parent.parent / "results" / "quick" / "cases"
-PLUGIN = """\
-import symtop
-
-symtop.register(symtop.discrete_lagrangian("simpson-of-a-user", (0, 0.5, 1), (1 / 6, 2 / 3, 1 / 6), order=2))
-top, start = symtop.SymmetricTop(1.5, 1.0, 3.0), symtop.Angles(theta=1.0, psi_dot=4.0)
-symtop.register_scene(symtop.Scene("mine", top, start, horizon=6.0))
-"""
+STORED = Path(__file__).resolve().parent.parent / "results" / "quick"
 
 
 @contextlib.contextmanager
 def _registered_for_a_while():
     registry.integrators()  # the built-in ones are registered first
     stores = (registry._registry, scenes._added, plugins._loaded, plugins._owners)
-    before = [store.copy() for store in stores]
+    before = [kept.copy() for kept in stores]
     yield
-    for store, entries in zip(stores, before, strict=True):
-        store.clear()
-        store.update(entries)
+    for kept, entries in zip(stores, before, strict=True):
+        kept.clear()
+        kept.update(entries)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -62,17 +55,18 @@ def _figures_closed():
 
 @pytest.fixture(scope="session")
 def quick_results(tmp_path_factory) -> Path:
-    """Results of every study, quickly, with `plugin.py` beside them: four lines that add a method and a scene."""
-    folder = tmp_path_factory.mktemp("results")
-    if STORED.is_dir():  # after `make quick`: what is up to date need not be computed twice
-        shutil.copytree(STORED, folder / "quick" / "cases")
-    plugin = folder / "plugin.py"
-    plugin.write_text(PLUGIN)
-    with _registered_for_a_while():
-        done = CliRunner().invoke(
-            main, ["study", "--all", "--quick", "--results", str(folder), "--plugin", str(plugin)]
-        )
-    assert done.exit_code == 0, done.output
+    """Results of every study, quickly, to read: made once for all processes of a run of the tests."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "results-of-all"
+    done = folder / "done"
+    with store.locked(folder / "making", wait=True):
+        if not done.is_file():
+            if STORED.is_dir():  # after `make quick`: what is up to date need not be computed twice
+                shutil.copytree(STORED, folder / "quick", dirs_exist_ok=True)
+            with _registered_for_a_while():
+                made = CliRunner().invoke(main, ["study", "--all", "--quick", "--results", str(folder)])
+            assert made.exit_code == 0, made.output
+            done.touch()
     return folder / "quick"
 
 

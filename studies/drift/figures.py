@@ -139,7 +139,8 @@ def _exponents(histories: xr.Dataset) -> Picture:
 def _windows(data: xr.Dataset) -> Picture:
     figure, axes = panels(len(BANDS), data.sizes["integrator"], height=1.9, sharex=True, sharey="row")
     for row, quantity in zip(axes, BANDS, strict=True):
-        scale = 10.0 ** np.floor(np.log10(float(np.abs(data[f"{quantity}_largest"]).max())))
+        size = float(np.abs(data[f"{quantity}_largest"]).max()) or 1.0  # what every method keeps exactly has none
+        scale = 10.0 ** np.floor(np.log10(size))
         for axis, (name, cell) in zip(row, by_integrator(data).items(), strict=True):
             style, run = look(name), cell.dropna("window", subset=["steps"])
             steps = run["steps"].values

@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from symtop.base import datasets, fingerprint
 from symtop.base.validate import SymtopError, label, positive
-from symtop.runner import depends, plugins, store
+from symtop.runner import depends, plugins, seen, store
 from symtop.runner.execute import execute
 from symtop.runner.pools import Workers
 from symtop.runner.scripts import file_of, folder, load, names
@@ -62,8 +62,17 @@ class Round:
 
     def add(self, cases: Iterable[Case], *, fresh: bool) -> dict[Path, Case]:
         """Take cases in; returns those that have to be computed."""
-        new = {store.case_path(self.results, self.study, case): case for case in cases}
+        return self.missing(self.named(cases), fresh=fresh)
+
+    def named(self, cases: Iterable[Case]) -> dict[Path, Case]:
+        """Cases by their files, which this round now has."""
+        asked = list(cases)
+        new = dict(zip(store.case_paths(self.results, self.study, asked), asked, strict=True))
         self.paths |= new
+        return new
+
+    def missing(self, new: dict[Path, Case], *, fresh: bool) -> dict[Path, Case]:
+        """Those of the cases that have to be computed."""
         if not fresh:
             self._look(new)
         return {path: case for path, case in new.items() if path not in self.done}
@@ -132,11 +141,15 @@ def run(study: Study, results: Path, *, quick: bool = False, full: bool = False,
     seconds = study.limit if limit is None else positive("limit", limit)
     store.prepare(results, study)
     cases = Round(study, results)
-    missing = cases.add(study.grid(quick=quick, full=full), fresh=fresh)
-    stamp = _stamp(study, sorted(path.name for path in cases.paths), save)
+    first = cases.named(study.grid(quick=quick, full=full))
+    stamp = _stamp(study, sorted(path.name for path in first), save)
     before = _drawn(study, results, stamp)
+    if before is not None and not fresh and seen.untouched(results, study, stamp, first):
+        return {**before, "computed": 0, "seconds": time.monotonic() - began}
+    missing = cases.missing(first, fresh=fresh)
     later = None if missing else cases.follow_up(fresh=fresh)  # not known before the first round is done
-    if before is not None and later == {}:
+    if before is not None and later == {} and seen.dataset_untouched(results, study, stamp):
+        seen.note(results, study, stamp, cases.paths)
         return {**before, "computed": 0, "seconds": time.monotonic() - began}
     with Workers(jobs) if workers is None else contextlib.nullcontext(workers) as hired:
         try:
@@ -168,6 +181,8 @@ def _conclude(cases: Round, stamp: str, save: Save | None, *, quick: bool) -> di
     findings = findings_of(study, combined, results, save, failures=cases.failures, cases=len(cases.paths))
     findings |= {"quick": quick, "stamp": stamp if not cases.failures else ""}
     store.write_json(results / f"{study.name}.json", findings)
+    if not cases.failures:
+        seen.note(results, study, stamp, cases.paths)
     return findings
 
 

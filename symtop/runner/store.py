@@ -20,7 +20,7 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,8 +45,17 @@ SEED = 0  # of the order in which batches are timed; nothing else here is random
 
 def case_path(results: Path, study: Study, case: Case) -> Path:
     """The file of a case; its name holds the digest of everything the numbers depend on."""
-    key = depends.settings_key(study, case)[:8]
-    return results / "cases" / study.name / f"{case.label}--{key}--{depends.digest(study, case)}.nc"
+    return case_paths(results, study, [case])[0]
+
+
+def case_paths(results: Path, study: Study, cases: Sequence[Case]) -> list[Path]:
+    """The files of many cases."""
+    folder = results / "cases" / study.name
+    keys = [depends.settings_key(study, case)[:8] for case in cases]
+    made_of = depends.digests(study, cases)
+    return [
+        folder / f"{case.label}--{key}--{digest}.nc" for case, key, digest in zip(cases, keys, made_of, strict=True)
+    ]
 
 
 def digest_of(path: Path) -> str:

@@ -1,0 +1,32 @@
+"""A plug-in of four lines, which adds a method and a scene, takes part in the studies beside a method of symtop's."""
+
+from click.testing import CliRunner
+
+from symtop.base import datasets
+from symtop.cli.main import main
+from symtop.methods.registry import split_name
+
+PLUGIN = """\
+import symtop
+
+symtop.register(symtop.discrete_lagrangian("simpson-of-a-user", (0, 0.5, 1), (1 / 6, 2 / 3, 1 / 6), order=2))
+top, start = symtop.SymmetricTop(1.5, 1.0, 3.0), symtop.Angles(theta=1.0, psi_dot=4.0)
+symtop.register_scene(symtop.Scene("mine", top, start, horizon=6.0))
+"""
+
+
+STUDIES = ("convergence", "work_precision", "drift", "stability")
+
+
+def test_a_plugins_method_and_scene_are_in_every_study(tmp_path):
+    plugin = tmp_path / "plugin.py"
+    plugin.write_text(PLUGIN)
+    words = ["--quick", "--only", "simpson-of-a-user,strang", "--results", str(tmp_path), "--plugin", str(plugin)]
+    done = CliRunner().invoke(main, ["study", *STUDIES, *words])
+    assert done.exit_code == 0, done.output
+    for study in STUDIES:
+        data = datasets.groups(datasets.read_any(tmp_path / "quick" / "only" / f"{study}.nc")).values()
+        groups = [group for group in data if group.variables]
+        methods = {split_name(str(row))[0] for group in groups for row in group["integrator"].values}
+        assert {"simpson-of-a-user", "strang"} <= methods, study
+        assert any("mine" in group["scene"].values for group in groups), study
