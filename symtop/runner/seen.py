@@ -1,7 +1,7 @@
 """Which files of a study were read whole and found good, and have not been touched since.
 
 Reading the 1,400 files of the quick grids takes 12 s, asking for their sizes and times of change 10 ms. As git's index
-does, `cases/STUDY/.seen.json` keeps both from when the study was concluded, with the stamp of what it was drawn from.
+does, `cases/STUDY/seen.json` keeps both from when the study was concluded, with the stamp of what it was drawn from.
 Whoever damages a file changes its time; a disk that loses bits by itself is found by ``symtop study --check``.
 """
 
@@ -13,7 +13,7 @@ from symtop.runner.study import Study
 
 
 def _record(results: Path, study: Study) -> Path:
-    return results / "cases" / study.name / ".seen.json"
+    return results / "cases" / study.name / "seen.json"
 
 
 def _marks(paths: Iterable[Path]) -> dict[str, list[int]]:

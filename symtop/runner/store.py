@@ -3,6 +3,7 @@
 results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.nc             what one case measured
 results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.failed.json    or how it failed, with its traceback
 results/cases/STUDY/.SCENE--INTEGRATOR--SETTINGS--DIGEST.lock          while it is being computed
+results/cases/STUDY/seen.json                                sizes and times of the files that were read (`seen`)
 results/STUDY.nc                                             all of them, with labelled dimensions
 results/STUDY.json                                           verdict, tables and captions for the report
 results/figures/STUDY-NAME.png

@@ -78,7 +78,7 @@ def test_a_dataset_that_is_gone_or_damaged_is_made_again(bring):
 @pytest.mark.parametrize("nonsense", ["", "[]", '{"stamp": 1}', '{"stamp": "", "files": []}'])
 def test_a_damaged_record_of_what_was_seen_is_not_believed(bring, nonsense):
     computed, _ = bring()
-    (record,) = (bring.folder / "cases").glob("*/.seen.json")
+    (record,) = (bring.folder / "cases").glob("*/seen.json")
     record.write_text(nonsense)
     again, read = bring()
     assert (again, read >= computed) == (0, True)

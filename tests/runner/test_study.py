@@ -317,7 +317,7 @@ def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_pa
     assert probe(tmp_path).exit_code == 0
 
     def bytes_of():  # but for the record of the files' times
-        return {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file() and path.name != ".seen.json"}
+        return {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file() and path.name != "seen.json"}
 
     before = bytes_of()
     done = probe(tmp_path, "--fresh", "--json")

@@ -1,0 +1,40 @@
+"""``symtop doctor --warm``: every compiled method in each chart, and nothing left to compile the second time."""
+
+import pytest
+from click.testing import CliRunner
+
+import symtop
+from symtop.cli import warm
+from symtop.cli.main import main
+
+
+def test_every_compiled_method_is_run_in_each_of_its_charts():
+    todo = warm.tasks()
+    for kind in ("alone", "together"):
+        names = [name for what, name in todo if what == kind]
+        assert len(names) == len(set(names))
+        for method in symtop.integrators().values():
+            rows = {f"{method.name}[{chart}]" for chart in method.charts()}
+            assert rows <= set(names) if method.implementation != "python" else not rows & set(names)
+
+
+def test_kernels_are_on_disk_afterwards_and_a_run_that_fails_is_named(monkeypatch, tmp_path):
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    todo = [("alone", "strang[axis]"), ("together", "strang[axis]"), ("alone", "no-such-method[axis]")]
+    monkeypatch.setattr(warm, "tasks", lambda: todo)
+    count, failed = warm.warm(jobs=1)
+    assert count >= 3
+    assert count == warm.kernels()
+    assert [why.partition(":")[0] for why in failed] == ["no-such-method[axis]"]
+    assert warm.warm(jobs=1)[0] == 0
+
+
+@pytest.mark.slow
+def test_all_of_them_are_compiled_once(monkeypatch, tmp_path):
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    done = CliRunner().invoke(main, ["doctor", "--warm", "--results", str(tmp_path / "r")])
+    assert done.exit_code == 0, done.output
+    assert warm.kernels() > 100
+    assert "not run" not in done.output
+    again = CliRunner().invoke(main, ["doctor", "--warm", "--results", str(tmp_path / "r")])
+    assert "kernels compiled: 0;" in again.output
