@@ -48,7 +48,25 @@ VARIABLES: dict[str, tuple[str, ...]] = {
     "p_theta": ("momentum conjugate to theta", "kg m2 s-1", "1"),
     "p_phi": ("momentum conjugate to phi, recomputed from the trajectory", "kg m2 s-1", "1"),
     "p_psi": ("momentum conjugate to psi, recomputed from the trajectory", "kg m2 s-1", "1"),
+    **{
+        f"{name}_error_bound": (f"bound on the error of {name}", "rad")
+        for name in ("theta", "phi", "psi", "axis", "attitude")
+    },
+    "step_size": ("time step", "s", "1"),
+    "tolerance": ("tolerance of an adaptive method, relative", "1"),
+    "horizon": ("time that a run was asked for", "s", "1"),
+    "reached_time": ("time of the last completed step", "s", "1"),
+    "steps": ("number of steps", "1"),
+    "force_evaluations": ("number of evaluations of the force", "1"),
+    "newton_iterations": ("number of iterations of Newton or of a sweep", "1"),
+    "outcome": ("how a run ended",),
+    "dithered": ("are the samples dithered, because uniform ones would miss phases of the nutation?",),
+    "stratum": ("kind of motion that a top was drawn for",),
+    "component": ("component of a vector in the space frame",),
+    "part": ("part of a quaternion",),
 }
+
+CONVENTIONS = {"Conventions": "CF-1.11", "source": "symtop", "history": f"made by symtop {__version__}"}
 
 Tree = TypeVar("Tree", bound=xr.Dataset | xr.DataTree)
 
@@ -101,7 +119,7 @@ def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
 def _words(name: str, units: str) -> dict[str, str]:
     """The attributes of a variable."""
     long_name, *choice = VARIABLES[name]
-    return {"long_name": long_name, "units": choice[0 if units == "SI" else -1]}
+    return {"long_name": long_name} | ({"units": choice[0 if units == "SI" else -1]} if choice else {})
 
 
 def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree:
@@ -114,7 +132,7 @@ def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree
             if name in VARIABLES:
                 variable.attrs.update(_words(str(name), units))
     plain = {key: _plain(value) for key, value in attributes.items()}
-    data.attrs.update({"Conventions": "CF-1.11", "title": title, "source": "symtop", **plain, **provenance()})
+    data.attrs.update({**CONVENTIONS, "title": title, **plain, **provenance()})
     return data
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from symtop.base import datasets
 from symtop.base.numbers import EPSILON
 from symtop.base.over_time import over_time
 from symtop.base.validate import SymtopWarning, one_of
@@ -71,8 +72,12 @@ def errors(
     bounds = {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns}
     shown = _beside(data, columns | bounds)
     for name in columns:
-        shown.variables[name].attrs["long_name"] = QUANTITIES[name]
-    shown.attrs.update(title=f"errors on {chosen.name}", scene=chosen.name, precision=truth.attrs["precision"])
+        units = "1" if name in CONSTANTS else "rad"
+        shown.variables[name].attrs.update(long_name=QUANTITIES[name], units=units)
+        shown.variables[f"{name}_bound"].attrs.update(long_name=f"the least {QUANTITIES[name]} to be seen", units=units)
+    shown.attrs.update(
+        datasets.CONVENTIONS, title=f"errors on {chosen.name}", scene=chosen.name, precision=truth.attrs["precision"]
+    )
     return shown
 
 

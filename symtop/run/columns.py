@@ -5,7 +5,6 @@ from typing import Any
 import xarray as xr
 
 from symtop.base.over_time import PARTS
-from symtop.run.pieces import TOLD
 
 
 def as_dataset(columns: dict[str, Any], labels: dict[str, Any], *, shared: bool | None = None) -> xr.Dataset:
@@ -23,13 +22,10 @@ def as_dataset(columns: dict[str, Any], labels: dict[str, Any], *, shared: bool 
         for name, values in columns.items()
         if name != "time"
     }
-    data = xr.Dataset(
+    return xr.Dataset(
         {**variables, **{name: ("member", values) for name, values in labels.items()}},
         {
             "time": ("time", times[0]) if shared else (("member", "time"), times),
             **{name: list(PARTS[name]) for name in parts},
         },
     )
-    for name, words in TOLD.items():
-        data[name].attrs["long_name"] = words
-    return data

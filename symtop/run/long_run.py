@@ -155,8 +155,10 @@ def long_run(
     columns = np.array(rows).reshape(len(rows), len(QUANTITIES), 3)
     variables: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
     for i, name in enumerate(QUANTITIES):
+        words, units = ("theta", "rad") if name == "theta" else (f"relative change of {name} since the start", "1")
         for m, part in enumerate(("least", "largest", "mean")):
-            variables[f"{name}_{part}"] = ("window", columns[:, i, m])
+            told = {"long_name": f"{words}, {part} over the window", "units": units}
+            variables[f"{name}_{part}"] = ("window", columns[:, i, m], told)
     return datasets.describe(
         xr.Dataset(variables), title=f"{method.name} on {chosen.name}, {count} steps", units=chosen.units,
         integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h,

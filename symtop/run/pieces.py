@@ -44,16 +44,9 @@ SHOWN = {  # by each chart, in this order
         ("angles", ("psi",), ()), ("axis", (), ()), ("attitude", ("psi",), ("quaternion",)),
     )
 }  # fmt: skip
-TOLD = {  # of each member, beside what it shows
-    "outcome": "how the run ended",
-    "steps": "steps completed",
-    "force_evaluations": "force evaluations",
-    "newton_iterations": "iterations of Newton or of a sweep",
-    "reached_time": "time of the last completed step",
-    "step_size": "step",
-    "horizon": "time that was asked for",
-    "dithered": "are the samples dithered, because uniform ones would miss phases of the nutation?",
-}
+TOLD = (  # of each member, beside what it shows
+    "outcome", "steps", "force_evaluations", "newton_iterations", "reached_time", "step_size", "horizon", "dithered",
+)  # fmt: skip
 
 
 class _Top(NamedTuple):

@@ -30,11 +30,7 @@ from symtop.runner import depends
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
-COUNTS = {
-    "steps": "steps",
-    "force_evaluations": "force evaluations",
-    "newton_iterations": "iterations of Newton's method",
-}
+COUNTS = ("steps", "force_evaluations", "newton_iterations")
 
 
 class _Cell(NamedTuple):
@@ -219,12 +215,10 @@ def _stored(file: Path) -> dict[str, xr.Dataset]:
 
 
 def _described(data: xr.Dataset) -> xr.Dataset:
-    """Words and units for the errors and the counts, whose names are those of other quantities elsewhere."""
+    """Words and units for the errors, whose names are those of other quantities elsewhere."""
     ends = {"": "largest over the run", "_end": "at the horizon", "_bound": "the least that can be judged"}
     for name, words in QUANTITIES.items():
         for end, what in ends.items():
             unit = "rad" if name in ANGLES else "1"
             data[f"{name}{end}"].attrs = {"long_name": f"{words}, {what}", "units": unit}
-    for name, words in COUNTS.items():
-        data[name].attrs["long_name"] = words
     return data
