@@ -124,8 +124,9 @@ def test_the_report_shows_the_peers_with_date_machine_and_versions(tmp_path):
         page.write(tmp_path)
 
 
-def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_path):
+def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_path, quick_results):
     _peers_into(tmp_path)
+    shutil.copytree(quick_results / "cases" / "truth", tmp_path / "cases" / "truth")  # it only has to be drawn
     (tmp_path / "report.md").write_text("what an earlier run left")
     truth = runner.load("truth")
     runner.run(truth, tmp_path, quick=True, jobs=1, quiet=True, save=style.save)

@@ -424,6 +424,7 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
 
 CLOCKED = """
 import os, time
+from pathlib import Path
 import matplotlib.pyplot as plt
 import xarray as xr
 from symtop.runner.study import Case, Picture, Study
@@ -432,8 +433,11 @@ def cases(quick):
     return [Case("spheroid", "midpoint", {"k": k}, timed=k >= 8) for k in range(16)]
 
 def measure(case):
-    begin = time.monotonic()
-    time.sleep(0.05 if case.timed else 0.6)  # long enough for the second worker to start
+    begin, crew = time.monotonic(), Path(os.environ["CREW"])
+    (crew / str(os.getpid())).touch()
+    while not case.timed and len(list(crew.iterdir())) < 2 and time.monotonic() < begin + 60.0:
+        time.sleep(0.01)  # until the second worker has begun a case, too
+    time.sleep(0.05)
     one = xr.Dataset({"begin": begin, "end": time.monotonic(), "process": os.getpid(), "timed": float(case.timed)})
     return one.expand_dims(k=[case.settings["k"]])
 
@@ -441,7 +445,9 @@ STUDY = Study("clocked", "Clocked", "Alone?", "", cases, measure, lambda data: [
 """
 
 
-def test_timed_cases_run_one_at_a_time_in_workers_that_are_there_already(tmp_path):
+def test_timed_cases_run_one_at_a_time_in_workers_that_are_there_already(tmp_path, monkeypatch):
+    (tmp_path / "crew").mkdir()
+    monkeypatch.setenv("CREW", str(tmp_path / "crew"))
     (tmp_path / "clocked.py").write_text(CLOCKED)
     runner.run(runner.load(str(tmp_path / "clocked.py")), tmp_path / "r", jobs=2, quiet=True)
     found = [datasets.read(path) for path in (tmp_path / "r").rglob("cases/clocked/*.nc")]
