@@ -44,7 +44,11 @@ copybutton_only_copy_prompt_lines = True
 highlight_language = "none"  # formulas are plain text; blocks of code name their language
 smartquotes = False
 
+html_show_search_summary = False  # it fetches pages, which a browser refuses for files
+
 html_theme = "furo"
+pygments_style = "a11y-light"
+pygments_dark_style = "github-dark"
 html_title = "symtop"
 html_static_path = ["generator/static"]
 html_css_files = ["site.css"]

@@ -7,7 +7,7 @@ A block says by its language what a test does with it:
     sh                commands of symtop and python, which are run and end with exit code 0
     console           a command after "$ symtop" and what it prints, to the word
     text              a part of what the block before it prints
-    bash              commands for other machines, for hours or for a reader's files: read as the command line reads them
+    bash              commands for hours, other machines or a reader's files: read as the command line would
 
 The word slow after a language (```sh slow) leaves a block to the slow tests.
 """

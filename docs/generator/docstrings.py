@@ -1,8 +1,8 @@
 """Docstrings as autodoc wants them: from the plain Markdown of the sources to reStructuredText.
 
-A docstring has paragraphs, `code` in one or two backticks, *emphasis*, lists with a dash and blocks that are indented:
-formulas and tables in plain text. Blocks are shown as they stand. All other signs (``|``, ``_``, ``*`` alone) mean
-nothing in the sources and are escaped.
+A docstring has paragraphs, `code` in one or two backticks, *emphasis*, and blocks that are indented: formulas and
+tables in plain text, which are shown as they stand. All other signs (``|``, ``_``, a ``*`` alone) mean themselves and
+are escaped.
 """
 
 import re
@@ -15,48 +15,33 @@ EMPHASIS = re.compile(r"(?<![\w*])\*(\w[^*\n]*\w|\w)\*(?![\w*])")
 SIGNS = re.compile(r"([\\|*_`<>])")
 
 
+def inline(text: str) -> str:
+    """A paragraph: code in double backticks, emphasis kept, everything else as it is written."""
+    parts = CODE.split(text)  # every second one is code
+    return "".join(rf"``{part.strip('`')}``\ " if place % 2 else _plain(part) for place, part in enumerate(parts))
+
+
 def _plain(text: str) -> str:
-    parts = re.split(EMPHASIS, text)  # every second part is emphasised
+    parts = EMPHASIS.split(text)  # every second one is emphasised
     escaped = [SIGNS.sub(r"\\\1", part) for part in parts]
     return "".join(rf"\ *{part}*\ " if place % 2 else part for place, part in enumerate(escaped))
 
 
-def inline(text: str) -> str:
-    """A paragraph, its lines joined: code in double backticks, emphasis kept, everything else as it is written."""
-    parts = CODE.split(text)
-    return "".join(rf"``{part.strip('`')}``\ " if place % 2 else _plain(part) for place, part in enumerate(parts))
-
-
-def restructured(docstring: list[str]) -> list[str]:
-    """The lines of a docstring in Markdown as lines of reStructuredText."""
+def restructured(docstring: str) -> list[str]:
+    """The lines of a docstring in Markdown as lines of reStructuredText; a block that is indented becomes literal."""
     lines: list[str] = []
-    for block in re.split(r"\n\s*\n", "\n".join(docstring).strip("\n")):
-        if block.startswith(" "):
-            if not (lines and lines[-1] == "" and lines[-2:-1] and lines[-2].startswith("   ")):
-                lines += ["::", ""]
-            lines += [f"   {line}" for line in block.splitlines()]
-        elif re.match(r"- ", block):
-            for item in re.split(r"^- ", block, flags=re.MULTILINE)[1:]:
-                lines.append("- " + inline(" ".join(item.split())))
-        else:
-            lines += _paragraph(block)
+    literal = False
+    for block in re.split(r"\n\s*\n", docstring.strip("\n")):
+        above, literal = literal, block.startswith(" ")
+        if literal and not above:
+            lines += ["::", ""]
+        lines += [f"   {line}" for line in block.splitlines()] if literal else [inline(" ".join(block.split()))]
         lines.append("")
     return lines
 
 
-def _paragraph(block: str) -> list[str]:
-    """A paragraph; lines that are indented below it without an empty line between are a block of their own."""
-    above = re.match(r"(?:\S.*\n?)+", block)
-    assert above is not None
-    rest = block[above.end() :]
-    lines = [inline(" ".join(above.group().split()))]
-    if rest:
-        lines += ["", *restructured(rest.split("\n"))]
-    return lines
-
-
 def _process(_app: Sphinx, _what: str, _name: str, _obj: Any, _options: Any, lines: list[str]) -> None:
-    lines[:] = restructured(lines)
+    lines[:] = restructured("\n".join(lines))
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -111,7 +111,10 @@ def test_a_page_that_is_wrong_fails(tmp_path, monkeypatch):
     wrong = {
         "```python\nprint(1 + 1)\n```\n```text\n3\n```\n": ("3\n", "2\n"),
         "```sh\nsymtop scenes sphreoid\n```\n": ("sphreoid", "spheroid"),
-        "```console\n$ symtop --version\nsymtop, version 0.0\n```\n": ("0.0", importlib.import_module("symtop").__version__),
+        "```console\n$ symtop --version\nsymtop, version 0.0\n```\n": (
+            "0.0",
+            importlib.import_module("symtop").__version__,
+        ),
         "```python\nimport symtop\nsymtop.scene('no such')\n```\n": ("no such", "spheroid"),
         "```python\n# a.py\nx = 1\n```\n```sh\npython b.py\n```\n": ("b.py", "a.py"),
     }
