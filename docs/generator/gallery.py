@@ -63,7 +63,15 @@ def markdown(report: str, tracked: set[str], root: Path = ROOT) -> str:
             lines += [reading.group(), ""]
         for one in figures:
             lines += [f"```{{figure}} ../../results/figures/{one.file}", f":name: {Path(one.file).stem}"]
-            lines += [f":alt: {one.alt}", ":loading: lazy", "", one.caption, "```", ""]
+            lines += [
+                f":alt: {one.alt}",
+                ":loading: lazy",
+                f":target: ../_images/{one.file}",
+                "",
+                one.caption,
+                "```",
+                "",
+            ]
     return "\n".join(lines)
 
 
