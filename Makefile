@@ -3,23 +3,25 @@
 # make report          write results/report.html again from the stored findings
 # make check-results   compute some stored cases again and compare them to the last bit (FRESH=1: every case)
 # make test            run the fast tests            make test-all   run all tests
-# make lint            run ruff and mypy             make clean      delete .venv, caches and what studies stored
+# make lint            run ruff and mypy             make docs       build the site, into docs/_build/html
 # make bench           time the kernels against C    make peers      run the same tops in other libraries
 # make engines         run physics engines against their maps
+# make clean           delete .venv, caches and what studies stored
 # Each target makes .venv first if it is missing or out of date.
 
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
+DOCS := .venv/.docs
 PEERS := benchmarks/peers/.venv
 ENGINES := benchmarks/engines/.venv
 OLDER := benchmarks/engines/.venv-mujoco-3
 
 .DEFAULT_GOAL := help
-.PHONY: help setup studies quick report check-results test test-all lint bench peers engines clean
+.PHONY: help setup studies quick report check-results test test-all lint bench peers engines docs clean
 
 help:
-	@sed -n '1,9s/^# //p' Makefile
+	@sed -n '1,10s/^# //p' Makefile
 
 setup: $(READY)
 
@@ -60,6 +62,16 @@ lint: $(READY)
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
 
+docs: $(DOCS)
+	@echo "symtop: building the site (half a minute); a warning is an error"
+	@$(BIN)/python -m sphinx -W --keep-going -q -b html -d docs/_build/doctrees docs docs/_build/html
+	@echo "symtop: docs/_build/html/index.html"
+
+$(DOCS): $(READY) docs/constraints.txt
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt \
+	  --constraint docs/constraints.txt --group docs
+	@touch $(DOCS)
+
 bench: $(READY)
 	@echo "symtop: timing the kernels against C (needs gcc)"
 	@$(BIN)/python -m benchmarks.bench
@@ -88,5 +100,5 @@ $(ENGINES)/.ready: pyproject.toml constraints.txt benchmarks/engines/constraints
 	@touch $(ENGINES)/.ready
 
 clean:
-	rm -rf .venv $(PEERS) $(ENGINES) $(OLDER) .pytest_cache .ruff_cache .mypy_cache benchmarks/build results/cases results/quick
+	rm -rf .venv $(PEERS) $(ENGINES) $(OLDER) .pytest_cache .ruff_cache .mypy_cache benchmarks/build docs/_build results/cases results/quick
 	find results -maxdepth 1 \( -name '*.nc' -o -name '*.json' \) ! -name 'peers.*' ! -name bench.json ! -name live-engines.json -delete

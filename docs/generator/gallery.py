@@ -1,0 +1,88 @@
+"""The gallery: every figure in results/figures with its caption, the study that makes it and the command to type.
+
+Captions, questions and notes on reading are those of results/report.md, in its order. A figure is of the study whose
+folder its name begins with; those of benchmarks are named in `OTHERS`. A figure that the report does not show, and one
+that nothing makes, is an error: the site does not build.
+"""
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE, MARK = "reference/gallery", "<!-- gallery -->"
+OTHERS = {"peers": ("make peers", "benchmarks/peers/figures.py")}  # a command and the code, by the name's beginning
+SHOWN = re.compile(r"^!\[(?P<alt>.*)\]\(figures/(?P<file>[^)]+)\)\n\n(?P<caption>\S(?:.|\n(?!\n))*)", re.MULTILINE)
+
+
+class Shown(NamedTuple):
+    """A figure as the report shows it."""
+
+    file: str
+    alt: str
+    caption: str
+
+
+def sections(report: str) -> dict[str, tuple[str, list[Shown]]]:
+    """Of each section of the report that has figures: its text, and its figures in order."""
+    found: dict[str, tuple[str, list[Shown]]] = {}
+    for part in re.split(r"^## ", report, flags=re.MULTILINE)[1:]:
+        title, _, text = part.partition("\n")
+        if figures := [Shown(one["file"], one["alt"], one["caption"]) for one in SHOWN.finditer(text)]:
+            found[title.strip()] = (text, figures)
+    return found
+
+
+def maker(file: str, root: Path = ROOT) -> tuple[str, str]:
+    """The command that makes a figure, and the file with the code."""
+    name = file.partition("-")[0]
+    if (root / "studies" / name / "study.py").is_file():
+        return f"symtop study {name}", f"studies/{name}/figures.py"
+    if name in OTHERS:
+        return OTHERS[name]
+    raise ExtensionError(f"gallery: nothing is known to make the figure {file}")
+
+
+def markdown(report: str, tracked: set[str], root: Path = ROOT) -> str:
+    """The page below its heading; ExtensionError for a figure without a caption and for a caption without a figure."""
+    parts = sections(report)
+    shown = {one.file for _, figures in parts.values() for one in figures}
+    if shown != tracked:
+        raise ExtensionError(f"gallery: the report and results/figures differ by {sorted(shown ^ tracked)}")
+    lines: list[str] = []
+    for title, (text, figures) in parts.items():
+        command, code = maker(figures[0].file, root)
+        lines += [f"## {title}", ""]
+        if question := re.search(r"^\*[^*\n]+\*$", text, re.MULTILINE):
+            lines += [question.group(), ""]
+        lines += [f"Made by `{command}`; the code that draws is in `{code}`.", ""]
+        if reading := re.search(r"^\*\*How to read it\.\*\*.*", text, re.MULTILINE):
+            lines += [reading.group(), ""]
+        for one in figures:
+            lines += [f"```{{figure}} ../../results/figures/{one.file}", f":name: {Path(one.file).stem}"]
+            lines += [
+                f":alt: {one.alt}",
+                ":loading: lazy",
+                f":target: ../_images/{one.file}",
+                "",
+                one.caption,
+                "```",
+                "",
+            ]
+    return "\n".join(lines)
+
+
+def _fill(_app: Sphinx, page: str, source: list[str]) -> None:
+    if page == PAGE:
+        report = (ROOT / "results" / "report.md").read_text(encoding="utf-8")
+        tracked = {path.name for path in (ROOT / "results" / "figures").iterdir() if path.suffix in {".png", ".gif"}}
+        source[0] = source[0].replace(MARK, markdown(report, tracked))
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Called by Sphinx."""
+    app.connect("source-read", _fill)
+    return {"parallel_read_safe": True}

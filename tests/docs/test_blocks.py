@@ -1,0 +1,153 @@
+"""Every block of code in the README and on the site does what it says (`tests.pages` has the languages)."""
+
+import contextlib
+import importlib
+import io
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import pytest
+from click.testing import CliRunner
+
+from symtop.cli.main import main
+from tests.commands import ended, symtop
+from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
+
+registry = importlib.import_module("symtop.methods.registry")
+scenes = importlib.import_module("symtop.model.scenes")
+
+TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+PAGES = {path.relative_to(ROOT).as_posix(): blocks(path.read_text(encoding="utf-8")) for path in pages()}
+SLOW = [page for page, found in PAGES.items() if any(block.slow for block in found)]
+OTHERS = {"pip": {"install"}, "dask": {"scheduler", "worker"}}  # programs of bash blocks that are not ours
+
+
+def words(text):
+    return " ".join(text.split())
+
+
+class Page:
+    """A page as a reader follows it: one folder, one Python, block after block."""
+
+    def __init__(self, name, *, slow):
+        self.slow = slow
+        self.name = re.sub(r"\W", "_", f"{name}_{slow}")
+        self.names = {}
+        self.said = None  # by the last block that was run
+
+    def follow(self, block):
+        """Do what the language of a block asks for."""
+        if block.file:
+            Path(block.file).write_text(block.code, encoding="utf-8")
+        elif block.language == "text":
+            assert self.said is None or words(block.code) in words(self.said)
+        elif block.slow and not self.slow:
+            self.said = None
+        elif block.language == "python":
+            self.said = self.python(block.code)
+        elif block.language == "sh":
+            self.said = "".join(self.command(line, apart=block.slow) for line in block.code.splitlines())
+        elif block.language == "console":
+            line, _, shown = block.code.partition("\n")
+            self.said = self.command(line.removeprefix("$ "))
+            assert words(shown) in words(self.said)
+
+    def python(self, code):
+        """What a block prints. A function that `judge` is given is sent to its process by the file it stands in."""
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            if re.search(r"symtop\.judge\([a-z]", code):
+                Path(f"{self.name}.py").write_text(code, encoding="utf-8")
+                importlib.import_module(self.name)
+            else:
+                exec(compile(code, self.name, "exec"), self.names)
+        plt.close("all")
+        return said.getvalue()
+
+    def command(self, line, *, apart=False):
+        """What a command prints; it must end with exit code 0. Those of slow blocks are processes of their own."""
+        program, *rest = shlex.split(line, comments=True)
+        if program == "python":
+            done = subprocess.run([sys.executable, *rest], capture_output=True, text=True, timeout=240, check=True)
+            return done.stdout
+        assert program == "symtop"
+        if apart:
+            code, out, err = ended(symtop(*rest), seconds=900.0)
+            assert code == 0, (line, out, err)
+            return out
+        done = CliRunner().invoke(main, rest)
+        assert done.exit_code == 0, (line, done.output)
+        return done.output
+
+
+def follow(page, slow, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setattr(registry, "_registry", registry.integrators())  # what a page adds goes with the test
+    monkeypatch.setattr(scenes, "_added", {})
+    reader = Page(page, slow=slow)
+    for block in PAGES[page]:
+        reader.follow(block)
+
+
+@pytest.mark.parametrize("page", [page for page, found in PAGES.items() if found])
+def test_a_page_runs(page, tmp_path, monkeypatch):
+    follow(page, False, tmp_path, monkeypatch)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", SLOW)
+def test_a_page_runs_whole(page, tmp_path, monkeypatch):
+    follow(page, True, tmp_path, monkeypatch)
+
+
+def test_a_page_that_is_wrong_fails(tmp_path, monkeypatch):
+    """Negative control: a wrong output, a wrong command and a raise are seen, and each is right when mended."""
+    wrong = {
+        "```python\nprint(1 + 1)\n```\n```text\n3\n```\n": ("3\n", "2\n"),
+        "```sh\nsymtop scenes sphreoid\n```\n": ("sphreoid", "spheroid"),
+        "```console\n$ symtop --version\nsymtop, version 0.0\n```\n": (
+            "0.0",
+            importlib.import_module("symtop").__version__,
+        ),
+        "```python\nimport symtop\nsymtop.scene('no such')\n```\n": ("no such", "spheroid"),
+        "```python\n# a.py\nx = 1\n```\n```sh\npython b.py\n```\n": ("b.py", "a.py"),
+    }
+    for text, (before, after) in wrong.items():
+        monkeypatch.setitem(PAGES, "page", blocks(text.replace(before, after)))
+        follow("page", False, tmp_path, monkeypatch)
+        monkeypatch.setitem(PAGES, "page", blocks(text))
+        with pytest.raises((AssertionError, ValueError, subprocess.CalledProcessError)):
+            follow("page", False, tmp_path, monkeypatch)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_block_has_a_language_that_says_what_to_do_with_it(page):
+    assert {block.language for block in PAGES[page]} <= LANGUAGES
+    for place, block in enumerate(PAGES[page]):
+        if block.file:  # is run by a later block that names it
+            later = [other.code for other in PAGES[page][place + 1 :] if other.language in {"sh", "python"}]
+            assert any(block.file in code for code in later)
+
+
+@pytest.mark.parametrize("block", [block for found in PAGES.values() for block in found if block.language == "bash"])
+def test_a_command_that_is_not_run_is_one(block: Block):
+    """Negative control: an option that is not there is refused by the same reading."""
+    for line in block.code.splitlines():
+        program, *rest = shlex.split(line, comments=True)
+        if program == "symtop":
+            name, command, rest = main.resolve_command(main.make_context("symtop", [], resilient_parsing=True), rest)
+            wanted = [word for word in rest if word != "--plugin" and not word.startswith("my_methods")]
+            command.make_context(str(name), wanted, resilient_parsing=True)
+            for option in (word for word in rest if word.startswith("--")):
+                assert any(option in parameter.opts for parameter in command.params), (line, option)
+        elif program == "make":
+            assert rest[0] in TARGETS
+        else:
+            assert rest[0] in OTHERS[program]
+    assert not any("--no-such" in parameter.opts for parameter in main.commands["run"].params)
