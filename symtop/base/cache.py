@@ -7,6 +7,7 @@ removed, and then the entries used longest ago until the folder is small enough.
 import contextlib
 import os
 import shutil
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +15,17 @@ from pathlib import Path
 DAY = 86_400.0  # seconds
 UNUSED = 30  # days
 
-on_cold: list[Callable[[], object]] = []  # called when a kernel is not in the cache and has to be compiled
+COMPILING = "compiling what runs for the first time; the next time it is found on disk"
+
+
+def _tell() -> None:
+    """Say once, to somebody who is watching, that kernels are being compiled, which takes one second to twenty."""
+    on_cold.remove(_tell)
+    if "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty()):
+        print(f"symtop: {COMPILING}", file=sys.stderr, flush=True)  # noqa: T201  (no warning: nothing is wrong)
+
+
+on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in the cache and has to be compiled
 
 
 def cache_root() -> Path:

@@ -62,11 +62,11 @@ class Group(click.Group):
 
 
 def tell_of_compiling() -> None:
-    """Say once, on a terminal, that kernels are being compiled, as it takes from one second to half a minute."""
+    """Say once, on a terminal and in its width, that kernels are being compiled."""
 
     def tell() -> None:
         cache.on_cold.clear()
-        warn("compiling what runs for the first time; the next time it is found on disk")
+        warn(cache.COMPILING)
 
     cache.on_cold[:] = [tell] if sys.stderr.isatty() else []
 

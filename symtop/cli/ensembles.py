@@ -14,6 +14,9 @@ from symtop.cli.completion import completing
 pairs = partial(zip, strict=True)
 COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
 
+OUTCOME = {"ok": "reached the horizon"}  # which says nothing yet of their errors
+EXECUTION = {"lanes": "32 tops at a time in vector registers (lanes)"}
+
 
 @click.command(short_help="Run one integrator on many random tops.")
 @click.argument("integrator", shell_complete=completing("integrators"))
@@ -76,8 +79,9 @@ def ensemble(
         }
         click.echo(json.dumps({"outcomes": outcomes, "steps": steps, "largest_errors": errors}, indent=1))
     else:
-        said = ", ".join(f"{count} {name}" for name, count in outcomes.items())
-        say(f"{data.attrs['title']} ({data.attrs['execution']}): {said}\n{steps} steps")
+        said = ", ".join(f"{count} {OUTCOME.get(name, name)}" for name, count in outcomes.items())
+        execution = data.attrs["execution"]
+        say(f"{data.attrs['title']}: {said}\n{steps} steps, computed {EXECUTION.get(execution, execution)}")
         heading = [f"largest error, {few.sizes['member']} tops", *(f"{100.0 * level:g} %" for level in LEVELS)]
         click.echo(table(heading, [[QUANTITIES[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
         for file in (output, figure):

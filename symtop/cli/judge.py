@@ -72,7 +72,7 @@ def judge(
     if as_json:
         click.echo(json.dumps([finding.plain() for finding in ledger.findings], indent=1))
     else:
-        click.echo(screen.ending(ledger.findings))
+        click.echo(screen.ending(ledger.findings, ledger.implied))
     if output is not None:
         from symtop.base import datasets
 

@@ -73,7 +73,9 @@ def run(
         findings = {**{name: data.attrs[name] for name in names}, "judgement": verdict._asdict(), "errors": largest}
         click.echo(json.dumps(findings, indent=1))
     else:
-        say("{title}: {outcome_message}\n{steps} steps, {force_evaluations} force evaluations".format(**data.attrs))
+        told = data.attrs
+        say(f"{told['integrator']}[{told['chart']}] on {chosen.name}: {told['outcome_message']}")
+        say("{steps} steps, {force_evaluations} force evaluations".format(**told))
         if data.attrs["outcome"] == "ok":
             say(f"judged against the truth: {verdict.words()}")
         for name, values in largest.items():

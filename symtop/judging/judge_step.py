@@ -25,9 +25,16 @@ class Judged(Ledger):
     """The findings on a step that came through a socket; shown as the screen of the command."""
 
     about: About
+    implied: frozenset[str] = frozenset()  # claims that follow from those that were made
 
     def __str__(self) -> str:
-        return screen.screen(self.about._asdict(), self.scene, self.findings)
+        return screen.screen(self.about._asdict(), self.scene, self.findings, implied=self.implied)
+
+    def card(self, file: "str | Path") -> Path:
+        """Write a page with two figures and the findings (HTML); returns the file."""
+        from symtop.report.card import card
+
+        return card(self, str(file))
 
     def dataset(self) -> xr.Dataset:
         """As of any ledger, with attributes that say what was judged."""
@@ -94,7 +101,8 @@ def judge(
                 tell(one)
     if about is None:
         raise SymtopError("it cannot be judged: its process ended before it was open")
-    return Judged(about.name, request.scene.name, tuple(findings), traces, about)
+    implied = {"time"} | ({"energy"} if energy is None and "energy" not in (conserves or ()) else set())
+    return Judged(about.name, request.scene.name, tuple(findings), traces, about, frozenset(implied))
 
 
 def _states(

@@ -3,7 +3,7 @@
 import math
 import textwrap
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from symtop.judging.ledger import Finding, spoken
@@ -62,6 +62,9 @@ def described(findings: Sequence[Finding]) -> str:
     bounded = [KEPT[name] for name, kind in kinds.items() if kind == "bounded"]
     words += [f"keeps {_listed(kept)}"] if kept else []
     words += [f"{_listed(bounded)} bounded"] if bounded else []
+    wrong = {name.removesuffix("_error"): one for name, one in by_claim.items() if name.endswith("_error")}
+    if wrong:  # a trajectory
+        words = [f"{name} within {one.value:.1e} rad of the truth" for name, one in wrong.items()] + words
     sentence = ", ".join(word for word in words if word)
     return (sentence or "nothing could be measured") + (f"; not {_listed(lost)}" if lost else "")
 
@@ -81,15 +84,25 @@ def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def ending(findings: Sequence[Finding]) -> str:
-    """What the method is, and how many claims hold."""
+def ending(findings: Sequence[Finding], implied: Collection[str] = ()) -> str:
+    """What the method is, and how many claims hold: those that were made, and those that follow from them."""
+    own = _counted([one for one in findings if one.declared and one.claim not in implied])
+    theirs = _counted([one for one in findings if one.declared and one.claim in implied])
+    claims = f"Claims: {own}" if own else "No claims were made"
+    follow = f". Implied by them ({_listed([spoken(name) for name in sorted(implied)])}): {theirs}" if theirs else ""
+    return f"\nIt is: {described(findings)}.\n{claims}{follow}."
+
+
+def _counted(findings: Sequence[Finding]) -> str:
     counts = Counter(one.verdict for one in findings)
-    made = [f"{counts[verdict]} {verdict}" for verdict in ("confirmed", "refuted", "undecided") if counts[verdict]]
-    claims = f"claims: {', '.join(made)}" if made else "no claims were made"
-    return f"\nIt is: {described(findings)}.\n{claims[0].upper()}{claims[1:]}."
+    return ", ".join(
+        f"{counts[verdict]} {verdict}" for verdict in ("confirmed", "refuted", "undecided") if counts[verdict]
+    )
 
 
-def screen(about: Mapping[str, Any], scene: str, findings: Sequence[Finding], width: int = WIDTH) -> str:
+def screen(
+    about: Mapping[str, Any], scene: str, findings: Sequence[Finding], width: int = WIDTH, implied: Collection[str] = ()
+) -> str:
     """All of it."""
     lines = [text for one in findings if (text := line(one, width))]
-    return "\n".join([heading(about, scene), *lines, ending(findings)])
+    return "\n".join([heading(about, scene), *lines, ending(findings, implied)])

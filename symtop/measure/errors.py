@@ -75,9 +75,10 @@ def errors(
         units = "1" if name in CONSTANTS else "rad"
         shown.variables[name].attrs.update(long_name=QUANTITIES[name], units=units)
         shown.variables[f"{name}_bound"].attrs.update(long_name=f"the least {QUANTITIES[name]} to be seen", units=units)
-    shown.attrs.update(
-        datasets.CONVENTIONS, title=f"errors on {chosen.name}", scene=chosen.name, precision=truth.attrs["precision"]
-    )
+    told = {"scene": chosen.name, "precision": truth.attrs["precision"]}
+    if isinstance(run, xr.Dataset) and "integrator" in run.attrs:
+        told["integrator"] = run.attrs["integrator"]
+    shown.attrs.update(datasets.CONVENTIONS, title=f"errors on {chosen.name}", **told)
     return shown
 
 

@@ -1,4 +1,4 @@
-"""plot(): a run, a sweep or an ensemble on an Axes of the caller's, or on a new one."""
+"""plot(): a run, its errors, a sweep or an ensemble on an Axes of the caller's, or on a new one."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -23,9 +23,10 @@ def plot(
     data: xr.Dataset, ax: "Axes | None" = None, *, quantity: str = "axis", x: str | None = None,
     members: xr.Dataset | None = None,
 ) -> "Axes":  # fmt: skip
-    """Draw a dataset of `simulate`, `sweep` or `ensemble` and return the Axes; a new one is made if `ax` is None.
+    """Draw a dataset of `simulate`, `errors`, `sweep` or `ensemble` and return the Axes, a new one if `ax` is None.
 
         a run         the error of `quantity` over time, or a variable of the run itself (``phi``, ``p_theta``, ...)
+        its errors    (a dataset of `errors`) the error of `quantity` over time, and the least that can be seen
         a sweep       the largest error of `quantity` against ``step_size`` or ``tolerance``, or work where
                       some methods have one and some the other, or what `x` names: a line for each integrator, dashed
                       for further scenes
@@ -36,7 +37,7 @@ def plot(
     """
     if not isinstance(data, xr.Dataset):
         raise SymtopError(f"data must be a dataset of simulate, sweep or ensemble, not {type(data).__name__}")
-    drawn = _ensemble if "member" in data.dims else _sweep if "setting" in data.dims else _run
+    drawn = _ensemble if "member" in data.dims else _sweep if "setting" in data.dims else _over_time
     if ax is None:
         ax = plt.subplots(figsize=(7.2, 4.4), layout="constrained")[1]
     if drawn is _ensemble:
@@ -44,18 +45,25 @@ def plot(
     elif drawn is _sweep:
         _sweep(ax, data, quantity, x)
     else:
-        _run(ax, data, quantity)
+        _over_time(ax, data, quantity)
     return ax
 
 
-def _run(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
-    times = data["time"].values
-    color = look(data.attrs["integrator"]).color
+def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
+    """A run, its errors, or the errors of somebody's trajectory, which name no integrator."""
+    if "time" not in data:
+        raise SymtopError("data must have the dimension time, setting or member, as simulate, sweep and ensemble give")
+    times, known = data["time"].values, any(f"{name}_bound" in data for name in QUANTITIES)
+    name = data.attrs.get("integrator", "")
+    color = look(name).color if name else "black"
     if quantity in QUANTITIES:
-        wrong = errors(data)
+        wrong = data if known else errors(data)
         if quantity not in wrong:
-            raise SymtopError(f"this run does not show the {quantity}; it shows {', '.join(map(str, wrong.data_vars))}")
+            shows = ", ".join(str(shown) for shown in wrong.data_vars if shown in QUANTITIES)
+            raise SymtopError(f"this run does not show the {quantity}; it shows {shows}")
         ax.plot(times[1:], np.maximum(wrong[quantity].values[1:], LEAST), color=color, lw=1.2)
+        if known:
+            ax.plot(times, np.maximum(data[f"{quantity}_bound"].values, LEAST), color="0.6", lw=0.8, ls=":")
         ax.set(yscale="log", ylabel=QUANTITIES[quantity])
     else:
         shown = {name: variable for name, variable in data.data_vars.items() if variable.dims == ("time",)}
@@ -63,7 +71,8 @@ def _run(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         unit = values.attrs.get("units", "")
         ax.plot(times, values.values, color=color, lw=1.2)
         ax.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
-    ax.set(xlabel=f"time{_unit(data)}", title=f"{data.attrs['title']}: {data.attrs['outcome_message']}")
+    title, ended = (data.attrs.get(word, "") for word in ("title", "outcome_message"))
+    ax.set(xlabel=f"time{_unit(data)}", title=f"{title}: {ended}" if ended else title)
 
 
 def _unit(data: xr.Dataset) -> str:

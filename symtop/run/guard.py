@@ -101,8 +101,8 @@ def _adding_up(method: Integrator, plan: Plan, marks: Landmarks, expected: Forec
     if method.order is None:
         return "it has no order, so that a smaller step need not help; take another method, such as strang"
     return (
-        f"a step is 1/{expected.steps_per_nutation:.3g} of a nutation and errors add up over {nutations:.3g} of them; "
-        f"take a step of about {_smaller(method, plan, expected):.2g}"
+        f"a step is 1/{expected.steps_per_nutation:.3g} of a nutation, and errors add up over {nutations:.3g} "
+        f"nutations; take a step of about {_smaller(method, plan, expected):.2g}"
     )
 
 

@@ -39,7 +39,7 @@ def test_every_study_is_explained():
 
 
 def test_the_first_run_prints_what_the_readme_shows():
-    shown = re.search(r"```text\n(rk4 on spheroid.*?)```", PAGES["README.md"], re.DOTALL)
+    shown = re.search(r"```text\n(rk4\[angles\] on spheroid.*?)```", PAGES["README.md"], re.DOTALL)
     done = CliRunner().invoke(main, ["run", "spheroid", "rk4", "--step-size", "0.01"])
     assert shown is not None
     assert done.stdout.startswith(shown.group(1))

@@ -1,0 +1,44 @@
+"""Python says once that it compiles, to a terminal or a notebook and to nobody else."""
+
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPT = """
+import sys
+{before}
+import symtop
+for _ in range(2):
+    for name in ("strang", "rk4"):
+        symtop.simulate("spheroid", name, step_size=0.01, horizon=0.1, guard=False)
+"""
+
+
+def _heard(tmp_path, before="", terminal=False):
+    """What a script that runs two methods twice prints to its standard error."""
+    environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    ours, theirs = pty.openpty() if terminal else os.pipe()
+    command = [sys.executable, "-c", SCRIPT.format(before=before)]
+    subprocess.run(command, env=environment, stderr=theirs, check=True)
+    os.close(theirs)
+    with os.fdopen(ours, "rb") as stream:
+        return (os.read(stream.fileno(), 4096) if terminal else stream.read()).decode()
+
+
+@pytest.mark.parametrize(
+    ("watched", "lines"),
+    [({"terminal": True}, 1), ({"before": "sys.modules['ipykernel'] = sys"}, 1), ({}, 0)],
+    ids=["terminal", "notebook", "pipe"],
+)
+def test_compiling_is_said_once_to_whoever_watches(tmp_path, watched, lines):
+    assert _heard(tmp_path, **watched).count("symtop: compiling") == lines
+
+
+def test_nothing_is_said_of_kernels_that_are_on_disk(tmp_path):
+    _heard(tmp_path)
+    assert _heard(tmp_path, before="sys.modules['ipykernel'] = sys") == ""
