@@ -1,7 +1,7 @@
 """The map of outcomes: one method on one top over a grid of steps and spins, as one ensemble.
 
-A cell is the run from the page's start with its own psi_dot (row) and step size (column). Its value is the largest angle
-between its axis and the exact one over the samples, in radians; the outcome is kept for cells that ended early.
+A cell is the run from the page's start with its own psi_dot (row) and step size (column). Its value is the largest
+angle in radians between its axis and the exact one over nine samples; a run that ended early has none.
 """
 
 import base64
@@ -43,7 +43,7 @@ def grid(fields: Mapping[str, Any]) -> tuple[Setup, np.ndarray, np.ndarray]:
 
 
 def answer(asked: tuple[Setup, np.ndarray, np.ndarray]) -> dict[str, Any]:
-    """The map: ``error_rad`` in radians as base64 of float32, NaN where a run ended early, row by row from the least spin."""
+    """The map: ``error_rad`` as base64 of float32, row by row from the least spin; NaN where a run ended early."""
     began = time.perf_counter()
     chosen, steps, spins = asked
     scene = chosen.scene

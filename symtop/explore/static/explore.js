@@ -177,14 +177,16 @@ function unpacked(answer, name) {
   const arrays = Object.fromEntries(Object.entries(answer.arrays).map(([key, text]) => [key, unpack(text)]));
   const last = arrays.time.length - 1;
   const trail = answer.period ? Math.ceil((8 * answer.period * last) / arrays.time[last]) : last;
-  return { ...arrays, trail, degrees: arrays.theta.map((value) => (value * 180) / Math.PI), color: catalogue.integrators.find((entry) => entry.name === name).color };
+  const swing = answer.period ? (values.I1 * 2 * Math.PI * Math.PI) / (180 * answer.period) : 1e-3;  // p_theta of a nutation by a degree
+  return { ...arrays, trail, swing, degrees: arrays.theta.map((value) => (value * 180) / Math.PI), color: catalogue.integrators.find((entry) => entry.name === name).color };
 }
 
 function show(answer, other, began) {
   const before = run && run.time.length > 1 ? place / (run.time.length - 1) : 0;
   run = unpacked(answer, values.integrator);
   second = other ? unpacked(other, values.second) : null;
-  if (second && second.color === run.color) second.color = tone("ink");
+  const taken = second && second.color === run.color;
+  for (const one of [run, second]) if (one) { const own = one.color; Object.defineProperty(one, "color", { get: () => ((one === second && taken) || own === "#000000" ? tone("ink") : own) }); }
   run.width = Math.min(0.6, 0.42 * Math.sqrt(values.I3 / values.I1));
   const last = run.time.length - 1;
   run.trueTheta = Array.from({ length: last + 1 }, (_, k) => {
@@ -207,7 +209,6 @@ function show(answer, other, began) {
   for (const [id, name, one] of [["swatch-1", values.integrator, run], ["swatch-2", values.second, second]]) {
     $(id).hidden = !one;
     $(id).textContent = name;
-    $(id).style.borderColor = one ? one.color : "";
   }
   $("warnings").replaceChildren(...[...answer.warnings, ...(other ? other.warnings : [])].map((sentence) => {
     const item = document.createElement("li");
@@ -229,6 +230,7 @@ function drawPlots() {
   const now = run.time[Math.round(place)] || 0;
   plot($("plot-theta"), run.time, [{ values: run.trueTheta, color: "#9a9a9a", dash: [2, 3] }, { values: run.degrees, color: run.color }, ...beside("degrees")], false, now);
   for (const name of PLOTS) plot($(`plot-${name}`), run.time, [{ values: run[name], color: run.color }, ...beside(name)], true, now);
+  for (const [id, one] of [["swatch-1", run], ["swatch-2", second]]) if (one) $(id).style.borderColor = one.color;
   portrait($("portrait"), second ? [run, second] : [run]);
   outcomes.draw({ step: values.step_size, spin: values.psi_dot });
   drawnAt = performance.now();

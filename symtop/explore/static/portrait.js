@@ -17,7 +17,7 @@ export function portrait(canvas, runs) {
   let [west, east] = span(theta.map((v) => v * DEGREE), 1);
   west = Math.max(west, 0);
   east = Math.min(east, 180);
-  const [south, north] = span(momentum, 1e-3);
+  const [south, north] = span(momentum, runs[0].swing);
   const x = (v) => LEFT + ((width - LEFT - RIGHT) * (v - west)) / (east - west);
   const y = (v) => TOP + ((height - TOP - BOTTOM) * (north - v)) / (north - south);
   context.font = "11px system-ui, 'DejaVu Sans', sans-serif";

@@ -7,7 +7,7 @@ export const STORIES = {
   },
   loop: {
     scene: "loop", integrator: "rk4", second: "gauss-4", step_size: 0.26,
-    watch: "The axis draws loops; with 5 steps a nutation rk4 changes the energy by a tenth and its orbit leaves the exact curve. Gauss-4 keeps the energy to 1e-12 and stays on the curve, although its axis is wrong by 0.03 rad.",
+    watch: "The axis draws loops; with 5 steps a nutation rk4 changes the energy by a tenth and its orbit leaves the exact curve. Gauss-4 keeps the energy to 1e-12 and stays on the curve, although its axis is wrong by 0.02 rad.",
   },
   sleeping: {
     scene: "sleeping-unstable", integrator: "rk4", second: "midpoint", step_size: 0.71,
