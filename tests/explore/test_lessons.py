@@ -133,6 +133,5 @@ def test_the_page_answers_under_200_requests_200_that_leave_and_20_slow_ones(ser
             sizes.append(int(Path("/proc/self/statm").read_text().split()[1]))  # pages in memory now, not the peak
     for one in slow:
         one.close()
-    print(sizes)
     assert capfd.readouterr().err.count("\n") < 10
     assert sizes[2] < 1.05 * sizes[1]  # the first round compiles and fills caches
