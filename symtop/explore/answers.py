@@ -29,6 +29,7 @@ MOST_STEPS = 2_000_000  # of one run; the common kernels take a quarter of a sec
 MOST_WORK = {"compiled": 2e6, "python": 2e5}  # force evaluations of an adaptive run, two seconds at most
 SAMPLES_A_NUTATION = 60
 FEWEST_SAMPLES, MOST_SAMPLES = 601, 4001  # of one run, whatever its nutations
+PORTRAIT = 361  # points of the exact phase curve, over one nutation
 
 
 @dataclass(frozen=True)
@@ -89,8 +90,9 @@ def answer(chosen: Setup) -> dict[str, Any]:
     """A run beside the exact motion: attitudes, residuals, errors, and the sentences of the outcome and the guard.
 
     Arrays are base64 of float32, over `time`: ``attitude`` and ``truth`` (w, x, y, z in turn), ``theta``, ``energy``,
-    ``p_phi`` and ``p_psi`` (relative changes since the start), ``axis_error`` and ``attitude_error`` in radians. Values
-    after a failure are NaN.
+    ``p_phi`` and ``p_psi`` (relative changes since the start), ``axis_error`` and ``attitude_error`` in radians, and
+    ``p_theta``. Values after a failure are NaN. ``true_theta`` and ``true_p_theta`` are the exact phase curve, one
+    nutation at 361 times.
     """
     began = time.perf_counter()
     warnings: list[str] = []
@@ -99,6 +101,8 @@ def answer(chosen: Setup) -> dict[str, Any]:
     times = run["time"].values
     truth = closed_form(chosen.scene).quaternion(times)
     angles = (run[name].values for name in ("theta", "phi", "psi"))
+    period = float(np.nan_to_num(chosen.scene.nutation_period, posinf=0.0))
+    once = closed_form(chosen.scene)(np.linspace(0.0, period or chosen.scene.horizon, PORTRAIT))
     attitude = run["quaternion"].values if "quaternion" in run else charts.quaternion_from_angles(*angles)
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
         arrays = {
@@ -106,6 +110,9 @@ def answer(chosen: Setup) -> dict[str, Any]:
             "attitude": attitude,
             "truth": truth,
             "theta": run["theta"].values,
+            "p_theta": run["p_theta"].values,
+            "true_theta": once.theta,
+            "true_p_theta": chosen.scene.top.I1 * once.theta_dot,
             **residuals(chosen.scene, run),
             "axis_error": charts.axis_distance(run["axis"].values, charts.axis_from_quaternion(truth)),
             "attitude_error": charts.attitude_distance(attitude, truth),
@@ -117,7 +124,7 @@ def answer(chosen: Setup) -> dict[str, Any]:
         "warnings": warnings,
         "steps": int(run.attrs["steps"]),
         "force_evaluations": int(run.attrs["force_evaluations"]),
-        "period": float(np.nan_to_num(chosen.scene.nutation_period, posinf=0.0)),
+        "period": period,
         "run_ms": 1e3 * (ran - began),
         "all_ms": 1e3 * (time.perf_counter() - began),
         "largest": {name: _largest(arrays[name]) for name in (*CONSTANTS, "axis_error")},

@@ -1,8 +1,8 @@
-"""The explorer's server: a page with its files, and three actions, for this machine only.
+"""The explorer's server: a page with its files, and four actions, for this machine only.
 
-    GET  /  /explore.js  /draw.js  /style.css     the page
-    GET  /catalogue                               scenes and integrators
-    POST /run  /netcdf  /script                   one run: as arrays, as a file, as a script
+    GET  /  /style.css  /*.js           the page and its modules
+    GET  /catalogue                     scenes and integrators
+    POST /run  /netcdf  /script  /map   one run: as arrays, as a file, as a script; a grid of runs
 
 It listens on 127.0.0.1. It answers only requests that name this machine as their host, and POST requests only if they
 send JSON, so that a page of another origin cannot use it.
@@ -24,13 +24,15 @@ from symtop.base import datasets
 from symtop.base.strangers import words_of
 from symtop.base.threads import cores
 from symtop.base.validate import SymtopError, whole
-from symtop.explore import answers
+from symtop.explore import answers, maps
 
 STATIC = Path(__file__).parent / "static"
 PAGES = {
     "/": ("page.html", "text/html; charset=utf-8"),
-    "/explore.js": ("explore.js", "text/javascript; charset=utf-8"),
-    "/draw.js": ("draw.js", "text/javascript; charset=utf-8"),
+    **{
+        f"/{name}.js": (f"{name}.js", "text/javascript; charset=utf-8")
+        for name in ("explore", "draw", "portrait", "map", "stories")
+    },
     "/style.css": ("style.css", "text/css; charset=utf-8"),
 }
 PATIENCE = 60.0  # seconds to wait for the rest of a request, or for the next one of a connection
@@ -44,10 +46,12 @@ def _netcdf(chosen: answers.Setup) -> bytes:
         return datasets.write(answers.dataset(chosen, str), Path(folder) / "explored.nc").read_bytes()
 
 
-ACTIONS: dict[str, tuple[Callable[[answers.Setup], bytes], str]] = {
-    "/run": (lambda chosen: json.dumps(answers.answer(chosen)).encode(), "application/json"),
-    "/netcdf": (_netcdf, "application/x-netcdf"),
-    "/script": (lambda chosen: answers.script(chosen).encode(), "text/x-python; charset=utf-8"),
+# What reads the question, what answers it, and the type of the answer.
+ACTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], bytes], str]] = {
+    "/run": (answers.setup, lambda chosen: json.dumps(answers.answer(chosen)).encode(), "application/json"),
+    "/netcdf": (answers.setup, _netcdf, "application/x-netcdf"),
+    "/script": (answers.setup, lambda chosen: answers.script(chosen).encode(), "text/x-python; charset=utf-8"),
+    "/map": (maps.grid, lambda asked: json.dumps(maps.answer(asked)).encode(), "application/json"),
 }
 
 
@@ -107,8 +111,8 @@ class Handler(BaseHTTPRequestHandler):
             if length > LONGEST_BODY:
                 self._refuse(413, f"a question must be at most {LONGEST_BODY} bytes, not {length}")
                 return
-            action, kind = ACTIONS[self.path]
-            chosen = answers.setup(_parsed(self.rfile.read(length)))
+            read, action, kind = ACTIONS[self.path]
+            chosen = read(_parsed(self.rfile.read(length)))
             with _at_work:
                 if self._has_left():
                     self.close_connection = True
@@ -116,7 +120,7 @@ class Handler(BaseHTTPRequestHandler):
                 body = action(chosen)
         except SymtopError as error:
             # The page shows the sentence in place of a run, as an ordinary answer; a file cannot be replaced by it.
-            self._refuse(200 if self.path == "/run" else 400, str(error))
+            self._refuse(200 if self.path in ("/run", "/map") else 400, str(error))
         except Exception as error:  # noqa: BLE001  (the page shows it, and the server keeps running)
             self._refuse(500, f"the run failed: {type(error).__name__}: {' '.join(str(error).split())}")
         else:

@@ -4,8 +4,11 @@ const TRIAD = ["#d55e00", "#009e73", "#0072b2"];
 const GHOST = "#9a9a9a";
 const FLOOR = 1e-17;
 
+// A colour of the style sheet, which follows the light or dark scheme.
+export const tone = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+
 // A canvas scaled to the screen's own pixels; returns its context and its size in page units.
-function surface(canvas) {
+export function surface(canvas) {
   const box = canvas.getBoundingClientRect();
   const ratio = window.devicePixelRatio || 1;
   const width = Math.max(1, Math.round(box.width * ratio));
@@ -70,7 +73,13 @@ export class Sphere {
     return [-sa * point[0] + ca * point[1], ce * point[2] - se * near, ce * near + se * point[2]];
   }
 
-  draw(run, place) {
+  // Keys turn the view as the mouse does.
+  turn(right, up) {
+    this.azimuth -= right;
+    this.elevation = Math.min(1.55, Math.max(-1.55, this.elevation - up));
+  }
+
+  draw(run, place, second) {
     const [context, width, height] = surface(this.canvas);
     const scale = 0.46 * Math.min(width, height);
     this.context = context;
@@ -79,8 +88,8 @@ export class Sphere {
       return [width / 2 + scale * x, height / 2 - scale * y, depth];
     };
     context.lineJoin = context.lineCap = "round";
-    context.fillStyle = "#f7f9fb";
-    context.strokeStyle = "#c4ccd4";
+    context.fillStyle = tone("tint");
+    context.strokeStyle = tone("line");
     context.lineWidth = 1;
     context.beginPath();
     context.arc(width / 2, height / 2, scale, 0, 2 * Math.PI);
@@ -93,6 +102,7 @@ export class Sphere {
     if (!run) return;
     this.path(run.truth, place, GHOST, 2.2, [2, 4], run.trail);
     this.path(run.attitude, place, run.color, 1.4, [], run.trail);
+    if (second) this.path(second.attitude, (place / (run.time.length - 1)) * (second.time.length - 1), second.color, 1.8, [7, 4], second.trail);
     this.rods(attitudeAt(run.truth, place), true);
     const now = attitudeAt(run.attitude, place);
     if (!now.every(Number.isFinite)) return;
@@ -178,7 +188,7 @@ export class Sphere {
 
 const LEFT = 46, RIGHT = 8, TOP = 6, BOTTOM = 20;
 
-// A plot of one or two curves over time; `logarithmic` draws absolute values, nothing below rounding.
+// A plot of curves over time, each over its own `time` if it has one; `logarithmic` draws absolute values, nothing below rounding.
 export function plot(canvas, time, curves, logarithmic, now) {
   const [context, width, height] = surface(canvas);
   const shown = curves.map((curve) => (logarithmic ? Array.from(curve.values, (v) => Math.log10(Math.max(Math.abs(v), FLOOR))) : curve.values));
@@ -197,8 +207,8 @@ export function plot(canvas, time, curves, logarithmic, now) {
   const x = (t) => LEFT + ((width - LEFT - RIGHT) * t) / end;
   const y = (v) => TOP + ((height - TOP - BOTTOM) * (high - v)) / (high - low);
   context.font = "11px system-ui, 'DejaVu Sans', sans-serif";
-  context.fillStyle = "#57606a";
-  context.strokeStyle = "#e3e7eb";
+  context.fillStyle = tone("soft");
+  context.strokeStyle = tone("line");
   context.lineWidth = 1;
   for (const tick of ticks(low, high, 4, logarithmic)) {
     context.beginPath(); context.moveTo(LEFT, y(tick)); context.lineTo(width - RIGHT, y(tick)); context.stroke();
@@ -212,23 +222,24 @@ export function plot(canvas, time, curves, logarithmic, now) {
   shown.forEach((values, k) => {
     context.strokeStyle = curves[k].color;
     context.lineWidth = 1.4;
-    context.setLineDash(curves[k].dotted ? [2, 3] : []);
+    context.setLineDash(curves[k].dash || []);
+    const own = curves[k].time || time;
     context.beginPath();
     let pen = false;
     for (let i = 0; i < values.length; i++) {
       if (!Number.isFinite(values[i])) { pen = false; continue; }
-      if (pen) context.lineTo(x(time[i]), y(values[i])); else context.moveTo(x(time[i]), y(values[i]));
+      if (pen) context.lineTo(x(own[i]), y(values[i])); else context.moveTo(x(own[i]), y(values[i]));
       pen = true;
     }
     context.stroke();
   });
   context.setLineDash([]);
-  context.strokeStyle = "#1b1f24";
+  context.strokeStyle = tone("ink");
   context.lineWidth = 0.8;
   context.beginPath(); context.moveTo(x(now), TOP); context.lineTo(x(now), height - BOTTOM); context.stroke();
 }
 
-function ticks(low, high, count, whole) {
+export function ticks(low, high, count, whole) {
   const rough = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(rough));
   let step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= rough) || rough;

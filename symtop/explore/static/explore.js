@@ -1,6 +1,9 @@
 // Controls, requests to the server, and the animation.
 
-import { Sphere, plot } from "./draw.js";
+import { Sphere, plot, tone } from "./draw.js";
+import { OutcomeMap } from "./map.js";
+import { portrait } from "./portrait.js";
+import { STORIES } from "./stories.js";
 
 const $ = (id) => document.getElementById(id);
 // name, label with its unit, least, most of the slider, logarithmic; a rate's slider spans twice the scene's own value
@@ -15,7 +18,8 @@ const PLOTS = ["axis_error", "energy", "p_phi", "p_psi"];
 const values = {};
 const rows = {};
 const sphere = new Sphere($("sphere"));
-let catalogue, run = null, place = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, asking = false, stale = false, drawnAt = -1;
+const outcomes = new OutcomeMap($("map"), (step, spin) => { rows.step_size.set(step); rows.psi_dot.set(spin); edited("start"); ask(); });
+let catalogue, run = null, second = null, mapped = "", place = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, asking = false, stale = false, drawnAt = -1;
 
 function control([name, label, least, most, logarithmic], group) {
   const row = document.createElement("div");
@@ -66,18 +70,58 @@ function chooseScene(name) {
   ask();
 }
 
+// A map's ranges: steps from 1/200 to 1/2 of the scene's nutation, spins up to twice the scene's own.
+function mapRange() {
+  const { period, horizon, psi_dot: spin } = catalogue.scenes.find((scene) => scene.name === $("scene").value);
+  const [scale, most] = [period || horizon, 2 * Math.max(1, Math.abs(spin))];
+  return { step_least: scale / 200, step_most: scale / 2, spin_least: -most, spin_most: most };
+}
+
+function chooseStory(name) {
+  const story = STORIES[name];
+  $("watch").textContent = story ? story.watch : "";
+  if (!story) return;
+  $("scene").value = story.scene;
+  $("integrator").value = story.integrator;
+  $("second").value = values.second = story.second;
+  chooseScene(story.scene);
+  chooseIntegrator(story.integrator);
+  rows.step_size.set(story.step_size);
+  ask();
+}
+
+// The whole state stands in the fragment of the address: a link restores it.
+function keep() {
+  history.replaceState(null, "", `#${new URLSearchParams(Object.entries({ ...values, base: $("scene").value }).filter(([, value]) => value !== null && value !== ""))}`);
+}
+
+function restore() {
+  const kept = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
+  if (!catalogue.scenes.some((scene) => scene.name === kept.base) || !catalogue.integrators.some((entry) => entry.name === kept.integrator)) return false;
+  $("scene").value = kept.base;
+  $("integrator").value = kept.integrator;
+  $("second").value = kept.second || "";
+  values.second = $("second").value;
+  chooseScene(kept.base);
+  chooseIntegrator(kept.integrator);
+  for (const [name, row] of Object.entries(rows)) if (name in kept && Number.isFinite(+kept[name])) row.set(+kept[name]);
+  if (kept.scene !== kept.base) edited("start");
+  ask();
+  return true;
+}
+
 function chooseIntegrator(name) {
   values.integrator = name;
   const { summary, chart, control, tolerance } = chosen();
   $("summary").textContent = `${summary} (shown in the ${chart} chart)`;
-  rows.step_size.row.hidden = control !== "step_size";
-  rows.tolerance.row.hidden = control !== "tolerance";
+  const controls = [control, values.second && catalogue.integrators.find((entry) => entry.name === values.second).control];
+  for (const name of ["step_size", "tolerance"]) rows[name].row.hidden = !controls.includes(name);
   if (control === "tolerance") rows.tolerance.set(tolerance);
   ask();
 }
 
-async function post(path) {
-  return fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(values) });
+async function post(path, changes) {
+  return fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ ...values, ...changes }) });
 }
 
 // One request at a time; changes made meanwhile lead to one more, with the newest values.
@@ -89,16 +133,31 @@ async function ask() {
     $("status").textContent = `${values.integrator}: computing; the first run of a method takes longer, because it is compiled`;
   }, 400);
   try {
-    const response = await post("run");
-    const answer = await response.json();
+    keep();
+    const asked = [post("run"), values.second && post("run", { integrator: values.second })];
+    const [answer, other] = await Promise.all(asked.map(async (one) => one && (await one).json()));
     clearTimeout(patience);
-    if (answer.error) refuse(answer.error); else show(answer, began);
+    const refused = answer.error || (other && other.error);
+    if (refused) refuse(refused); else { show(answer, other, began); if (!stale) await askMap(); }
   } catch {
     clearTimeout(patience);
     refuse("the explorer's server does not answer; is symtop explore still running?");
   }
   asking = false;
   if (stale) { stale = false; ask(); }
+}
+
+// The map is asked for when something else than its own two axes has changed.
+async function askMap() {
+  const range = mapRange();
+  const question = JSON.stringify({ ...values, ...range, scene: "", step_size: 0, psi_dot: 0, tolerance: 0, second: "" });
+  if (question === mapped) return;
+  const answer = await (await post("map", range)).json();
+  mapped = question;
+  outcomes.cells = answer.error ? null : { ...answer, range, error: unpack(answer.error_rad) };
+  $("map-note").textContent = answer.error || `${values.integrator}, ${answer.columns * answer.rows} runs, ${answer.failed} ended early, ${Math.round(answer.cells_a_second / 1000)} 000 runs a second`;
+  outcomes.draw({ step: values.step_size, spin: values.psi_dot });
+  document.body.dataset.maps = +(document.body.dataset.maps || 0) + 1;
 }
 
 function unpack(text) {
@@ -114,18 +173,26 @@ function refuse(sentence) {
   document.body.dataset.answer = "refused";
 }
 
-function show(answer, began) {
+function unpacked(answer, name) {
+  const arrays = Object.fromEntries(Object.entries(answer.arrays).map(([key, text]) => [key, unpack(text)]));
+  const last = arrays.time.length - 1;
+  const trail = answer.period ? Math.ceil((8 * answer.period * last) / arrays.time[last]) : last;
+  const swing = answer.period ? (values.I1 * 2 * Math.PI * Math.PI) / (180 * answer.period) : 1e-3;  // p_theta of a nutation by a degree
+  return { ...arrays, trail, swing, degrees: arrays.theta.map((value) => (value * 180) / Math.PI), color: catalogue.integrators.find((entry) => entry.name === name).color };
+}
+
+function show(answer, other, began) {
   const before = run && run.time.length > 1 ? place / (run.time.length - 1) : 0;
-  run = Object.fromEntries(Object.entries(answer.arrays).map(([name, text]) => [name, unpack(text)]));
-  run.color = chosen().color;
+  run = unpacked(answer, values.integrator);
+  second = other ? unpacked(other, values.second) : null;
+  const taken = second && second.color === run.color;
+  for (const one of [run, second]) if (one) { const own = one.color; Object.defineProperty(one, "color", { get: () => ((one === second && taken) || own === "#000000" ? tone("ink") : own) }); }
   run.width = Math.min(0.6, 0.42 * Math.sqrt(values.I3 / values.I1));
   const last = run.time.length - 1;
-  run.trail = answer.period ? Math.ceil((8 * answer.period * last) / run.time[last]) : last;
   run.trueTheta = Array.from({ length: last + 1 }, (_, k) => {
     const [w, x, y, z] = run.truth.subarray(4 * k, 4 * k + 4);
     return (2 * Math.atan2(Math.hypot(x, y), Math.hypot(w, z)) * 180) / Math.PI;
   });
-  run.degrees = run.theta.map((value) => (value * 180) / Math.PI);
   place = before * last;
   for (const name of PLOTS) {
     const largest = answer.largest[name];
@@ -134,7 +201,16 @@ function show(answer, began) {
   const a = answer.period && answer.steps ? `, ${Math.round((answer.steps * answer.period) / run.time[last])} a nutation` : "";
   $("status").textContent = `${values.integrator}: ${answer.message}; ${answer.steps} steps${a}, ${answer.force_evaluations} force evaluations, ${answer.run_ms.toFixed(0)} ms`;
   $("status").className = answer.outcome === "ok" ? "" : "failed";
-  $("warnings").replaceChildren(...answer.warnings.map((sentence) => {
+  $("other").hidden = !other;
+  if (other) {
+    $("other").textContent = `${values.second}: ${other.message}; largest axis error ${other.largest.axis_error.toExponential(1)} rad`;
+    $("other").className = other.outcome === "ok" ? "" : "failed";
+  }
+  for (const [id, name, one] of [["swatch-1", values.integrator, run], ["swatch-2", values.second, second]]) {
+    $(id).hidden = !one;
+    $(id).textContent = name;
+  }
+  $("warnings").replaceChildren(...[...answer.warnings, ...(other ? other.warnings : [])].map((sentence) => {
     const item = document.createElement("li");
     item.textContent = sentence;
     return item;
@@ -147,11 +223,16 @@ function show(answer, began) {
   });
 }
 
+const beside = (name) => (second ? [{ values: second[name], time: second.time, color: second.color, dash: [6, 3] }] : []);
+
 function drawPlots() {
   if (!run) return;
   const now = run.time[Math.round(place)] || 0;
-  plot($("plot-theta"), run.time, [{ values: run.trueTheta, color: "#9a9a9a", dotted: true }, { values: run.degrees, color: run.color }], false, now);
-  for (const name of PLOTS) plot($(`plot-${name}`), run.time, [{ values: run[name], color: run.color }], true, now);
+  plot($("plot-theta"), run.time, [{ values: run.trueTheta, color: "#9a9a9a", dash: [2, 3] }, { values: run.degrees, color: run.color }, ...beside("degrees")], false, now);
+  for (const name of PLOTS) plot($(`plot-${name}`), run.time, [{ values: run[name], color: run.color }, ...beside(name)], true, now);
+  for (const [id, one] of [["swatch-1", run], ["swatch-2", second]]) if (one) $(id).style.borderColor = one.color;
+  portrait($("portrait"), second ? [run, second] : [run]);
+  outcomes.draw({ step: values.step_size, spin: values.psi_dot });
   drawnAt = performance.now();
 }
 
@@ -166,7 +247,7 @@ function frame(instant) {
     place = Math.min(place, last);
     $("clock").value = place / last;
     $("now").textContent = `${run.time[Math.round(place)].toFixed(2)} s`;
-    sphere.draw(run, place);
+    sphere.draw(run, place, second);
     if (playing && instant - drawnAt > 100) drawPlots();
   }
   requestAnimationFrame(frame);
@@ -193,7 +274,17 @@ async function begin() {
     group.label = family;
     for (const entry of catalogue.integrators) if (entry.family === family) group.append(new Option(entry.name, entry.name));
     $("integrator").append(group);
+    $("second").append(group.cloneNode(true));
   }
+  for (const name of Object.keys(STORIES)) $("story").append(new Option(name, name));
+  $("story").addEventListener("change", () => chooseStory($("story").value));
+  $("second").addEventListener("change", () => { values.second = $("second").value; chooseIntegrator(values.integrator); });
+  $("sphere").addEventListener("keydown", (event) => {
+    const turn = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowDown: [0, 0.1], ArrowUp: [0, -0.1] }[event.key];
+    if (turn) { event.preventDefault(); sphere.turn(...turn); }
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawPlots);
+  window.addEventListener("hashchange", restore);
   $("scene").addEventListener("change", () => chooseScene($("scene").value));
   $("reset").addEventListener("click", () => chooseScene($("scene").value));
   $("integrator").addEventListener("change", () => chooseIntegrator($("integrator").value));
@@ -205,8 +296,8 @@ async function begin() {
   if (!playing) $("play").textContent = "Play";
   rows.tolerance.set(1e-6);
   values.integrator = catalogue.integrators[0].name;
-  chooseScene(catalogue.scenes[0].name);
-  chooseIntegrator(values.integrator);
+  values.second = "";
+  if (!restore()) { chooseScene(catalogue.scenes[0].name); chooseIntegrator(values.integrator); }
   requestAnimationFrame(frame);
 }
 

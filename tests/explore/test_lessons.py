@@ -1,0 +1,137 @@
+"""What a teacher shows: the map of outcomes, the stories, the link that restores a state; and a page under load."""
+
+import base64
+import http.client
+import json
+import socket
+import struct
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symtop.base.validate import SymtopError
+from symtop.explore import answers, maps
+from symtop.explore.server import address, serve
+from tests.browser import Browser
+from tests.explore.test_explore import fields
+
+RANGE = {"step_least": 0.01, "step_most": 0.6, "spin_least": -4.0, "spin_most": 4.0}
+
+
+@pytest.fixture(scope="module")
+def server():
+    running = serve()
+    threading.Thread(target=running.serve_forever, daemon=True).start()
+    yield running
+    running.shutdown()
+    running.server_close()
+
+
+def test_a_cell_of_the_map_is_the_run_that_a_click_asks_for():
+    asked = maps.grid(fields(**RANGE))
+    _, steps, spins = asked
+    found = np.frombuffer(base64.b64decode(maps.answer(asked)["error_rad"]), "<f4").reshape(maps.ROWS, maps.COLUMNS)
+    early = 0
+    for row, column in ((0, 0), (8, 10), (20, 20), (31, 47), (16, 47)):
+        alone = answers.answer(answers.setup(fields(step_size=steps[column], psi_dot=spins[row])))
+        early += alone["outcome"] != "ok"
+        assert np.isnan(found[row, column]) == (alone["outcome"] != "ok")
+        if alone["outcome"] == "ok":  # nine samples of the many of a run
+            assert 0.2 * alone["largest"]["axis_error"] < found[row, column] < 1.001 * alone["largest"]["axis_error"]
+    assert 0 < early < 5
+    assert found[8, 10] != pytest.approx(found[20, 20], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"integrator": "rk45"}, "integrator must be one with a step"), ({"step_least": 0.7}, "must not be empty"),
+        ({"spin_most": None}, "spin_most"), ({"step_least": 1e-5}, "20000000 steps"),
+    ],
+)  # fmt: skip
+def test_a_map_that_cannot_be_is_refused_in_a_sentence(changes, word):
+    with pytest.raises(SymtopError, match=word):
+        maps.grid(fields(**RANGE | changes))
+
+
+def answered(browser, selector, value):
+    count = browser.evaluate("+(document.body.dataset.answers || 0)")
+    browser.set(selector, value)
+    browser.wait_for(f"+document.body.dataset.answers > {count}")
+    browser.wait_for("!document.querySelector('#status').textContent.includes('computing')")
+
+
+def text(browser, name):
+    return browser.evaluate(f"document.querySelector('#{name}').textContent")
+
+
+def test_a_story_a_cell_and_a_link(server):
+    with Browser(1280, 900) as browser:
+        browser.open(address(server))
+        browser.wait_for("+document.body.dataset.maps > 0")
+        answered(browser, "#story", "resonance")
+        browser.wait_for("document.querySelector('#status').textContent.startsWith('stormer-verlet: reached t = 20')")
+        answered(browser, "#step_size", 0.21)  # the step that the story names crosses the failure
+        browser.wait_for("document.querySelector('#status').className === 'failed'")
+        assert text(browser, "other").startswith("strang: reached t = 20")
+        state = browser.evaluate("location.href")
+        kept = "[...document.querySelectorAll('input[type=number], #scene, #integrator, #second')].map((c) => c.value)"
+        before, status = browser.evaluate(kept), text(browser, "status").split(";")[0]
+        answered(browser, "#story", "loop")
+        assert browser.evaluate(kept) != before
+        browser.evaluate(f"location.href = {json.dumps(state)}")
+        browser.wait_for(f"document.querySelector('#status').textContent.startsWith({json.dumps(status)})")
+        assert browser.evaluate(kept) == before
+        browser.wait_for("document.querySelector('#map-note').textContent.startsWith('stormer-verlet')")
+        spin = browser.evaluate("document.querySelector('#psi_dot').value")
+        key = "document.querySelector('#map').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowDown'}))"
+        browser.evaluate(key)
+        assert browser.evaluate("+document.querySelector('#psi_dot').value") < float(spin)
+        reached = "[...document.querySelectorAll('select, input, button, canvas[tabindex]')]"
+        assert browser.evaluate(f"{reached}.every((c) => c.tabIndex === 0)")
+        for scheme in ("light", "dark"):
+            browser._send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+            for width in (1280, 390):
+                browser.resize(width, 900)
+                assert browser.too_wide == 0
+        assert browser.problems == []
+        assert browser.outside() == []
+
+
+@pytest.mark.slow
+def test_the_page_answers_under_200_requests_200_that_leave_and_20_slow_ones(server, capfd):
+    body = json.dumps(fields()).encode()
+    head = "POST /run HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    head += f"Content-Length: {len(body)}\r\n\r\n"
+
+    def ask(_):
+        connection = http.client.HTTPConnection("127.0.0.1", server.server_address[1], timeout=60)
+        try:
+            connection.request("POST", "/run", body, {"Content-Type": "application/json"})
+            with connection.getresponse() as response:
+                return response.status, json.loads(response.read())["outcome"]
+        finally:
+            connection.close()
+
+    def leave(_):
+        with socket.create_connection(server.server_address) as browser:
+            browser.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            browser.sendall(head.encode() + body)
+
+    slow = [socket.create_connection(server.server_address) for _ in range(20)]
+    for one in slow:
+        one.sendall(head.encode() + body[:10])
+    sizes = []
+    with ThreadPoolExecutor(200) as pool:
+        for _ in range(3):
+            gone = pool.map(leave, range(200))
+            assert set(pool.map(ask, range(200))) == {(200, "ok")}
+            list(gone)
+            sizes.append(int(Path("/proc/self/statm").read_text().split()[1]))  # pages in memory now, not the peak
+    for one in slow:
+        one.close()
+    assert capfd.readouterr().err.count("\n") < 10
+    assert sizes[2] < 1.05 * sizes[1]  # the first round compiles and fills caches
