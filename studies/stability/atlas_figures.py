@@ -23,6 +23,7 @@ RASTER = {"small": (55, 90), "enlarged": (150, 220)}  # pixels of a map: hatches
 SHADE = 0.72  # a hatch line is the same colour, darker
 DARK = ("not_finite", "not_converged", "accurate", "left_chart")  # colours that need white letters
 CONTROLS = {"step_size": "step (nutation periods)", "tolerance": "tolerance", "none": "nothing to set"}
+SHORT = {"step_size": "step / nutation", "tolerance": "tolerance"}  # below a small map
 HATCHES = {  # of the legend, and in the map: which pixels, by row and column
     "left_chart": ("////", lambda row, column: (row + column) % 10 == 0),
     "wrong_regime": ("\\\\\\\\", lambda row, column: (row - column) % 10 == 0),
@@ -74,16 +75,17 @@ def _name_regions(axis: Any, outcome: NDArray[np.uint8], extent: Sequence[float]
         word = VERDICTS[index].replace("_", " ")
         regions, _ = label(outcome == index)
         largest = 1 + int(np.argmax(np.bincount(regions.ravel())[1:]))
-        shape = (1.0 / height, 0.35 / width)  # as the text sees a cell: it is wider than high
+        shape = (1.0 / height, 0.55 / width)  # as the text sees a cell: it is wider than high
         depth = distance_transform_edt(np.pad(regions == largest, 1), sampling=shape)[1:-1, 1:-1]
         row, column = np.unravel_index(int(np.argmax(depth)), depth.shape)
-        if depth[row, column] < 0.035:
+        if depth[row, column] < 0.05:
             continue
         half = 0.012 * len(word)  # of the text's width, in units of the map's
         x, y = np.clip((column + 0.5) / width, half, 1.0 - half), np.clip((row + 0.5) / height, 0.07, 0.93)
         axis.text(
             extent[0] + x * (extent[1] - extent[0]), extent[2] + y * (extent[3] - extent[2]), word, ha="center",
             va="center", fontsize=LEAST_TEXT, weight="bold", color="white" if VERDICTS[index] in DARK else "black",
+            zorder=5, bbox={"facecolor": OUTCOME_COLORS[VERDICTS[index]], "edgecolor": "none", "pad": 0.8},
         )  # fmt: skip
 
 
@@ -95,10 +97,10 @@ def _edges(values: NDArray[np.float64]) -> tuple[float, float]:
     return float(np.log10(values[0]) - half), float(np.log10(values[-1]) + half)
 
 
-def _ticks(ends: tuple[float, float]) -> tuple[range, list[str]]:
+def _ticks(ends: tuple[float, float], most: int) -> tuple[range, list[str]]:
     """Places and names of the powers of ten between two decimal logarithms."""
     powers = range(int(np.ceil(ends[0] - 1e-9)), int(np.floor(ends[1] + 1e-9)) + 1)
-    shown = powers[:: 1 if len(powers) <= 5 else 2 if len(powers) <= 8 else 3]
+    shown = powers[:: -(-len(powers) // most)]
     return shown, [f"{10.0**k:g}" if -3 <= k <= 2 else rf"$10^{{{k}}}$" for k in shown]
 
 
@@ -108,8 +110,9 @@ def draw_map(axis: Any, one: OutcomeMap, size: str = "enlarged") -> None:
     image = painted(one.outcome, size)
     axis.imshow(image, origin="lower", extent=(*x, *y), aspect="auto", interpolation="nearest")
     axis.grid(visible=False)
-    axis.set_xticks(*(([], []) if one.control == "none" else _ticks(x)))
-    axis.set_yticks(*_ticks(y))
+    most = 5 if size == "enlarged" else 3
+    axis.set_xticks(*(([], []) if one.control == "none" else _ticks(x, most)))
+    axis.set_yticks(*_ticks(y, most))
     if size == "enlarged":
         _name_regions(axis, one.outcome, (*x, *y))
 
@@ -168,7 +171,8 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
             axis.set_yticklabels([])
         if k + columns < len(names):
             axis.set_xticklabels([])
-    figure.supxlabel(CONTROLS[shown[names[0]].control], fontsize=8.0)
+        else:
+            axis.set_xlabel(SHORT[one.control], fontsize=LEAST_TEXT, labelpad=1.0)
     figure.supylabel(AXES[over], fontsize=8.0)
     _key(figure, drawn)
     return figure

@@ -8,7 +8,7 @@ from symtop.report.style import headline
 from symtop.runner.study import Picture
 
 from . import mechanism_figures
-from .atlas import families, maps
+from .atlas import families, maps, methods_of
 from .atlas_figures import by_area, enlarged, small_maps
 from .atlas_words import advice, caption, ends
 
@@ -33,7 +33,8 @@ def _pages(data: xr.Dataset, scene: str, over: str, name: str) -> Iterator[Pictu
             continue
         names = by_area(shown)
         figure = small_maps(data, scene, names, over)
-        best, worst = ends(shown)
+        closed = [row for row, one in methods_of(data).items() if one.exact_steps]  # accurate by construction
+        best, worst = ends({row: one for row, one in shown.items() if row not in closed} or shown)
         place = "past a pole" if over == "gap" else f"on {scene} with any spin"
         headline(figure, f"{title.capitalize()} that stay accurate {place}: most with {best}, fewest with {worst}")
         alt = f"Small maps of outcomes, in the order of their accurate share: {', '.join(names)}."
@@ -43,6 +44,8 @@ def _pages(data: xr.Dataset, scene: str, over: str, name: str) -> Iterator[Pictu
 def _enlarged(data: xr.Dataset, family: str) -> Picture:
     shown = maps(data, family)
     name = FAMILIAR if FAMILIAR in shown else by_area(shown)[0]
-    figure = enlarged(data, family, name, f"{name}: {advice(data, family)[name].fails}")
+    right, silent = shown[name].shares[0], shown[name].silent
+    message = f"{name} is accurate in {right:.0%} of its map; {silent:.0%} of its wrong runs end without an error"
+    figure = enlarged(data, family, name, message)
     text = f"How to read a map of the atlas. {advice(data, family)[name].sentence} {caption(data, family, [name])}"
     return Picture(f"atlas-{family}-enlarged", figure, text, f"Two maps of the outcomes of {name}, enlarged.")

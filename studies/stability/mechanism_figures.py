@@ -12,7 +12,7 @@ import xarray as xr
 from symtop.methods.registry import split_name
 from symtop.methods.splitting_space import cayley_sleeps_from, strang_sleeps_from
 from symtop.report.figures import name_ends
-from symtop.report.style import BLUE, GREEN, GREY, LEAST_TEXT, VERMILLION, headline, ink, line, panels
+from symtop.report.style import BLUE, GREEN, GREY, LEAST_TEXT, VERMILLION, headline, line, panels
 from symtop.runner.study import Picture
 
 from . import messages
@@ -25,7 +25,6 @@ SHOWN = (
     "cayley[axis]", "gauss-4[angles]", "gauss-4[axis]", "rk4[angles]", "rk4[axis]",
 )  # fmt: skip
 PLACED = ("stormer-verlet[angles]", "midpoint[angles]", "rk4[axis]", "strang[axis]", "gauss-4[axis]")
-SLEEPERS = ("strang", "cayley", "midpoint", "gauss-4", "yoshida-4")
 GUIDE = {"color": GREY, "lw": 0.9, "zorder": 1}
 FLOOR = 1e-16  # what is smaller is drawn here
 NOTE = {"fontsize": LEAST_TEXT, "color": "#444444"}
@@ -69,7 +68,7 @@ def _pole(axis: Any, data: xr.Dataset) -> None:
         last = int(np.flatnonzero(np.isfinite(y))[-1])
         ends[name] = float(x[last]), float(y[last]), str(marks["color"])
     axis.set(xscale="log", yscale="log", xlabel=r"gap $\delta$ to the pole (rad)", ylabel="largest axis error (rad)")
-    axis.text(0.02, 0.98, "x: run ended early", transform=axis.transAxes, va="top", **NOTE)
+    axis.text(0.02, 0.9, "x: run ended early", transform=axis.transAxes, va="top", **NOTE)
     name_ends(axis, ends)
 
 
@@ -93,7 +92,7 @@ def _resonance(axis: Any, data: xr.Dataset) -> None:
 
 
 def _sleep(axis: Any, data: xr.Dataset) -> None:
-    rows = [str(name) for name in data["integrator"].values if split_name(str(name))[0] in SLEEPERS]
+    rows = [str(name) for name in data["integrator"].values if split_name(str(name))[0] in messages.SLEEPERS]
     for name, cell in _each(data, Column.SLEEPING_THRESHOLD, rows):
         x, y = cell[Column.SLEEPING_STEP].values, cell[Column.SLEEPING_THRESHOLD].values
         axis.plot(x, y, **(line(name, 1.4) | {"ls": "none"}), label=name)
@@ -122,6 +121,7 @@ def _separatrix(axis: Any, data: xr.Dataset) -> None:
 
 
 def _sampling(axis: Any, data: xr.Dataset) -> None:
+    ends = {}
     for name in map(str, data["integrator"].values):
         once, every = (float(data[key].sel(integrator=name)) for key in (Column.ENERGY_ONCE, Column.ENERGY_EVERY))
         marks = line(name)
@@ -131,10 +131,7 @@ def _sampling(axis: Any, data: xr.Dataset) -> None:
         size = 1.3 * marks["ms"] if name in PLACED else 2.5
         axis.plot(every, max(once, FLOOR), marks["marker"], fillstyle=marks["fillstyle"], ms=size, **look)
         if name in PLACED:
-            axis.annotate(
-                name, (every, max(once, FLOOR)), (5, 0), textcoords="offset points", va="center",
-                fontsize=LEAST_TEXT, color=ink(str(marks["color"])),
-            )  # fmt: skip
+            ends[name] = every, max(once, FLOOR), str(marks["color"])
     axis.axhspan(0.0, LEAST_SAMPLED, color=GREY, alpha=0.15, lw=0)
     axis.plot([1e-15, 1e-2], [1e-15, 1e-2], **GUIDE)
     axis.set(xscale="log", yscale="log", ylabel="the same, sampled once a nutation")
@@ -142,6 +139,7 @@ def _sampling(axis: Any, data: xr.Dataset) -> None:
     axis.annotate("below rounding", (0.99, LEAST_SAMPLED), (0, -2), xycoords=("axes fraction", "data"),
                   textcoords="offset points", ha="right", va="top", **NOTE)  # fmt: skip
     axis.annotate("equal", (1e-3, 1e-3), (-4, 2), textcoords="offset points", ha="right", **NOTE)
+    name_ends(axis, ends)
 
 
 def _solver(axis: Any, data: xr.Dataset) -> None:

@@ -241,7 +241,7 @@ def least_text(figure: Any) -> tuple[float, str]:
 
 def headline(figure: Any, message: str) -> None:
     """Write a figure's one message above it."""
-    lines = textwrap.wrap(message, round(13.2 * figure.get_figwidth()))
+    lines = textwrap.wrap(message, round(12.3 * figure.get_figwidth()))
     figure.suptitle("\n".join(lines), x=0.01, ha="left", weight="bold")
 
 
