@@ -5,13 +5,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.ticker import NullFormatter
 
-from symtop.measure.errors import QUANTITIES
 from symtop.measure.growth import tops
 from symtop.methods.registry import split_name
 from symtop.report.figures import SMALLEST, error_band
-from symtop.report.style import GREY, grid, headline, legend_below, line, panels
+from symtop.report.style import GREY, few_ticks, grid, headline, legend_below, line, number, panels
 from symtop.runner.study import Picture
 
 from .tables import (
@@ -58,7 +56,8 @@ def _line(axis: Any, name: str, label: str, x: Any, y: Any) -> None:
 
 def _named(data: xr.Dataset) -> Picture:
     """Four panels on one scene: error against the step, against the tolerance, against work; energy over time."""
-    names = [name for name in map(str, data["integrator"].values) if split_name(name)[0] in NAMED]
+    named = [name for name in map(str, data["integrator"].values) if split_name(name)[0] in NAMED]
+    names = [name for name in named if name.replace("[attitude]", "[axis]") not in named or "[attitude]" not in name]
     part = data.sel(integrator=names).isel(scene=0)
     scene = str(part["scene"].values)
     labels = merged(data.sel(integrator=names), MAIN)
@@ -86,24 +85,22 @@ def _named(data: xr.Dataset) -> Picture:
     work.set(xlabel="force evaluations per nutation", title="error against cost")
     energy.set(xscale="log", yscale="log", xlabel="nutations", ylabel="relative change of the energy")
     energy.set_title(f"energy over time ({HISTORY_STEPS:g} steps a nutation)")
-    for axis in axes.flat:
-        axis.xaxis.set_minor_formatter(NullFormatter())
+    few_ticks(*axes.flat)
     paid_least = least_work(part, scene, labels)
     if len(paid_least) > 1:
         (best, least), (worst, most) = paid_least[0], paid_least[-1]
-        headline(figure, f"{TARGET:g} rad on {scene}: {best} needs {least:.3g} force evaluations a nutation, {worst} "
-                         f"{most:.2g}")  # fmt: skip
+        paid_text = f"{best} needs {number(least)} force evaluations a nutation, {worst} {number(most)}"
+        headline(figure, f"{number(TARGET)} rad on {scene}: {paid_text}")
     legend_below(figure, [work])
     listed = ", ".join(f"{name} {value:.3g}" for name, value in paid_least)
     tolerance = sorted({f"{value:.1e}" for value in np.ravel(part.get("history_tolerance", np.nan)) if value > 0.0})
     caption = (
-        f"The five methods that everybody knows on {scene}, chart in the name, to t = {float(part['horizon'].max()):g}. "
-        "Largest axis error at every step, at every tolerance, and both against force evaluations per nutation, on one "
-        "axis of work: a line of slope -2 costs ten times the work for a hundredth of the error; a Taylor step of "
-        f"order n counts n evaluations. Last: the largest change of the energy, relative to E0 - min V, at "
-        f"{HISTORY_STEPS:g} steps a nutation (adaptive: tolerance {' or '.join(tolerance)}), with each window of time "
-        f"as a point. For an error below {TARGET:g} the cheapest run of each takes: {listed}. Grey band: below the "
-        "error bound of the reference."
+        f"The five methods that everybody knows on {scene}, chart in the name, to t = {float(part['horizon'].max()):g}."
+        " Largest axis error at every step, at every tolerance, and both against force evaluations per nutation, on "
+        "one axis of work: a line of slope -2 costs ten times the work for a hundredth of the error; a Taylor step of "
+        "order n counts n evaluations. Last: the largest change of the energy, relative to E0 - min V, in each window "
+        f"of time, at {HISTORY_STEPS:g} steps a nutation (adaptive: tolerance {' or '.join(tolerance)}). For an error "
+        f"below {TARGET:g} the cheapest run of each takes: {listed}. Grey band: below the error bound of the reference."
     )
     alt = "Four log-log plots of the five named methods: error against step, tolerance and work, energy over time."
     return Picture("named-methods", figure, caption, alt)
@@ -113,7 +110,8 @@ def _history(axis: Any, name: str, label: str, cell: xr.Dataset) -> None:
     time, change = cell["history_time"].values, cell["history_energy"].values
     good = np.isfinite(time) & np.isfinite(change) & (time > 0.0)
     if good.any():
-        x, y = tops(time[good], np.maximum(change[good], SMALLEST), np.log10(time[good][-1] / time[good][0]), WINDOWS)
+        decades = np.log10(time[good][-1] / max(time[good][0], 1.0))
+        x, y = tops(time[good], np.maximum(change[good], SMALLEST), decades, WINDOWS)
         axis.plot(x, y, **line(name), label=label)
 
 
@@ -161,13 +159,16 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
                 place += 1
         axis.set(xscale="log", yticks=places, yticklabels=ticks, ylim=(most - 0.4, -0.6))
         axis.tick_params(axis="y", labelsize=7.0, length=0)
-        axis.set_xlabel("force evaluations a nutation")
         axis.grid(visible=False, axis="y")
     best = min(middle, key=lambda name: middle[name])
     firsts = [block[0] for block in blocks if declared_order(block[0])]
     low = min(firsts, key=lambda name: declared_order(name) or 0)
-    headline(figure, f"The best of order {declared_order(low)}, {low}, needs {middle[low] / middle[best]:.2g} times the "
-                     f"work of {best} for {TARGET:g} rad")  # fmt: skip
+    figure.supxlabel(f"force evaluations a nutation for an axis error of {number(TARGET)} rad", fontsize=8.0)
+    orders_named = [f"{name} (order {declared_order(name)})" for name in (low, best)]
+    times = number(middle[low] / middle[best])
+    headline(
+        figure, f"The best of the lowest order, {orders_named[0]}, takes {times} times the work of {orders_named[1]}"
+    )
     caption = (
         f"Efficiency constants: force evaluations per nutation that the law error = C h^p of each row foretells for an "
         f"axis error of {TARGET:g} rad {HORIZON}; p is the declared order, C the median of error / h^p over the steps "
@@ -193,7 +194,7 @@ def _by_tolerance(data: xr.Dataset) -> Picture:
     """Error of the adaptive rows against their tolerance, with the line where they are equal."""
     fitted, labels = tolerance_fits(data), merged(data, MAIN)
     scenes = [str(name) for name in data["scene"].values]
-    figure, axes = grid(len(scenes), min(2, len(scenes)), ("tolerance", f"largest {QUANTITIES[MAIN]}"), sharey=True)
+    figure, axes = grid(len(scenes), min(2, len(scenes)), ("tolerance", "largest axis error (rad)"), sharey=True)
     shown = [name for name in labels if name in SHOWN_ADAPTIVE]
     ratios = []
     for scene, axis in zip(scenes, axes, strict=True):
@@ -213,16 +214,17 @@ def _by_tolerance(data: xr.Dataset) -> Picture:
         axis.set(xscale="log", yscale="log", title=scene)
     legend_below(figure, axes)
     middle = float(np.median(ratios)) if ratios else np.nan
-    headline(figure, f"A tolerance bounds a step, not the run: the axis error is {middle:.2g} times it in the median, "
-                     f"up to {max(ratios, default=np.nan):.0e} times")  # fmt: skip
+    few_ticks(*axes)
+    most = number(max(ratios, default=np.nan))
+    headline(figure, f"Axis errors of a run are {number(middle)} times the tolerance in the median, up to {most} times")
     slopes = {name: [fit.slope for pair, fit in fitted.items() if pair[1] == name and np.isfinite(fit.slope)]
               for name in labels}  # fmt: skip
     listed = ", ".join(f"{name} {min(values):.2f} to {max(values):.2f}" for name, values in slopes.items() if values)
     caption = (
         f"Largest axis error {HORIZON} of the adaptive methods, method[chart], against the tolerance that was asked "
         "for; relative and absolute tolerance of the Runge-Kutta methods are equal. Lines above the dashed diagonal "
-        f"lose more than they were asked for. Exponents x of error ~ tolerance^x: {listed}. Open markers: Euler angles; "
-        "dotted lines: plain Python."
+        f"lose more than they were asked for. Exponents x of error ~ tolerance^x: {listed}. Open markers: Euler "
+        "angles; dotted lines: plain Python."
     )
     alt = "Log-log plots of axis error against tolerance for the adaptive methods, with the diagonal as a guide."
     return Picture("tolerance", figure, caption, alt)

@@ -239,16 +239,23 @@ def least_text(figure: Any) -> tuple[float, str]:
     return min(sizes, default=(np.inf, ""))
 
 
+def number(value: float, digits: int = 2) -> str:
+    """A number of a title: ``1e-6``, ``0.012``, ``340``."""
+    text = f"{value:.{digits}g}" if not 10.0**digits <= abs(value) < 1e4 else f"{value:.0f}"
+    mantissa, mark, power = text.partition("e")
+    return f"{mantissa}e{int(power)}" if mark else text
+
+
 def headline(figure: Any, message: str) -> None:
     """Write a figure's one message above it."""
-    lines = textwrap.wrap(message, round(12.3 * figure.get_figwidth()))
+    lines = textwrap.wrap(message, round(12.3 * figure.get_figwidth()), break_on_hyphens=False)
     figure.suptitle("\n".join(lines), x=0.01, ha="left", weight="bold")
 
 
 def panels(rows: int, columns: int, width: float = WIDTH, height: float = 2.3, **options: Any) -> Any:
     """A grid of axes, always two-dimensional, with room for a title above and a legend below; sizes in inches."""
     use()
-    return plt.subplots(rows, columns, figsize=(width, height * rows + 0.6), squeeze=False, **options)
+    return plt.subplots(rows, columns, figsize=(width, height * rows + 0.8), squeeze=False, **options)
 
 
 def grid(count: int, columns: int, labels: tuple[str, str] = ("", ""), **options: Any) -> Any:
@@ -267,6 +274,44 @@ def grid(count: int, columns: int, labels: tuple[str, str] = ("", ""), **options
     for axis in used[::columns]:
         axis.set_ylabel(labels[1])
     return figure, used
+
+
+def lead(count: int, labels: tuple[str, str], height: float = 2.9, small: float = 1.3, columns: int = 4) -> Any:
+    """A figure of one wide panel and, below it, `count` - 1 small ones with the same axes, all logarithmic.
+
+    Returns the figure and its panels (one-dimensional). Limits that are set on the first hold for all.
+    """
+    use()
+    rows = -(-(count - 1) // columns)
+    figure = plt.figure(figsize=(WIDTH, height + small * rows + 0.5))
+    parts = figure.subfigures(1 + bool(rows), 1, height_ratios=[height, small * rows + 0.2][: 1 + bool(rows)])
+    first = np.ravel(parts)[0].subplots()
+    others: list[Any] = []
+    if rows:
+        below = parts[1].subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        below[0, 0].sharex(first)
+        below[0, 0].sharey(first)
+        others = list(below.flat[: count - 1])
+        for axis in below.flat[count - 1 :]:
+            axis.set_visible(False)
+        for axis in others[-columns:]:
+            axis.tick_params(which="both", labelbottom=True)
+    for axis in (first, *others):
+        axis.set(xscale="log", yscale="log")
+        axis.tick_params(which="minor", length=0)
+    first.set(xlabel=labels[0], ylabel=labels[1])
+    return figure, np.array([first, *others])
+
+
+def few_ticks(*axes: Any, most: int = 6) -> None:
+    """At most so many labelled powers of ten on the logarithmic axes, and none of the lesser ticks is labelled."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    for panel in axes:
+        for one in (panel.xaxis, panel.yaxis):
+            if one.get_scale() == "log":
+                one.set_major_locator(LogLocator(numticks=most + 1))
+                one.set_minor_formatter(NullFormatter())
 
 
 def legend_below(figure: Any, axes: Any) -> None:
