@@ -34,16 +34,14 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     scenes = [str(name) for name in data["scene"].values]
     known = summary.groups(data)
     names = [name for name in dict.fromkeys([*LOOKS, *known]) if name in known and name not in LEFT_OUT]
-    figure, axes = style.panels(
-        len(NAMES), len(scenes), width=max(9.6, 4.6 * len(scenes)), height=3.7, sharey=True, sharex=True
-    )
+    figure, axes = style.panels(len(NAMES), len(scenes), height=2.5, sharey=True, sharex=True)
     for row, (call, words) in zip(axes, NAMES.items(), strict=True):
         for axis, scene in zip(row, scenes, strict=True):
             for name in names:
                 _front(axis, data.sel(call=call, scene=scene, integrator=known[name]), name)
             for target in JUDGED:
                 axis.axhline(target, color=style.GREY, lw=0.8, ls=(0, (5, 3)), zorder=0)
-            axis.set(xscale="log", yscale="log", title=f"{words}, {scene}", ylim=(3e-12, 3.0))
+            axis.set(xscale="log", yscale="log", title=f"{words}\n{scene}", ylim=(3e-12, 3.0))
             axis.label_outer()
         row[0].set_ylabel(f"largest axis error over\n{PERIODS:g} nutations (rad)")
     for axis in axes[-1]:
