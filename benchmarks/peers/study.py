@@ -46,7 +46,13 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         row[0].set_ylabel(f"largest axis error over\n{PERIODS:g} nutations (rad)")
     for axis in axes[-1]:
         axis.set_xlabel("wall time of one call (s)")
-    style.legend_below(figure, axes)
+    style.few_ticks(*axes.flat, most=5)
+    theirs = _gain(data, known).partition(",")[0]
+    style.headline(figure, theirs or "Axis error against time, the best that each library offers")
+    for axis in axes[:, -1]:
+        drawn = {line.get_label(): line for line in axis.get_lines() if line.get_label() in names}
+        ends = {label: np.transpose(line.get_data())[-1] for label, line in drawn.items() if len(line.get_xdata())}
+        figures.name_ends(axis, {label: (*map(float, end), drawn[label].get_color()) for label, end in ends.items()})
     caption = (
         "Above, the call that a user types; below, the inner loop alone; the same runs at the same settings in both. "
         f"{_gain(data, known)}Each curve is the best that a library offers: for every accuracy its fastest method and "

@@ -31,10 +31,7 @@ from .words import spans
 
 TARGET = 1e-6  # rad, the axis error at which costs are compared
 HORIZON = "over 8 nutations (spheroid: to t = 8)"
-SHOWN_ADAPTIVE = (
-    "rk45[angles]", "rk45-compiled[axis]", "dop853[angles]", "lsoda[angles]", "radau[angles]", "taylor[axis]",
-    "taylor-longdouble[axis]", "series-adaptive[axis]",
-)  # fmt: skip
+SHOWN_ADAPTIVE = ("rk45[angles]", "dop853[angles]", "lsoda[angles]", "taylor[axis]", "series-adaptive[axis]")
 WINDOWS = 18  # of time, in each of which the largest energy error is drawn
 
 
@@ -77,6 +74,7 @@ def _named(data: xr.Dataset) -> Picture:
         _line(work, name, label, np.where(cells > 0.0, paid, np.nan), error)
         if "history_time" in cell and np.isfinite(cell["history_time"]).any():
             _history(energy, name, label, cell)
+    energy.set_visible(bool(energy.get_lines()))
     ends = np.array([1e-14, LARGE])
     tolerances.plot(ends, ends, color=GREY, lw=0.9, zorder=1)
     tolerances.text(1e-11, 2e-12, "error = tolerance", fontsize=7.0, color="#444444")
@@ -170,8 +168,8 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
         figure, f"The best of the lowest order, {orders_named[0]}, takes {times} times the work of {orders_named[1]}"
     )
     caption = (
-        f"Efficiency constants: force evaluations per nutation that the law error = C h^p of each row foretells for an "
-        f"axis error of {TARGET:g} rad {HORIZON}; p is the declared order, C the median of error / h^p over the steps "
+        "Efficiency constants: force evaluations per nutation that the law error = C h^p of each row, method[chart], "
+        f"foretells for an axis error of {TARGET:g} rad {HORIZON}; p is the declared order, C the median of error / h^p over the steps "
         f"of the fit. Bar: from the least to the largest of the scenes {', '.join(scenes)}; marker: their median, open "
         f"if {TARGET:g} rad lies outside the errors that were fitted on most of them, so that it is foreseen. Charts "
         "of a method with the same errors share a line. Rows without an order to be trusted are in the table only. "

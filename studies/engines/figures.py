@@ -57,9 +57,6 @@ def draw_error(data: xr.DataTree) -> Picture:
     floors = {row: words.facts(data, row) for row in names if words.single(row) and row not in words.without_term(data)}
     for row, known in floors.items():
         axis.plot(known.best_count, known.best, marker="v", ms=5, color=color(data, row), mec="white", zorder=4)
-    dashed = {"color": COLORS[1], "ls": (0, (4, 2))}
-    axis.plot([], [], marker="v", ms=5, mec="white", label="single precision and its best step", **dashed)
-    axis.legend(loc="lower right", frameon=False)
     period = scene(words.SLOW).nutation_period
     for rate in FREQUENCIES:
         axis.axvline(rate * period, color=style.GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)

@@ -68,7 +68,7 @@ def draw_orders(data: xr.Dataset) -> Picture:
         column[1].set_xlabel("step")
     axes[0, 0].set_ylabel("largest error of x")
     axes[1, 0].set_ylabel("relative error of\nthe slow exponent")
-    style.few_ticks(*axes.flat, most=3)
+    style.few_ticks(*axes.flat, most=2)
     style.legend_below(figure, axes)
     halves = [order(data, "damping-2", m, Column.EXPONENT_ERROR).slope for m in ("trapezoidal", ONE_SIDED)]
     style.headline(figure, f"At critical damping the slow exponent is right to order {halves[0]:.1f} (trapezoidal) and "

@@ -107,7 +107,8 @@ def caption(data: xr.Dataset, scene: str, names: Sequence[str]) -> str:
         else "No run ends early: an inaccurate run raises no error here."
     )
     what = (
-        "one fall (one nutation period) past a pole that the axis misses by 1.1 delta (rad)" if scene == "grazing"
+        "one fall (one nutation period) of the scene grazing past a pole that the axis misses by 1.1 delta (rad)"
+        if scene == "grazing"
         else f"the scene {scene} over {PERIODS:g} nutation periods with another spin r and everything else held fixed; "
         "r = 1 is the spin from which a top sleeps (spins upright and stays so)"
     )  # fmt: skip

@@ -10,7 +10,19 @@ import xarray as xr
 from symtop.measure import ranking
 from symtop.measure.phase import PARTS
 from symtop.report.figures import error_band, name_ends, pareto
-from symtop.report.style import BLACK, GREY, few_ticks, grid, headline, lead, legend_below, line, look, number
+from symtop.report.style import (
+    BLACK,
+    GREY,
+    few_ticks,
+    grid,
+    headline,
+    lead,
+    legend_below,
+    line,
+    look,
+    number,
+    same_limits,
+)
 from symtop.runner.study import Picture
 
 from . import energy, words
@@ -71,6 +83,7 @@ def _fronts(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
             _closed_form(axis, cell, named=axis is axes[0])
         axis.set_title(scene)
     axes[0].set_ylim(LEAST, 3.0)
+    same_limits(axes)
     few_ticks(axes[0])
     few_ticks(*axes[1:], most=4)
     most = [row for row, _ in owners.most_common(4)]
@@ -155,6 +168,7 @@ def _energy(data: xr.Dataset, chart: str) -> Picture:
         bad = _ended_badly(cell.sel(integrator=classic + structured))
         axis.set_title(f"{scene}{bad}")
     axes[0].set_ylim(1e-16, 30.0)
+    same_limits(axes)
     few_ticks(axes[0])
     few_ticks(*axes[1:], most=4)
     headline(figure, energy.message(data, chart))
@@ -192,8 +206,8 @@ def _parts(data: xr.Dataset) -> Picture:
     growths = {part: [energy.growth_at_equal_settings(scene.sel(integrator=row), part) for row in rows]
                for part in ("shape", "nutation_lag")}  # fmt: skip
     shape_grows, lag_grows = (number(float(np.nanmedian(values))) for values in growths.values())
-    headline(figure, f"From {first} to {last} nutations the error of the path grows by {shape_grows}, the lag by "
-                     f"{lag_grows} (median factors)")  # fmt: skip
+    headline(figure, f"From {first} to {last} nutations the error of the path grows by a factor of {shape_grows}, the "
+                     f"lag by {lag_grows} (medians)")  # fmt: skip
     return Picture(
         "parts",
         figure,

@@ -277,20 +277,20 @@ def grid(count: int, columns: int, labels: tuple[str, str] = ("", ""), **options
 
 
 def lead(count: int, labels: tuple[str, str], height: float = 2.9, small: float = 1.3, columns: int = 4) -> Any:
-    """A figure of one wide panel and, below it, `count` - 1 small ones with the same axes, all logarithmic.
+    """A figure of one wide panel and, below it, `count` - 1 small ones, all logarithmic.
 
-    Returns the figure and its panels (one-dimensional). Limits that are set on the first hold for all.
+    Returns the figure and its panels (one-dimensional). `same_limits` gives them the same limits once all is drawn:
+    axes that are shared between parts of a figure would draw it anew at every change.
     """
     use()
     rows = -(-(count - 1) // columns)
     figure = plt.figure(figsize=(WIDTH, height + small * rows + 0.5))
-    parts = figure.subfigures(1 + bool(rows), 1, height_ratios=[height, small * rows + 0.2][: 1 + bool(rows)])
-    first = np.ravel(parts)[0].subplots()
+    ratios = [height, small * rows + 0.2][: 1 + bool(rows)]
+    parts: Any = figure.subfigures(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
+    first = parts[0].subplots()
     others: list[Any] = []
     if rows:
         below = parts[1].subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-        below[0, 0].sharex(first)
-        below[0, 0].sharey(first)
         others = list(below.flat[: count - 1])
         for axis in below.flat[count - 1 :]:
             axis.set_visible(False)
@@ -301,6 +301,17 @@ def lead(count: int, labels: tuple[str, str], height: float = 2.9, small: float 
         axis.tick_params(which="minor", length=0)
     first.set(xlabel=labels[0], ylabel=labels[1])
     return figure, np.array([first, *others])
+
+
+def same_limits(axes: Any) -> None:
+    """Give all panels the limits that hold everything; those in y of the first, if it does not scale itself."""
+    for name in "xy":
+        limits = [getattr(axis, f"get_{name}lim")() for axis in axes]
+        if not getattr(axes[0], f"get_autoscale{name}_on")():
+            limits = limits[:1]
+        ends = min(low for low, _ in limits), max(high for _, high in limits)
+        for axis in axes:
+            getattr(axis, f"set_{name}lim")(ends)
 
 
 def few_ticks(*axes: Any, most: int = 6) -> None:
@@ -325,7 +336,9 @@ def legend_below(figure: Any, axes: Any) -> None:
 
 
 def slope_guide(axis: Any, power: float, x: tuple[float, float], y: float, label: str) -> None:
-    """A thin reference line y ~ x^power from (x[0], y)."""
+    """A thin reference line y ~ x^power from (x[0], y), labelled below its middle."""
     ends = np.array(x)
     axis.plot(ends, y * (ends / ends[0]) ** power, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
-    axis.annotate(label, (ends[0], y), color="#444444", fontsize=7.5, ha="right", va="center")
+    middle = float(np.sqrt(ends[0] * ends[1]))
+    place = middle, y * (middle / ends[0]) ** power
+    axis.annotate(label, place, (3, -2), textcoords="offset points", color="#444444", fontsize=7.5, va="top")
