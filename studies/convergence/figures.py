@@ -169,11 +169,11 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
     )
     caption = (
         "Efficiency constants: force evaluations per nutation that the law error = C h^p of each row, method[chart], "
-        f"foretells for an axis error of {TARGET:g} rad {HORIZON}; p is the declared order, C the median of error / h^p over the steps "
-        f"of the fit. Bar: from the least to the largest of the scenes {', '.join(scenes)}; marker: their median, open "
-        f"if {TARGET:g} rad lies outside the errors that were fitted on most of them, so that it is foreseen. Charts "
-        "of a method with the same errors share a line. Rows without an order to be trusted are in the table only. "
-        f"{spans(fits(data, MAIN))}"
+        f"foretells for an axis error of {TARGET:g} rad {HORIZON}; p is the declared order, C the median of error / "
+        f"h^p over the steps of the fit. Bar: from the least to the largest of the scenes {', '.join(scenes)}; marker: "
+        f"their median, open if {TARGET:g} rad lies outside the errors that were fitted on most of them, so that it is "
+        "foreseen. Charts of a method with the same errors share a line. Rows without an order to be trusted are in "
+        f"the table only. {spans(fits(data, MAIN))}"
     )
     alt = "Dot plot of the work for one accuracy, a line a row, grouped by order."
     return Picture("constants", figure, caption, alt)
