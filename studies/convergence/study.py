@@ -69,7 +69,9 @@ STUDY = Study(
     how_to_read=(
         "Both axes are logarithmic, so a method of order p is a straight line of slope p against its step. Where a "
         "line bends at the top, the step is too large for the order to show; where it flattens at the bottom, the "
-        "error has reached rounding or the grey band, below which the reference cannot judge. A row is a method in one "
+        "error has reached rounding or the grey band, below which the reference cannot judge. Lines of one order look "
+        "alike; what tells their methods apart is the constant C in error = C h^p, shown as the work that it takes to "
+        "one accuracy. A row is a method in one "
         "chart, rk4[axis]: angles are Euler's angles, axis is the direction of the axis with the angular momentum, "
         "attitude is the quaternion with the angular momentum. Steps of adaptive methods follow from their tolerance; "
         "they are drawn against it, and against work beside the methods of fixed step."
