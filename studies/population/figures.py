@@ -176,7 +176,7 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
             )
         axis.set(xscale="log", xlim=(0.9, FAR), ylim=(SHOWN - 0.4, -0.6), yticks=range(len(listed)))
         axis.set_yticklabels([one.name for one in listed], fontsize=LEAST_TEXT)
-        axis.set_title(f"axis error below {power(target)} rad")
+        axis.set_title(f"to {power(target)} rad")
         axis.annotate(
             "wins,\nlevel",
             (1.02, 1.0),
@@ -185,7 +185,7 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
             va="bottom",
             annotation_clip=False,
         )
-        axis.xaxis.set_major_formatter("{x:g}")
+        axis.set_xticks([1.0, 10.0, 100.0, 1000.0], ["1", "10", "100", "1000"])
         axis.grid(visible=False, axis="y")
     headline(figure, _ahead(data, horizon, words.UNIT))
     return Picture(
