@@ -205,9 +205,13 @@ def _parts(data: xr.Dataset) -> Picture:
     first, last = (f"{data['horizon'].values[far]:g}" for far in (0, -1))
     growths = {part: [energy.growth_at_equal_settings(scene.sel(integrator=row), part) for row in rows]
                for part in ("shape", "nutation_lag")}  # fmt: skip
-    shape_grows, lag_grows = (number(float(np.nanmedian(values))) for values in growths.values())
-    headline(figure, f"From {first} to {last} nutations the error of the path grows by a factor of {shape_grows}, the "
-                     f"lag by {lag_grows} (medians)")  # fmt: skip
+    known = [[value for value in values if np.isfinite(value)] for values in growths.values()]
+    if all(known):
+        shape_grows, lag_grows = (number(float(np.median(values))) for values in known)
+        by = f"by a factor of {shape_grows}, the lag by {lag_grows} (medians)"
+        headline(figure, f"From {first} to {last} nutations the error of the path grows {by}")
+    else:
+        headline(figure, f"Parts of the axis error over {first} and {last} nutations")
     return Picture(
         "parts",
         figure,

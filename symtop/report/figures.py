@@ -59,6 +59,8 @@ def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]], size: flo
 
     Limits and layout of the panel must be final but for the room that the names take.
     """
+    if not ends:
+        return
     axis.figure.canvas.figure.draw_without_rendering()  # the root of a subfigure
     height = axis.get_window_extent().height * 72.0 / axis.figure.dpi
     places = axis.transAxes.inverted().transform(axis.transData.transform([end[:2] for end in ends.values()]))

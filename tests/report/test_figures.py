@@ -96,6 +96,8 @@ def test_names_at_the_ends_of_lines_do_not_meet():
     figure, axes = style.panels(1, 1)
     axis = axes[0, 0]
     axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+    figures.name_ends(axis, {})  # nothing to name
+    assert not axis.texts
     ends = {f"name {k}": (1.0, 0.5 + 0.001 * k, style.BLUE) for k in range(8)}
     figures.name_ends(axis, ends)
     figure.draw_without_rendering()
