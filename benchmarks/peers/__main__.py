@@ -36,7 +36,7 @@ def main() -> None:
         datasets.write(data, file)
         many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())
     findings = run.findings_of(
-        STUDY, data, options.results, style.save, failures=missing, cases=data["seconds"].count().item()
+        STUDY, data, options.results, style.publish, failures=missing, cases=data["seconds"].count().item()
     )
     if many:
         findings["tables"].append(together.table(many)._asdict())

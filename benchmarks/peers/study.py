@@ -34,21 +34,25 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     scenes = [str(name) for name in data["scene"].values]
     known = summary.groups(data)
     names = [name for name in dict.fromkeys([*LOOKS, *known]) if name in known and name not in LEFT_OUT]
-    figure, axes = style.panels(
-        len(NAMES), len(scenes), width=max(9.6, 4.6 * len(scenes)), height=3.7, sharey=True, sharex=True
-    )
+    figure, axes = style.panels(len(NAMES), len(scenes), height=2.5, sharey=True, sharex=True)
     for row, (call, words) in zip(axes, NAMES.items(), strict=True):
         for axis, scene in zip(row, scenes, strict=True):
             for name in names:
                 _front(axis, data.sel(call=call, scene=scene, integrator=known[name]), name)
             for target in JUDGED:
                 axis.axhline(target, color=style.GREY, lw=0.8, ls=(0, (5, 3)), zorder=0)
-            axis.set(xscale="log", yscale="log", title=f"{words}, {scene}", ylim=(3e-12, 3.0))
+            axis.set(xscale="log", yscale="log", title=f"{words}\n{scene}", ylim=(3e-12, 3.0))
             axis.label_outer()
         row[0].set_ylabel(f"largest axis error over\n{PERIODS:g} nutations (rad)")
     for axis in axes[-1]:
         axis.set_xlabel("wall time of one call (s)")
-    style.legend_below(figure, axes)
+    style.few_ticks(*axes.flat, most=5)
+    theirs = _gain(data, known).partition(",")[0]
+    style.headline(figure, theirs or "Axis error against time, the best that each library offers")
+    for axis in axes[:, -1]:
+        drawn = {line.get_label(): line for line in axis.get_lines() if line.get_label() in names}
+        ends = {label: np.transpose(line.get_data())[-1] for label, line in drawn.items() if len(line.get_xdata())}
+        figures.name_ends(axis, {label: (*map(float, end), drawn[label].get_color()) for label, end in ends.items()})
     caption = (
         "Above, the call that a user types; below, the inner loop alone; the same runs at the same settings in both. "
         f"{_gain(data, known)}Each curve is the best that a library offers: for every accuracy its fastest method and "

@@ -1,11 +1,16 @@
 """Figures of the study: the verdicts at a glance, and what tells a symplectic step from one that is not."""
 
+from collections import Counter
+
 import numpy as np
 import xarray as xr
+from matplotlib.ticker import NullLocator
 
 from symtop.judging.claims import SCENE
 from symtop.judging.ledger import CLAIMS, Finding, spoken
+from symtop.methods.registry import FAMILIES, integrators
 from symtop.report import style
+from symtop.report.figures import name_ends
 from symtop.runner.study import Picture
 
 from .tables import defects, findings
@@ -13,6 +18,7 @@ from .words import LEGEND, SYMBOLS, count_words
 
 MARKED = ("midpoint", "strang", "galerkin-simpson", "sofroniou-spaletta-10", "gauss-4", "gauss-12", "rk4", "rk45")
 REFINED = 100.0  # a defect that falls by more than this over the differencing widths is an error of the differencing
+WORST = ("refuted", "undecided", "confirmed", "measured", "inapplicable")  # the first that occurs colours a cell
 COLORS = {
     "confirmed": "#CFE8F3", "refuted": style.VERMILLION, "measured": "#F2F2F2", "undecided": style.YELLOW,
     "inapplicable": "#FFFFFF",
@@ -25,56 +31,81 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 
 def _matrix(judged: dict[str, list[Finding]]) -> Picture:
-    """One row an integrator, one column a claim: what was measured and, if that refutes it, what was declared."""
+    """One row a claim, one column a family of methods: how many of its methods have each verdict."""
     from matplotlib.patches import Patch, Rectangle
 
-    figure, axes = style.panels(1, 1, width=14.5, height=0.6 + 0.235 * len(judged))
+    families = by_family(judged)
+    names = [family for family in FAMILIES if family in families]
+    figure, axes = style.panels(1, 1, height=0.8 + 0.24 * len(CLAIMS))
     axis = axes[0, 0]
-    for line, row in enumerate(judged.values()):
-        for column, one in enumerate(row):
-            color = COLORS[one.verdict]
-            axis.add_patch(Rectangle((column - 0.5, line - 0.5), 1.0, 1.0, facecolor=color, edgecolor="white", lw=1.0))
-            bad = one.verdict == "refuted"
-            text = f"{SYMBOLS[one.verdict]} {f'{one.declared} | ' if bad else ''}{one.measured}"
-            text = text.replace(" +- ", "±").rstrip()
+    for column, family in enumerate(names):
+        for line, claim in enumerate(CLAIMS):
+            count = Counter(one.verdict for row in families[family] for one in row if one.claim == claim)
+            verdict = next((word for word in WORST if count[word]), "inapplicable")
+            box = {"facecolor": COLORS[verdict], "edgecolor": "white", "lw": 1.0}
+            axis.add_patch(Rectangle((column - 0.5, line - 0.5), 1.0, 1.0, **box))
+            said = "  ".join(f"{SYMBOLS[word]} {count[word]}" for word in WORST if count[word])
+            bad = verdict == "refuted"
             axis.text(
-                column, line, text, ha="center", va="center", fontsize=min(7.5, (108.0 if bad else 130.0) / len(text)),
+                column, line, said, ha="center", va="center", fontsize=style.LEAST_TEXT,
                 color="white" if bad else "black", fontweight="bold" if bad else "normal",
             )  # fmt: skip
-    axis.set(xlim=(-0.5, len(CLAIMS) - 0.5), ylim=(len(judged) - 0.5, -0.5))
-    axis.set_yticks(range(len(judged)), list(judged))
-    axis.set_xticks(range(len(CLAIMS)), list(map(spoken, CLAIMS)))
-    axis.tick_params(length=0, top=True, labeltop=True)
+    axis.set(xlim=(-0.5, len(names) - 0.5), ylim=(len(CLAIMS) - 0.5, -0.5))
+    axis.set_yticks(range(len(CLAIMS)), list(map(spoken, CLAIMS)))
+    axis.set_xticks(range(len(names)), [f"{name.replace('-', chr(10))}\n({len(families[name])})" for name in names])
+    axis.tick_params(length=0, bottom=False, labelbottom=False, labeltop=True)
     axis.grid(visible=False)
     axis.spines[:].set_visible(False)
-    handles = [Patch(facecolor=color, edgecolor=style.GREY, lw=0.4, label=f"{SYMBOLS[verdict]} {verdict}")
-               for verdict, color in COLORS.items()]  # fmt: skip
+    handles = [Patch(facecolor=COLORS[verdict], edgecolor=style.GREY, lw=0.4, label=f"{SYMBOLS[verdict]} {verdict}")
+               for verdict in WORST]  # fmt: skip
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
+    number = Counter(one.verdict for row in judged.values() for one in row)
+    decided = number["confirmed"] + number["refuted"]
+    style.headline(figure, f"{number['confirmed']} of {decided} claims that could be judged are confirmed, "
+                           f"{number['refuted']} refuted")  # fmt: skip
     caption = (
-        f"Every claim of every integrator, on {SCENE} where a row names no other scene: {count_words(judged)}. A claim "
-        "is judged in every chart of a method, and its worst chart is shown; the long runs take up to a million steps, "
-        "all other measurements a ladder of steps or tolerances. The text of a cell is what was measured; grey cells "
-        "claim nothing, white ones do not apply."
+        f"Claims of every integrator by family, on {SCENE} where a table row names no other scene: "
+        f"{count_words(judged)}. A number is that of the methods with a verdict; below the family the number of its "
+        "methods. A claim is judged in every chart of a method, and its worst chart counts; the long runs take up to a "
+        "million steps, all other measurements a ladder of steps or tolerances. Grey: not claimed, and measured all "
+        "the same; white: does not apply. Each method and what was measured is in the table."
     )
-    alt = f"A matrix of integrators and claims with a symbol for each verdict: {LEGEND}."
+    alt = f"A matrix of claims and families of methods with the number of methods for each verdict: {LEGEND}."
     return Picture("ledger", figure, caption, alt)
+
+
+def by_family(judged: dict[str, list[Finding]]) -> dict[str, list[list[Finding]]]:
+    """The findings of the integrators of each family; of those that are not registered any more under "other"."""
+    known, families = integrators(), {}
+    for name, row in judged.items():
+        method = known.get(name.partition(" on ")[0])
+        families.setdefault(method.family if method else "other", []).append(row)
+    return families
 
 
 def _bracket(data: xr.Dataset) -> Picture:
     names = [str(name) for name in data["integrator"].values]
     measured = defects(data, [name for name in names if name in MARKED] or names)
-    figure, axes = style.panels(1, 1, height=4.4)
-    axis = axes[0, 0]
+    figure, axes = style.panels(1, 1, height=2.8)
+    axis, ends = axes[0, 0], {}
     for name, (width, defect) in measured.items():
-        look = style.look(name)
-        axis.plot(width, defect, look.marker + "-", color=look.color, ms=look.size, label=name)
-    axis.set(xscale="log", yscale="log", xlabel="differencing width (rad, momentum)")
+        look = style.line(name)
+        axis.plot(width, defect, **look)
+        least = int(np.argmin(width))
+        ends[name] = float(width[least]), float(defect[least]), str(look["color"])
+    axis.set(xscale="log", yscale="log", xlabel="differencing width (rad, momentum), finer to the right")
+    axis.invert_xaxis()
+    ticks = sorted({float(value) for width, _ in measured.values() for value in width})
+    axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axis.xaxis.set_minor_locator(NullLocator())
     axis.set_ylabel("defect of the bracket after one step")
     widths, sizes = (np.concatenate(values) for values in zip(*measured.values(), strict=True))
     style.slope_guide(axis, 2.0, (1.4 * widths.min(), 0.7 * widths.max()), 0.5 * sizes.min(), "width$^2$")
-    style.legend_below(figure, axes)
     falling = [name for name, (_, defect) in measured.items() if defect[-1] < defect[0] / REFINED]
     level = [name for name in measured if name not in falling]
+    style.headline(figure, f"{len(falling)} of {len(measured)} methods are symplectic: what they miss of the bracket "
+                           "is an error of the differencing")  # fmt: skip
+    name_ends(axis, ends)
     caption = (
         f"How far one step is from preserving the Poisson bracket, which a symplectic step does, on {SCENE} in the "
         "chart where it is farthest, against the width of the central differences that measure it. For a symplectic "

@@ -1,164 +1,228 @@
-"""Figures of the study: five methods against work, error against step for each order, error against tolerance."""
+"""Figures of the study: the five named methods together, what every order costs, error against tolerance."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.ticker import LogLocator
 
-from symtop.measure.errors import QUANTITIES
+from symtop.measure.growth import tops
 from symtop.methods.registry import split_name
-from symtop.report.figures import error_band
-from symtop.report.style import GREY, grid, legend_below, look, slope_guide
+from symtop.report.figures import SMALLEST, error_band
+from symtop.report.style import GREY, few_ticks, grid, headline, legend_below, line, number, panels
 from symtop.runner.study import Picture
 
 from .tables import (
+    HISTORY_STEPS,
     LARGE,
     MAIN,
+    NAMED,
+    Efficiency,
     adaptive,
-    by_order,
+    declared_order,
+    efficiencies,
     evaluations_a_nutation,
     fits,
-    guide_constant,
     merged,
     stepping,
     tolerance_fits,
-)  # fmt: skip
+)
 from .words import spans
 
-STEEP = 8  # from this order on a guide as long as that of a lower order would leave the figure
-NAMED = ("midpoint", "trapezoidal", "stormer-verlet", "rk45", "taylor")  # the five that every reader knows
+TARGET = 1e-6  # rad, the axis error at which costs are compared
 HORIZON = "over 8 nutations (spheroid: to t = 8)"
+SHOWN_ADAPTIVE = ("rk45[angles]", "dop853[angles]", "lsoda[angles]", "taylor[axis]", "series-adaptive[axis]")
+WINDOWS = 18  # of time, in each of which the largest energy error is drawn
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
-    """The five named methods against work; axis error against the step by declared order; against the tolerance."""
-    steps, chosen = stepping(data), adaptive(data)
-    groups = by_order(steps)
-    drawn = [_named(data), *(_by_step(steps.sel(integrator=names), MAIN, power) for power, names in groups.items())]
-    if 2 in groups:
-        drawn.append(_by_step(steps.sel(integrator=groups[2]), "energy", 2))
+    """The five named methods; the work that each row with a step needs; error against the tolerance."""
+    drawn = [_named(data)] if any(split_name(str(name))[0] in NAMED for name in data["integrator"].values) else []
+    works = efficiencies(stepping(data), TARGET)
+    drawn += [_constants(data, works)] if works else []
+    chosen = adaptive(data)
     return [*drawn, _by_tolerance(chosen)] if chosen.sizes["integrator"] else drawn
 
 
-def _panels(data: xr.Dataset, labels: tuple[str, str]) -> tuple[Any, list[tuple[str, Any]]]:
-    """A figure with a logarithmic panel for each scene."""
-    scenes = [str(name) for name in data["scene"].values]
-    figure, axes = grid(len(scenes), 3 if len(scenes) == 3 else min(2, len(scenes)), labels)
-    for axis, scene in zip(axes, scenes, strict=True):
-        axis.set(xscale="log", yscale="log", title=scene)
-    return figure, list(zip(scenes, axes, strict=True))
-
-
-def _line(axis: Any, cell: xr.Dataset, name: str, label: str, x: Any, y: Any, used: Any) -> None:
-    """One row: points that enter a fit are filled or half filled, the others small; plain Python is dashed."""
-    ranked = np.argsort(x)
-    ranked = ranked[np.isfinite(x[ranked]) & np.isfinite(y[ranked])]
-    if not ranked.size:
-        return
-    style = look(name)
-    line = (0, (4, 2)) if "python" in cell["implementation"].values else "-"
-    axis.plot(x[ranked], y[ranked], color=style.color, ls=line, lw=1.1, zorder=2)
-    marks = {"marker": style.marker, "color": style.color, "ls": "none", "fillstyle": style.fill}
-    axis.plot(x[used], y[used], ms=style.size, zorder=3, **marks)
-    axis.plot(x[~used], y[~used], ms=0.45 * style.size, zorder=3, **marks)
-    axis.plot([], [], ms=style.size, lw=1.1, label=label, **(marks | {"ls": line}))  # the one entry in the legend
+def _line(axis: Any, name: str, label: str, x: Any, y: Any) -> None:
+    order = np.argsort(x)
+    order = order[np.isfinite(x[order]) & np.isfinite(y[order])]
+    if order.size:
+        axis.plot(x[order], y[order], **line(name), label=label)
 
 
 def _named(data: xr.Dataset) -> Picture:
-    names = [name for name in map(str, data["integrator"].values) if split_name(name)[0] in NAMED]
-    part = data.sel(integrator=names)
-    labels = merged(part, MAIN)
-    figure, panels = _panels(part, ("force evaluations per nutation", f"largest {QUANTITIES[MAIN]}"))
-    for scene, axis in panels:
-        floor = error_band(axis, part.sel(scene=scene)[f"{MAIN}_bound"].values)
-        for name, label in labels.items():
-            cell = part.sel(scene=scene, integrator=name)
-            error = np.maximum(cell[MAIN].values, 0.3 * floor)
-            work = evaluations_a_nutation(cell, scene)
-            _line(axis, cell, name, label, work, error, np.isfinite(error))
-        axis.set_xlim(right=2e5)
-    legend_below(figure, [axis for _, axis in panels])
+    """Four panels on one scene: error against the step, against the tolerance, against work; energy over time."""
+    named = [name for name in map(str, data["integrator"].values) if split_name(name)[0] in NAMED]
+    names = [name for name in named if name.replace("[attitude]", "[axis]") not in named or "[attitude]" not in name]
+    part = data.sel(integrator=names).isel(scene=0)
+    scene = str(part["scene"].values)
+    labels = merged(data.sel(integrator=names), MAIN)
+    figure, axes = panels(2, 2, height=2.3)
+    steps, tolerances, work, energy = axes.flat
+    floor = 0.0
+    for axis in (steps, tolerances, work):
+        floor = 0.3 * error_band(axis, part[f"{MAIN}_bound"].values)
+        axis.set(xscale="log", yscale="log", ylim=(0.5 * floor, 10.0), ylabel="largest axis error (rad)")
+    for name, label in labels.items():
+        cell = part.sel(integrator=name)
+        error, paid = np.maximum(cell[MAIN].values, floor), evaluations_a_nutation(cell, scene)
+        cells = cell["force_evaluations"].values
+        with np.errstate(invalid="ignore"):
+            _line(steps, name, label, np.where(np.isfinite(cell["step_size"]), cell["step_size"], np.nan), error)
+        _line(tolerances, name, label, cell["tolerance"].values, error)
+        _line(work, name, label, np.where(cells > 0.0, paid, np.nan), error)
+        if "history_time" in cell and np.isfinite(cell["history_time"]).any():
+            _history(energy, name, label, cell)
+    energy.set_visible(bool(energy.get_lines()))
+    ends = np.array([1e-14, LARGE])
+    tolerances.plot(ends, ends, color=GREY, lw=0.9, zorder=1)
+    tolerances.text(1e-11, 2e-12, "error = tolerance", fontsize=7.0, color="#444444")
+    steps.set(xlabel="step size (s)", title="error against the step")
+    tolerances.set(xlabel="tolerance", title="error against the tolerance")
+    work.set(xlabel="force evaluations per nutation", title="error against cost")
+    energy.set(xscale="log", yscale="log", xlabel="nutations", ylabel="relative change of the energy")
+    energy.set_title(f"energy over time ({HISTORY_STEPS:g} steps a nutation)")
+    few_ticks(*axes.flat)
+    paid_least = least_work(part, scene, labels)
+    if len(paid_least) > 1:
+        (best, least), (worst, most) = paid_least[0], paid_least[-1]
+        paid_text = f"{best} needs {number(least)} force evaluations a nutation, {worst} {number(most)}"
+        headline(figure, f"{number(TARGET)} rad on {scene}: {paid_text}")
+    legend_below(figure, [work])
+    listed = ", ".join(f"{name} {value:.3g}" for name, value in paid_least)
+    tolerance = sorted({f"{value:.1e}" for value in np.ravel(part.get("history_tolerance", np.nan)) if value > 0.0})
     caption = (
-        f"The five methods that everybody knows, on one axis of work: largest axis error {HORIZON} against force "
-        "evaluations per nutation, each at all of its steps or tolerances. A line of slope -2 costs ten times the work "
-        "for a hundredth of the error. A Taylor step of order n counts n evaluations; dashed is plain Python. "
-        f"{_least_work(part, labels)} Held fixed: scene, horizon and the error that is measured; method and chart "
-        "differ from line to line."
+        f"The five methods that everybody knows on {scene}, chart in the name, to t = {float(part['horizon'].max()):g}."
+        " Largest axis error at every step, at every tolerance, and both against force evaluations per nutation, on "
+        "one axis of work: a line of slope -2 costs ten times the work for a hundredth of the error; a Taylor step of "
+        "order n counts n evaluations. Last: the largest change of the energy, relative to E0 - min V, in each window "
+        f"of time, at {HISTORY_STEPS:g} steps a nutation (adaptive: tolerance {' or '.join(tolerance)}). For an error "
+        f"below {TARGET:g} the cheapest run of each takes: {listed}. Grey band: below the error bound of the reference."
     )
-    alt = "Log-log plots of axis error against force evaluations per nutation for the five named methods."
+    alt = "Four log-log plots of the five named methods: error against step, tolerance and work, energy over time."
     return Picture("named-methods", figure, caption, alt)
 
 
-def _least_work(part: xr.Dataset, labels: dict[str, str], target: float = 1e-6) -> str:
-    """What each row of the first scene pays for an error below a target."""
-    scene = str(part["scene"].values[0])
+def _history(axis: Any, name: str, label: str, cell: xr.Dataset) -> None:
+    time, change = cell["history_time"].values, cell["history_energy"].values
+    good = np.isfinite(time) & np.isfinite(change) & (time > 0.0)
+    if good.any():
+        decades = np.log10(time[good][-1] / max(time[good][0], 1.0))
+        x, y = tops(time[good], np.maximum(change[good], SMALLEST), decades, WINDOWS)
+        axis.plot(x, y, **line(name), label=label)
+
+
+def least_work(part: xr.Dataset, scene: str, labels: Mapping[str, str]) -> list[tuple[str, float]]:
+    """What each row pays for an error below `TARGET`: force evaluations per nutation, the least first."""
     paid = {}
     for name in labels:
-        cell = part.sel(scene=scene, integrator=name)
-        work = evaluations_a_nutation(cell, scene)[cell[MAIN].values <= target]
+        cell = part.sel(integrator=name)
+        work = evaluations_a_nutation(cell, scene)[cell[MAIN].values <= TARGET]
         if work.size:
             paid[name] = float(np.min(work))
-    listed = ", ".join(f"{name} {work:.3g}" for name, work in sorted(paid.items(), key=lambda one: one[1]))
-    return f"For an error below {target:g} on {scene}, the cheapest run of each takes: {listed}." if paid else ""
+    return sorted(paid.items(), key=lambda one: one[1])
 
 
-def _by_step(data: xr.Dataset, quantity: str, power: int) -> Picture:
-    """One panel a scene, one line a row, or one for rows of a method whose errors agree."""
-    fitted, labels = fits(data, quantity), merged(data, quantity)
-    figure, panels = _panels(data, ("step size (s)", f"largest {QUANTITIES[quantity]}"))
-    for scene, axis in panels:
-        part = data.sel(scene=scene)
-        floor = error_band(axis, part[f"{quantity}_bound"].values)
-        for name, label in labels.items():
-            cell, fit = part.sel(integrator=name), fitted.get((scene, name))
-            error = np.maximum(cell[quantity].values, 0.3 * floor)
-            used = np.zeros(error.size, bool) if fit is None else fit.used & np.isfinite(fit.slope)
-            _line(axis, cell, name, label, cell["step_size"].values, error, used)
-        axis.xaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))  # labels of all nine would collide
-        axis.grid(visible=True, which="major")
-        constants = [fit.constant for pair, fit in fitted.items() if pair[0] == scene and np.isfinite(fit.slope)]
-        least = min(constants, default=guide_constant(part, quantity, power))
-        if power and np.isfinite(least):
-            coarse = float(part["step_size"].max())
-            width, below = (0.2, 0.15) if power < STEEP else (0.5, 0.02)
-            ends = (width * coarse, coarse)
-            slope_guide(axis, power, ends, below * least * ends[0] ** power, f"$h^{{{power}}}$")
-    legend_below(figure, [axis for _, axis in panels])
-    title = f"methods of order {power}" if power else "methods that declare no order"
-    caption = (
-        f"Largest {quantity} error {HORIZON} against the step, {title}, every chart of each; charts of a method with "
-        "the same errors share a line. Large points enter the fit; small ones are too large, too far from the series "
-        "in h, or within ten times round-off or the error bound of the reference (grey band). A line without large "
-        "points is judged by its errors at the end, or by a run in long double, or not at all: see the table. "
-        f"{spans(fitted)}"
+def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Picture:
+    """A line a row, grouped by order: the work that the error constants foretell for `TARGET`, over the scenes."""
+    labels = merged(stepping(data), MAIN)
+    scenes = [str(name) for name in data["scene"].values]
+    sizes = {name: [works[scene, name] for scene in scenes if (scene, name) in works] for name in labels}
+    sizes = {name: found for name, found in sizes.items() if found}
+    middle = {name: float(np.median([one.work for one in found])) for name, found in sizes.items()}
+    orders: dict[int, list[str]] = {}
+    for name in sorted(sizes, key=lambda name: middle[name]):
+        orders.setdefault(declared_order(name) or 0, []).append(name)
+    blocks = [orders[power] for power in sorted(orders)]
+    halves = _halves(blocks)
+    most = max(sum(len(block) + 1 for block in half) for half in halves)
+    figure, axes = panels(1, len(halves), height=0.135 * most + 0.3, sharex=True)
+    for axis, half in zip(axes[0], halves, strict=True):
+        place, places, ticks = 0, [], []
+        for block in half:
+            power = declared_order(block[0])
+            axis.text(0.99, place, f"order {power}" if power else "no order declared", weight="bold", va="center",
+                      ha="right", transform=axis.get_yaxis_transform())  # fmt: skip
+            place += 1
+            for name in block:
+                values = [one.work for one in sizes[name]]
+                open_ = sum(one.foreseen for one in sizes[name]) * 2 > len(values)
+                marks = line(name, 1.1)
+                axis.plot([min(values), max(values)], [place, place], color=marks["color"], lw=1.2)
+                face = "white" if open_ else marks["color"]
+                axis.plot(middle[name], place, marks["marker"], color=marks["color"], mfc=face, ms=marks["ms"])
+                places.append(place)
+                ticks.append(labels[name])
+                place += 1
+        axis.set(xscale="log", yticks=places, yticklabels=ticks, ylim=(most - 0.4, -0.6))
+        axis.tick_params(axis="y", labelsize=7.0, length=0)
+        axis.grid(visible=False, axis="y")
+    best = min(middle, key=lambda name: middle[name])
+    firsts = [block[0] for block in blocks if declared_order(block[0])]
+    low = min(firsts, key=lambda name: declared_order(name) or 0)
+    figure.supxlabel(f"force evaluations a nutation for an axis error of {number(TARGET)} rad", fontsize=8.0)
+    orders_named = [f"{name} (order {declared_order(name)})" for name in (low, best)]
+    times = number(middle[low] / middle[best])
+    headline(
+        figure, f"The best of the lowest order, {orders_named[0]}, takes {times} times the work of {orders_named[1]}"
     )
-    alt = f"Log-log plots of {quantity} error against step size, {title}, with the slope {power} as a guide."
-    return Picture(f"{quantity}-order-{power}", figure, caption, alt)
+    caption = (
+        "Efficiency constants: force evaluations per nutation that the law error = C h^p of each row, method[chart], "
+        f"foretells for an axis error of {TARGET:g} rad {HORIZON}; p is the declared order, C the median of error / "
+        f"h^p over the steps of the fit. Bar: from the least to the largest of the scenes {', '.join(scenes)}; marker: "
+        f"their median, open if {TARGET:g} rad lies outside the errors that were fitted on most of them, so that it is "
+        "foreseen. Charts of a method with the same errors share a line. Rows without an order to be trusted are in "
+        f"the table only. {spans(fits(data, MAIN))}"
+    )
+    alt = "Dot plot of the work for one accuracy, a line a row, grouped by order."
+    return Picture("constants", figure, caption, alt)
+
+
+def _halves(blocks: list[list[str]]) -> list[list[list[str]]]:
+    """The blocks in two columns of about the same height; one column if there is one block."""
+    if len(blocks) < 2:
+        return [blocks]
+    sums = np.cumsum([len(block) + 1 for block in blocks])
+    cut = 1 + int(np.argmin(np.maximum(sums[:-1], sums[-1] - sums[:-1])))
+    return [blocks[:cut], blocks[cut:]]
 
 
 def _by_tolerance(data: xr.Dataset) -> Picture:
     """Error of the adaptive rows against their tolerance, with the line where they are equal."""
     fitted, labels = tolerance_fits(data), merged(data, MAIN)
-    figure, panels = _panels(data, ("tolerance", f"largest {QUANTITIES[MAIN]}"))
-    for scene, axis in panels:
+    scenes = [str(name) for name in data["scene"].values]
+    figure, axes = grid(len(scenes), min(2, len(scenes)), ("tolerance", "largest axis error (rad)"), sharey=True)
+    shown = [name for name in labels if name in SHOWN_ADAPTIVE]
+    ratios = []
+    for scene, axis in zip(scenes, axes, strict=True):
         part = data.sel(scene=scene)
         floor = error_band(axis, part[f"{MAIN}_bound"].values)
-        for name, label in labels.items():
-            cell = part.sel(integrator=name)
-            error = np.maximum(cell[MAIN].values, 0.3 * floor)
-            _line(axis, cell, name, label, cell["tolerance"].values, error, fitted[scene, name].used)
+        for name in labels:
+            cell, used = part.sel(integrator=name), fitted[scene, name].used
+            error, tolerance = np.maximum(cell[MAIN].values, 0.3 * floor), cell["tolerance"].values
+            if name in shown:
+                _line(axis, name, labels[name], tolerance, error)
+            else:
+                axis.plot(tolerance, error, color=GREY, lw=0.6, alpha=0.6, zorder=1)
+            ratios += list((cell[MAIN].values / tolerance)[used])
+        axis.plot([], [], color=GREY, lw=0.8, label="all other rows")
         ends = np.array([1e-14, LARGE])
-        axis.plot(ends, ends, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1, label="error = tolerance")
-    legend_below(figure, [axis for _, axis in panels])
+        axis.plot(ends, ends, color="black", lw=0.9, ls=(0, (5, 3)), zorder=1, label="error = tolerance")
+        axis.set(xscale="log", yscale="log", title=scene)
+    legend_below(figure, axes)
+    middle = float(np.median(ratios)) if ratios else np.nan
+    few_ticks(*axes)
+    most = number(max(ratios, default=np.nan))
+    headline(figure, f"Axis errors of a run are {number(middle)} times the tolerance in the median, up to {most} times")
     slopes = {name: [fit.slope for pair, fit in fitted.items() if pair[1] == name and np.isfinite(fit.slope)]
               for name in labels}  # fmt: skip
     listed = ", ".join(f"{name} {min(values):.2f} to {max(values):.2f}" for name, values in slopes.items() if values)
     caption = (
-        f"Largest axis error {HORIZON} of the adaptive methods against the tolerance that was asked for; relative and "
-        "absolute tolerance of the Runge-Kutta methods are equal. A tolerance bounds the error of a step and not that "
-        "of a run: lines above the dashed diagonal lose more than they were asked for. Exponents x of "
-        f"error ~ tolerance^x: {listed}. Large points enter the fit; dashed lines are plain Python."
+        f"Largest axis error {HORIZON} of the adaptive methods, method[chart], against the tolerance that was asked "
+        "for; relative and absolute tolerance of the Runge-Kutta methods are equal. Lines above the dashed diagonal "
+        f"lose more than they were asked for. Exponents x of error ~ tolerance^x: {listed}. Open markers: Euler "
+        "angles; dotted lines: plain Python."
     )
     alt = "Log-log plots of axis error against tolerance for the adaptive methods, with the diagonal as a guide."
     return Picture("tolerance", figure, caption, alt)

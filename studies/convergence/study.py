@@ -11,7 +11,7 @@ from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
-from . import figures, words
+from . import figures, tables, words
 
 LEFT_OUT = {
     "goldstein is the same top, let go at another speed": ("goldstein-falling", "goldstein-rising"),
@@ -25,6 +25,7 @@ NOT_QUICK = {"left to the ordinary grid": ("loop", "hairer-lubich-wanner")}
 WHOLE = "spheroid"  # runs to its horizon; the other scenes run for `NUTATIONS` at most
 NUTATIONS = 8.0
 MOST_STEPS = 1e6  # of a run
+HISTORY = (1000.0, 100.0)  # nutations of the run that shows the energy over time: in full, and quick
 
 
 def cases(quick: bool) -> list[Case]:
@@ -42,16 +43,23 @@ def cases(quick: bool) -> list[Case]:
                 settings = tolerance_ladder(row, 6 if quick else 13)
             else:
                 continue  # a formula has nothing to set
-            grid.append(Case(name, row.name, {"horizon": horizon, "settings": settings, "dense": not quick}))
+            chosen = {"horizon": horizon, "settings": settings, "dense": not quick}
+            if name == WHOLE and row.method in tables.NAMED:
+                chosen["history"] = HISTORY[quick]
+            grid.append(Case(name, row.name, chosen))
     return grid
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The error table of one method in one chart on one scene, with the attitude where the chart shows it."""
+    """The error table of one method in one chart on one scene, with the attitude where the chart shows it.
+
+    Of the five named methods on one scene also the change of the energy over a longer time.
+    """
     on, row = scene(case.scene), integrator(case.integrator)
     horizon = case.settings["horizon"]
     table = order_table(on, row, case.settings["settings"], horizon, observable(row), dense=case.settings["dense"])
-    return table.assign(horizon=horizon)
+    history = case.settings.get("history")
+    return (table if history is None else table.merge(tables.energy_history(on, row, history))).assign(horizon=horizon)
 
 
 STUDY = Study(
@@ -61,7 +69,9 @@ STUDY = Study(
     how_to_read=(
         "Both axes are logarithmic, so a method of order p is a straight line of slope p against its step. Where a "
         "line bends at the top, the step is too large for the order to show; where it flattens at the bottom, the "
-        "error has reached rounding or the grey band, below which the reference cannot judge. A row is a method in one "
+        "error has reached rounding or the grey band, below which the reference cannot judge. Lines of one order look "
+        "alike; what tells their methods apart is the constant C in error = C h^p, shown as the work that it takes to "
+        "one accuracy. A row is a method in one "
         "chart, rk4[axis]: angles are Euler's angles, axis is the direction of the axis with the angular momentum, "
         "attitude is the quaternion with the angular momentum. Steps of adaptive methods follow from their tolerance; "
         "they are drawn against it, and against work beside the methods of fixed step."

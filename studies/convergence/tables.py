@@ -4,7 +4,6 @@ The dataset has the columns of `symtop.measure.accuracy.error_table`, over ``sce
 ``rk4[axis]``) and ``setting``, and ``horizon`` over the first two.
 """
 
-import math
 from itertools import product
 from typing import NamedTuple
 
@@ -12,13 +11,17 @@ import numpy as np
 import xarray as xr
 
 from symtop.base.numbers import EPSILON
+from symtop.measure.conservation import residuals
 from symtop.measure.order import LARGEST_ERROR, Fit, order_verdict, power_law
 from symtop.measure.order_table import observable, order_fit
 from symtop.methods.registry import Integrator, integrator, integrators, split_name
-from symtop.model.scenes import scene
+from symtop.model.scenes import Scene, scene
+from symtop.run.simulation import simulate
 
 MAIN = "axis"  # every chart shows it
 OTHERS = ("attitude", "theta", "energy")
+NAMED = ("midpoint", "trapezoidal", "stormer-verlet", "rk45", "taylor")  # the five that every reader knows
+HISTORY_STEPS, HISTORY_TOLERANCE = 100.0, 1e-6  # a nutation; of their runs for the energy over time
 LARGE = LARGEST_ERROR  # radians: larger errors follow no power of the step
 ABOVE_BOUND = 100.0  # times the reference's own error bound: smaller errors may be the reference's
 SAME = 0.02  # rows of a method whose errors differ by less are drawn as one
@@ -121,9 +124,46 @@ def evaluations_a_nutation(cell: xr.Dataset, name: str) -> np.ndarray:
     return work
 
 
-def guide_constant(data: xr.Dataset, quantity: str, power: int) -> float:
-    """The least error / h^power of one scene's errors that are neither large nor rounding; NaN if there are none."""
-    h, error = data["step_size"], data[quantity]
-    usable = (error < LARGE) & (error > ABOVE_BOUND * data[f"{quantity}_bound"])
-    least = float((error / h**power).where(usable).min())
-    return least if math.isfinite(least) else math.nan
+def energy_history(on: Scene, row: Integrator, nutations: float) -> xr.Dataset:
+    """The relative change of the energy over time of a run with `HISTORY_STEPS` or `HISTORY_TOLERANCE`.
+
+    Dimension ``moment``: ``history_time`` in nutation periods, ``history_energy``. An adaptive method with a default
+    tolerance, the rounding of its arithmetic, keeps it; ``history_tolerance`` is what it ran with.
+    """
+    period, tolerance = on.nutation_period, row.default_tolerance or HISTORY_TOLERANCE
+    setting = {"step_size": period / HISTORY_STEPS} if row.fixed_step else {"tolerance": tolerance}
+    run = simulate(on, row, horizon=nutations * period, samples=801, guard=False, **setting)
+    return xr.Dataset(
+        {
+            "history_time": ("moment", run["time"].values / period),
+            "history_energy": ("moment", np.abs(residuals(on, run)["energy"])),
+            "history_tolerance": np.nan if row.fixed_step else tolerance,
+        }
+    )
+
+
+class Efficiency(NamedTuple):
+    """What a row pays for an axis error by its law, error = C h^p: force evaluations per nutation."""
+
+    work: float
+    foreseen: bool  # does the error lie outside those that were fitted?
+
+
+def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Efficiency]:
+    """The work for an axis error of every row with a fixed step on every scene where it has an order to trust.
+
+    A step h costs E force evaluations, so that C h^p = error takes E T (C / error)^(1/p) of them in a nutation T. E is
+    the median over the steps of the fit.
+    """
+    found = {}
+    for (name, label), fit in fits(data, MAIN).items():
+        if not (np.isfinite(fit.slope) and fit.used.any()):
+            continue
+        cell, order = data.sel(scene=name, integrator=label), declared_order(label) or round(fit.slope)
+        used, steps = fit.used, cell["step_size"].values[fit.used]
+        each = np.median((evaluations_a_nutation(cell, name)[used] * steps) / scene(name).nutation_period)
+        constant = np.median(cell[MAIN].values[used] / steps**order)
+        work = float(each * scene(name).nutation_period * (constant / error) ** (1.0 / order))
+        inside = cell[MAIN].values[used].min() <= error <= cell[MAIN].values[used].max()
+        found[name, label] = Efficiency(work, not inside)
+    return found

@@ -5,27 +5,31 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.ticker import NullFormatter
 
 from symtop.measure.conservation import CONSTANTS
 from symtop.measure.growth import ROUNDED, tops
-from symtop.methods.registry import split_name
-from symtop.report.style import BLACK, GREY, legend_below, look, panels, slope_guide
+from symtop.report import style
+from symtop.report.figures import name_ends
+from symtop.report.style import BLACK, GREY, few_ticks, headline, line, look, number, panels
 from symtop.run.long_run import PER_NUTATION
 from symtop.runner.study import Picture
 
-from . import rows, words
+from . import messages, rows, words
+from .keeping import LENGTHS, chosen, keeping
 from .phase_loss import LOST
 from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS, by_integrator, losses
 
-SHOWN = ("midpoint", "trapezoidal", "stormer-verlet", "strang", "gauss-4", "rk4", "rk45", "taylor")  # methods
+SHOWN = (
+    "midpoint[angles]", "stormer-verlet[angles]", "strang[axis]", "gauss-4[axis]", "rk4[angles]", "rk4[axis]",
+    "rk45[angles]", "taylor[axis]",
+)  # fmt: skip
 LABELS = {
     "energy": "energy", "modified_energy": "modified energy", "p_phi": r"$p_\varphi$", "p_psi": r"$p_\psi$",
     "phase": "phase",
 }  # fmt: skip
 BANDS = ("energy", "modified_energy", "p_phi", "p_psi")
 LAWS = (0.0, 0.5, 1.0, 2.0)  # exponents that are drawn as lines
-SIZES = (7.0, 4.0, 5.5, 3.0)  # of a marker, by scene
+SIZES = (4.5, 2.6, 3.5, 2.0)  # of a marker, by scene
 SMALLEST = 1e-17  # what is smaller is drawn here
 
 
@@ -43,30 +47,31 @@ def envelope(t: np.ndarray, r: np.ndarray) -> tuple[list[float], list[float]]:
 
 def _residuals(histories: xr.Dataset) -> Picture:
     small = rows.without_repeats(histories)
-    names = [name for name in small["integrator"].values if split_name(str(name))[0] in SHOWN]
+    names = [name for name in small["integrator"].values if name in SHOWN]
     data = small.sel(integrator=names) if names else small
-    figure, axes = panels(len(CONSTANTS), data.sizes["scene"], height=2.7, sharex="col", sharey="row")
-    for line, constant in zip(axes, CONSTANTS, strict=True):
-        for axis, scene in zip(line, data["scene"].values, strict=True):
+    figure, axes = panels(len(CONSTANTS), data.sizes["scene"], height=1.9, sharex="col", sharey="row")
+    for row, constant in zip(axes, CONSTANTS, strict=True):
+        for axis, scene in zip(row, data["scene"].values, strict=True):
             for name in data["integrator"].values:
-                style, cell = look(str(name)), data.sel(scene=scene, integrator=name)
+                mark, cell = look(str(name)), data.sel(scene=scene, integrator=name)
                 t, r = cell["sample_time"].values, np.abs(cell[f"{constant}_residual"].values)
                 good = np.isfinite(r) & np.isfinite(t) & (t > 0.0)
                 if good.any():
                     t, r = t[good], np.maximum(r[good], SMALLEST)
-                    axis.plot(t, r, ",", color=style.color, alpha=0.5, zorder=2)
-                    axis.plot(*envelope(t, r), style.marker + "-", color=style.color, ms=0.8 * style.size,
-                              fillstyle=style.fill, label=str(name), zorder=3)  # fmt: skip
+                    axis.plot(t, r, ",", color=mark.color, alpha=0.5, zorder=2, rasterized=True)
+                    axis.plot(*envelope(t, r), **line(str(name), 0.8), label=str(name), zorder=3)
             axis.set(xscale="log", yscale="log")
-        line[0].set_ylabel(f"|residual {LABELS[constant]}| (relative)")
+        row[0].set_ylabel(f"|change of {LABELS[constant]}|")
     for axis, scene in zip(axes[0], data["scene"].values, strict=True):
         axis.set_title(scene)
         first, last = axis.get_xlim()
         axis.autoscale(enable=False)
-        slope_guide(axis, 1.0, (first * 6.0, last / 2.0), 1e-8, "$t$")
+        style.slope_guide(axis, 1.0, (first * 6.0, last / 2.0), 1e-8, "$t$")
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
-    legend_below(figure, axes)
+    few_ticks(*axes.flat)
+    style.legend_below(figure, axes)
+    headline(figure, messages.residuals(data))
     caption = (
         "Change of energy since the start relative to E0 - min V, the energy of the nutation, and of both momenta "
         "relative to the larger one: samples as dots, the largest of each time window as a line with markers, at 1e-17 "
@@ -87,26 +92,29 @@ def dots(data: xr.Dataset, columns: dict[str, str], *, log: bool) -> Any:
     bar.
     """
     names, scenes = ([str(name) for name in data[dim].values] for dim in ("integrator", "scene"))
-    figure, axes = panels(1, len(columns), height=0.9 + 0.2 * len(names), sharey=True)
+    figure, axes = panels(1, len(columns), height=0.4 + 0.128 * len(names), sharey=True)
     shift = np.linspace(-0.22, 0.22, len(scenes)) if len(scenes) > 1 else np.zeros(1)
     for axis, (variable, label) in zip(axes[0], columns.items(), strict=True):
         for scene, offset, size in zip(scenes, shift, SIZES * 3, strict=False):
             axis.plot([], [], "o", color=GREY, ms=size, label=scene)
             for row, name in enumerate(names):
-                cell, style = data.sel(scene=scene, integrator=name), look(name)
+                cell, mark = data.sel(scene=scene, integrator=name), look(name)
                 value, bar = float(cell[variable]), float(cell.get(f"{variable}_interval", 0.0))
                 if np.isfinite(value):
-                    axis.errorbar(max(value, SMALLEST) if log else value, row + offset, xerr=bar, fmt=style.marker,
-                                  fillstyle=style.fill, color=style.color, ms=size, elinewidth=0.8)  # fmt: skip
+                    axis.errorbar(max(value, SMALLEST) if log else value, row + offset, xerr=bar, fmt=mark.marker,
+                                  fillstyle=mark.fill, color=mark.color, ms=size, elinewidth=0.6)  # fmt: skip
         axis.set(xlabel=label, yticks=range(len(names)), yticklabels=names, ylim=(len(names) - 0.5, -0.5))
         axis.set_xscale("log" if log else "linear")
-    legend_below(figure, axes)
+        axis.tick_params(axis="y", labelsize=7.0, length=0)
+    few_ticks(*axes.flat, most=3)
+    style.legend_below(figure, axes)
     return figure
 
 
 def _sizes(histories: xr.Dataset) -> Picture:
     data = rows.without_repeats(histories)
-    figure = dots(data, {f"{name}_largest": f"largest residual {LABELS[name]}" for name in CONSTANTS}, log=True)
+    figure = dots(data, {f"{name}_largest": f"change of {LABELS[name]}" for name in CONSTANTS}, log=True)
+    headline(figure, messages.sizes(data))
     caption = (
         "Largest relative residual of every row over the whole run, energies relative to E0 - min V; an exact zero "
         f"is drawn at 1e-17. {rows.setting(data)} {rows.charts_apart(data)} A million steps of rounding explain "
@@ -122,8 +130,9 @@ def _exponents(histories: xr.Dataset) -> Picture:
     columns = {f"{name}_exponent": f"exponent of {LABELS[name]}" for name in (*CONSTANTS, "phase")}
     data = rows.without_repeats(histories)
     figure = dots(data, columns, log=False)
+    headline(figure, messages.exponents(data))
     for axis in figure.axes:
-        axis.set(xlim=(-0.35, 2.5), xticks=(0.0, 0.5, 1.0, 1.5, 2.0))
+        axis.set(xlim=(-0.35, 2.5), xticks=(0.0, 0.5, 1.0, 2.0), xticklabels=("0", "½", "1", "2"))
         for law in LAWS:
             axis.axvline(law, color=GREY, lw=0.8, zorder=1)
     caption = (
@@ -137,21 +146,23 @@ def _exponents(histories: xr.Dataset) -> Picture:
 
 
 def _windows(data: xr.Dataset) -> Picture:
-    figure, axes = panels(len(BANDS), data.sizes["integrator"], height=1.9, sharex=True, sharey="row")
+    figure, axes = panels(len(BANDS), data.sizes["integrator"], height=1.35, sharex=True, sharey="row")
     for row, quantity in zip(axes, BANDS, strict=True):
         size = float(np.abs(data[f"{quantity}_largest"]).max()) or 1.0  # what every method keeps exactly has none
         scale = 10.0 ** np.floor(np.log10(size))
         for axis, (name, cell) in zip(row, by_integrator(data).items(), strict=True):
-            style, run = look(name), cell.dropna("window", subset=["steps"])
+            mark, run = look(name), cell.dropna("window", subset=["steps"])
             steps = run["steps"].values
             low, middle, high = (run[f"{quantity}_{part}"].values / scale for part in ("least", "mean", "largest"))
-            axis.fill_between(steps, low, high, step="pre", color=style.color, alpha=0.3, lw=0)
-            axis.step(steps, middle, where="pre", color=style.color, lw=1.3)
+            axis.fill_between(steps, low, high, step="pre", color=mark.color, alpha=0.3, lw=0)
+            axis.step(steps, middle, where="pre", color=mark.color, lw=1.3)
             axis.set_xscale("log")
-            axis.set_title(name if quantity == BANDS[0] else "")
-        row[0].set_ylabel(f"{LABELS[quantity]}\n(relative, in {scale:.0e})")
+            axis.set_title(name if quantity == BANDS[0] else "", fontsize=7.5)
+        row[0].set_ylabel(f"{LABELS[quantity]}\n(in {scale:.0e})")
     for axis in axes[-1]:
         axis.set_xlabel("steps")
+    few_ticks(*axes.flat, most=4)
+    headline(figure, f"Over {number(float(data['steps'].max()))} steps {words.moved(data).partition(',')[0]}")
     momenta = [np.abs(data[f"{name}_{part}"]).max() for name in ("p_phi", "p_psi") for part in ("least", "largest")]
     caption = (
         f"{float(data['steps'].max()):.0e} steps of rows in angles and in the axis chart on {data['scene'].values[0]}, "
@@ -167,23 +178,24 @@ def _windows(data: xr.Dataset) -> Picture:
 
 def _rounding(data: xr.Dataset) -> Picture:
     ensembles = by_integrator(data)
-    figure, axes = panels(1, len(ensembles), height=3.6, sharex=True, sharey=True)
+    figure, axes = panels(1, len(ensembles), height=2.4, sharex=True, sharey=True)
     for axis, (name, cell) in zip(axes[0], ensembles.items(), strict=True):
-        style, ensemble = look(name), cell.dropna("window", subset=["elapsed"])
+        mark, ensemble = look(name), cell.dropna("window", subset=["elapsed"])
         steps = ensemble["elapsed"].values
         for drift in ensemble["drift"].values:
-            axis.plot(steps, np.abs(drift), color=style.color, lw=0.5, alpha=0.45)
+            axis.plot(steps, np.abs(drift), color=mark.color, lw=0.5, alpha=0.45)
         axis.plot(
-            steps, ensemble["rms"], style.marker + "-", color=style.color, ms=4, fillstyle=style.fill,
-            label=f"{name}, compensated sums",
+            steps, ensemble["rms"], **line(name, 0.8), label="compensated sums, rms and each start",
         )  # fmt: skip
-        axis.plot(steps, ensemble["plain_rms"], "x--", color=BLACK, ms=4, lw=1.0, label="plain sums")
-        axis.set(xscale="log", yscale="log", title=name, xlabel="steps between the means")
-        axis.xaxis.set_minor_formatter(NullFormatter())
-        slope_guide(axis, 0.5, (steps[0] * 3.0, steps[-1]), 2e-18, r"$n^{1/2}$")
+        axis.plot(steps, ensemble["plain_rms"], "x--", color=BLACK, ms=3, lw=0.9, label="plain sums, rms")
+        axis.set(xscale="log", yscale="log", xlabel="steps in between")
+        axis.set_title(name, fontsize=7.5)
+        style.slope_guide(axis, 0.5, (steps[0] * 3.0, steps[-1]), 2e-18, r"$n^{1/2}$")
     axes[0, 0].set_ylim(bottom=1e-18)
     axes[0, 0].set_ylabel("drift of modified energy (relative)")
-    legend_below(figure, axes)
+    few_ticks(*axes.flat, most=5)
+    style.legend_below(figure, axes)
+    headline(figure, messages.rounding(ensembles))
     caption = (
         f"Drift of the modified energy by rounding near {data['scene'].values[0]}, {PER_NUTATION:.0f} steps a "
         f"nutation, over {float(data['elapsed'].max()):.0e} steps: each of {data.sizes['member']} starts "
@@ -196,33 +208,40 @@ def _rounding(data: xr.Dataset) -> Picture:
 
 
 def _horizons(data: xr.Dataset) -> Picture:
+    """Work per nutation that keeps the phase for N nutations: measured at one N, and by the law of each row elsewhere.
+
+    The phase error is LOST (N / N0)^q (h / h0)^p with the measured exponent q and the declared order p, so that the
+    work grows as N^(q / p).
+    """
     lost = losses(data)
-    figure, axes = panels(1, 2, height=0.9 + 0.2 * len(lost), width_ratios=(1.25, 1.0))
-    left, right = axes[0]
-    for row, (name, loss) in enumerate(lost.items()):
-        style, nutations, error = look(name), loss["nutations"].values, np.abs(loss["phase"].values)
-        good = np.isfinite(nutations) & np.isfinite(error) & (nutations > 0.0) & (error > 0.0)
-        left.plot(*envelope(nutations[good], error[good]), color=style.color, lw=0.9, alpha=0.8)
-        left.plot(loss["predicted"], LOST, "o", mfc="none", color=style.color, ms=9)
-        left.plot(loss["measured"], LOST, style.marker, color=style.color, ms=4, fillstyle=style.fill)
-        right.plot(1e2 * (loss["ratio"] - 1.0), row, style.marker, color=style.color, ms=6, fillstyle=style.fill)
-    left.axhline(LOST, color=GREY, lw=0.8)
-    left.axvspan(0.0, float(data["short"].min()), color=GREY, alpha=0.15, lw=0)
-    left.set(xscale="log", yscale="log", xlabel="nutations", ylabel="phase error of the nutation (rad)")
-    left.set_ylim(LOST * 1e-4, LOST * 4.0)
-    left.plot([], [], "o", mfc="none", color=GREY, ms=9, label="predicted from the grey part")
-    left.plot([], [], "s", color=GREY, ms=4, label="measured")
-    right.axvline(0.0, color=GREY, lw=0.8)
-    right.set(yticks=range(len(lost)), yticklabels=list(lost), ylim=(len(lost) - 0.5, -0.5))
-    right.set_xlabel("predicted less measured time (%)")
-    legend_below(figure, axes)
+    laws = {name: law for name, loss in lost.items() if (law := keeping(name, loss)) is not None}
+    named = chosen(laws)
+    figure, axes = panels(1, 1, height=3.4)
+    axis, ends = axes[0, 0], {}
+    for name, law in laws.items():
+        work = law.work(LENGTHS)
+        if name not in named:
+            axis.plot(LENGTHS, work, color=GREY, lw=0.5, alpha=0.5, zorder=1)
+            continue
+        mark = line(name)
+        axis.plot(LENGTHS, work, color=mark["color"], ls=mark["ls"], lw=1.1)
+        axis.plot(law.length, law.paid, mark["marker"], color=mark["color"], ms=1.2 * mark["ms"], zorder=4)
+        ends[f"{name}, order {law.order}"] = float(LENGTHS[-1]), float(work[-1]), str(mark["color"])
+    axis.set(xscale="log", yscale="log", xlim=(LENGTHS[0], LENGTHS[-1]), xlabel="nutations N that the phase must last")
+    axis.set_ylabel("force evaluations a nutation")
+    few_ticks(axis)
+    if named:
+        cheapest, dearest = (pick(named, key=lambda name: laws[name].work(LENGTHS[-1])) for pick in (min, max))
+        works = [number(float(laws[name].work(LENGTHS[-1]))) for name in (cheapest, dearest)]
+        headline(figure, f"To keep the phase for {number(LENGTHS[-1])} nutations {cheapest} needs {works[0]} "
+                         f"evaluations a nutation, {dearest} {works[1]}")  # fmt: skip
+        name_ends(axis, ends)
     caption = (
-        f"Phase error of the nutation of {data['scene'].values[0]}, every fixed-step row (method[chart]) with a step "
-        "of its own, in the table below, so that all lose their phase at the same time. The time at which it "
-        f"reaches {LOST:g} rad (line) is predicted from the grey part and then measured. {words.predictions(lost)}"
+        f"Force evaluations per nutation that keep the phase error of the nutation of {data['scene'].values[0]} below "
+        f"{LOST:g} rad for N nutations, a line a row, method[chart]. Measured at the marker, where each row with a "
+        "step of its own loses its phase; elsewhere foreseen by its law: error as N^q with the exponent q measured "
+        f"there and h^p with the declared order p, without rounding. Named: {', '.join(named)}; grey: all others. "
+        f"Before the run the time of the loss was predicted too. {words.predictions(lost)}"
     )
-    alt = (
-        "Left, phase errors that rise to a tolerance, with the predicted and the measured time of reaching it; right, "
-        "the difference of the two times in percent."
-    )
+    alt = "Log-log plot of the work per nutation against the nutations that the phase must last, a line a row."
     return Picture("horizons", figure, caption, alt)

@@ -56,10 +56,11 @@ def steps_for(scene: Scene, method: Integrator, target: float) -> float:
 def phase_loss(scene: Scene, method: Integrator, short: float = SHORT, target: float = TARGET) -> xr.Dataset:
     """When the phase error of a fixed-step method reaches `LOST`: predicted from `short` nutations, and measured.
 
-    ``steps`` a nutation; in nutations, ``predicted``, the length ``short`` of the run that predicts, and ``measured``;
-    ``ratio``, predicted over measured. Dimension ``sample``: ``nutations`` and ``phase`` (rad) of the run that
-    measures; ``exponent`` of the growth of its phase error in the last decade, with ``exponent_interval`` (half-width,
-    95 %). If nothing can be predicted there are the first three alone.
+    ``steps`` and force ``evaluations`` a nutation; in nutations, ``predicted``, the length ``short`` of the run that
+    predicts, and ``measured``; ``ratio``, predicted over measured. Dimension ``sample``: ``nutations`` and ``phase``
+    (rad) of the run that measures; ``exponent`` of the growth of its phase error in the last decade, with
+    ``exponent_interval`` (half-width, 95 %). If nothing can be predicted there are only ``steps``, ``predicted`` and
+    ``short``.
     """
     period = scene.nutation_period
     steps = steps_for(scene, method, target)
@@ -71,12 +72,15 @@ def phase_loss(scene: Scene, method: Integrator, short: float = SHORT, target: f
         steps *= 1.3  # the frequency error itself drifts, and a few nutations do not show it
     if not math.isfinite(predicted):
         return xr.Dataset({"steps": steps, "predicted": predicted, "short": short})
-    long = phase_run(scene, method, steps, min(1.1 * predicted, MOST_STEPS / steps))
+    length = min(1.1 * predicted, MOST_STEPS / steps)
+    long = phase_run(scene, method, steps, length)
     fit = growth(long["time"], long["phase"], 1.0)
+    evaluations = long.attrs["force_evaluations"] / length
     measured = lost_at(long["time"], long["phase"], LOST) / period
     return xr.Dataset(
         {
-            "steps": steps, "predicted": predicted, "short": short, "measured": measured, "ratio": predicted / measured,
+            "steps": steps, "evaluations": evaluations, "predicted": predicted, "short": short,
+            "measured": measured, "ratio": predicted / measured,
             "nutations": ("sample", long["time"].values / period), "phase": ("sample", long["phase"].values),
             "exponent": fit.slope, "exponent_interval": fit.interval,
         }

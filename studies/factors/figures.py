@@ -43,11 +43,11 @@ def _effect(bar: Bar, before: Bar) -> str:
 
 def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
     """Time after each change, from SciPy as it is usually called to the fastest kernel, in two orders."""
-    height = 0.42 * max(len(bars) for *_, bars in shown) + 1.0
+    height = 0.24 * max(len(bars) for *_, bars in shown) + 0.7
     figure, axes = style.panels(len(shown), 1, height=height)
     for axis, (scene, span, target, bars) in zip(axes[:, 0], shown, strict=True):
         seconds = [bar.time.seconds for bar in bars]
-        ends = 0.3 * min(seconds), 400.0 * max(seconds)
+        ends = 0.3 * min(seconds), 2000.0 * max(seconds)
         for k, bar in enumerate([*bars, bars[-1]]):
             total = k in (0, len(bars))
             low, high = sorted((ends[0] if total else seconds[k - 1], seconds[min(k, len(bars) - 1)]))
@@ -55,15 +55,19 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
             look = {"hatch": "////", "facecolor": "white"} if slower else {"facecolor": color}
             axis.barh(k, high - low, left=low, height=0.62, edgecolor=color, **look)
             words_beside = ("" if total else f"{_effect(bar, bars[k - 1])}, ") + words.duration(bar.time.seconds)
-            axis.annotate(words_beside, (high, k), (4, 0), textcoords="offset points", va="center", fontsize=8.5)
+            axis.annotate(
+                words_beside, (high, k), (4, 0), textcoords="offset points", va="center", fontsize=style.LEAST_TEXT
+            )
             if k < len(bars):
                 axis.plot([seconds[k]] * 2, [k - 0.31, k + 1.31], color="#444444", lw=0.8)
         last = bars[-1].time
         axis.set(xscale="log", xlim=ends, ylim=(len(bars) + 0.6, -0.6), yticks=range(len(bars) + 1))
-        axis.set_yticklabels([*map(_label, bars), f"{last.name}, {last.call}"], fontsize=9)
+        axis.set_yticklabels([*map(_label, bars), f"{last.name}, {last.call}"], fontsize=style.LEAST_TEXT)
         whole = words.times_faster(seconds[0] / seconds[-1])
         order = "the call last" if bars[-1].factor == "call" else "the call first"
-        axis.set_title(f"{scene}, {span:g} nutations, axis error {target:.0e}: {whole} times faster, {order}")
+        axis.set_title(
+            f"{scene}, {span:g} nutations, axis error {target:.0e}: {whole} times faster, {order}", loc="right"
+        )
         axis.grid(visible=False, axis="y")
         axis.xaxis.set_minor_formatter("")
     for factor in filter(None, COLORS):
@@ -71,6 +75,11 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
     axes[-1, 0].set_xlabel("time of a run (s)")
     noise = max(bar.time.spread for *_, bars in shown for bar in bars)
     style.legend_below(figure, axes)
+    bars = shown[0][-1]
+    largest = max(bars[1:], key=lambda bar: bar.ratio)
+    whole = words.times_faster(bars[0].time.seconds / bars[-1].time.seconds)
+    style.headline(figure, f"The largest part of the factor {whole} is the {largest.factor}: "
+                           f"{words.times_faster(largest.ratio)} times")  # fmt: skip
     return Picture(
         "waterfall",
         figure,
@@ -99,11 +108,11 @@ def draw_charts(data: xr.Dataset) -> Picture:
     first = goals[0][0]
     goals = [goal for goal in goals if goal[0] == first]
     schemes = [scheme for scheme in NAMES if any(scheme == method for *_, cells in goals for method, _ in cells)]
-    figure, axes = style.panels(2, len(goals), height=0.8 + 0.24 * len(schemes), sharey=True)
+    figure, axes = style.panels(2, len(goals), height=0.55 + 0.15 * len(schemes), sharey=True)
     for column, (_, span, target, cells) in enumerate(goals):
         for (scheme, chart), one in cells.items():
             look = style.look(f"{NAMES[scheme]}[{chart}]")
-            marks = {"color": look.color, "marker": look.marker, "fillstyle": look.fill, "ls": "none", "ms": 8.0}
+            marks = {"color": look.color, "marker": look.marker, "fillstyle": look.fill, "ls": "none", "ms": 5.0}
             for axis, value in ((axes[0, column], 1e6 * one.seconds), (axes[1, column], one.forces)):
                 axis.plot(value, schemes.index(scheme) + DODGE[chart], **marks)
         for scheme in schemes:
@@ -120,9 +129,10 @@ def draw_charts(data: xr.Dataset) -> Picture:
     for axis in axes.flat:
         _finish(axis, schemes)
     for chart, fill in style.FILLS.items():
-        axes[0, 0].plot([], [], "o", color="#444444", fillstyle=fill, ms=7.0, label=chart)
+        axes[0, 0].plot([], [], "o", color="#444444", fillstyle=fill, ms=5.0, label=chart)
     style.legend_below(figure, axes)
     sentences = " ".join(words.family_sentences(data))
+    style.headline(figure, words.family_sentences(data)[0].rstrip("."))
     return Picture(
         "charts",
         figure,

@@ -16,8 +16,8 @@ from symtop.runner.study import Picture
 from . import solid, words
 from .long_energy import better_from
 from .tables import ALPHA, FILMED, MIDPOINT, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION, Column
+from .words import PARTS
 
-PARTS = {"spheroid": "first part", "goldstein": "second part"}  # of the notebook
 NAMED = (SOLVER, *words.ORDER_TWO, "strang[axis]", "cayley[axis]")  # the others are thin grey lines
 LABELS = {"energy": "energy (J)", "p_phi": r"$p_\varphi$ (J s)", "p_psi": r"$p_\psi$ (J s)"}
 
@@ -30,7 +30,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 def draw_motion(data: xr.Dataset) -> Picture:
     """Inclination by the notebook's solver, and its difference from the closed form."""
-    figure, (motion, difference) = style.grid(2, 2, ("time (s)", ""), height=3.0)
+    figure, (motion, difference) = style.grid(2, 2, ("time (s)", ""), height=2.0)
     first = data.sel(scene="spheroid", integrator=SOLVER)
     time = first[Column.PATH_TIME].values
     for solver, true, label, color, line in (
@@ -40,9 +40,10 @@ def draw_motion(data: xr.Dataset) -> Picture:
         motion.plot(time, first[solver], line, color=color, label=label)
         difference.plot(time[1:], largest_so_far(first[solver] - first[true])[1:], line, color=color, label=label)
     motion.set_title("the notebook's solver")
-    difference.set(title="largest difference from the closed form so far", yscale="log")
+    difference.set(title="largest difference from the closed form", yscale="log")
     style.legend_below(figure, [motion])
     gap = float(np.abs(first[Column.SOLVER_THETA] - first[Column.TRUE_THETA]).max())
+    style.headline(figure, f"The notebook's solver follows the first scene to {style.number(gap)} rad")
     return Picture(
         "motion",
         figure,
@@ -56,7 +57,7 @@ def draw_motion(data: xr.Dataset) -> Picture:
 
 def draw_derivations(data: xr.Dataset) -> Picture:
     """The two derivations against each other and against the closed form."""
-    figure, axes = style.grid(2, 2, ("time (s)", "largest difference so far"), height=3.2, sharey=True)
+    figure, axes = style.grid(2, 2, ("time (s)", "largest difference so far"), height=2.1, sharey=True)
     lines = (
         (Column.DERIVATIONS_GAP, style.BLUE, "-", "hard way against easy way (rad)"),
         (Column.HARD_GAP, style.VERMILLION, "--", "hard way against closed form (rad)"),
@@ -69,6 +70,8 @@ def draw_derivations(data: xr.Dataset) -> Picture:
             axis.plot(solver[Column.BOTH_TIME], largest_so_far(solver[column]), line, color=color, label=label)
         axis.set(yscale="log", title=f"{name} ({part})")
     style.legend_below(figure, axes)
+    gap = style.number(float(data[Column.DERIVATIONS_GAP].max()))
+    style.headline(figure, f"The hard and the easy derivation agree to {gap} rad")
     return Picture(
         "two-ways",
         figure,
@@ -84,23 +87,26 @@ def draw_derivations(data: xr.Dataset) -> Picture:
 
 def draw_residuals(data: xr.Dataset) -> Picture:
     """Energy and momenta: the solver's as the notebook drew them, and those of every discrete method."""
-    figure, axes = style.panels(3, 3, width=13.0, height=2.3, sharex="col")
+    figure, axes = style.panels(3, 3, height=1.55, sharex="col")
     solver = data.sel(scene="spheroid", integrator=SOLVER)
     for line, name in zip(axes, CONSTANTS, strict=True):
         values = solver[name] - (solver[name].mean() if name == "energy" else solver[name][0])
         line[0].plot(solver[Column.SAMPLE_TIME], values, color=style.look(SOLVER).color, lw=1.0)
-        line[0].set_ylabel(f"residual {LABELS[name]}")
+        line[0].set_ylabel(LABELS[name])
         line[0].ticklabel_format(axis="y", scilimits=(-2, 2))
         for axis, part in zip(line[1:], PARTS, strict=True):
             for method in data["integrator"].values:
                 _residual_line(axis, data.sel(scene=part, integrator=method), name)
             axis.set(yscale="log")
-    titles = ("as the notebook drew it, spheroid", *(f"relative, largest so far, {part}" for part in PARTS))
+    titles = ("residual, as it was drawn", *(f"{part}, relative, so far" for part in PARTS))
     for column, title in zip(axes.T, titles, strict=True):
         column[0].set_title(title)
         column[-1].set_xlabel("time (s)")
+    style.few_ticks(*axes[:, 1:].flat, most=4)
     style.legend_below(figure, axes)
     largest = max(words.largest_momenta(data).values())
+    style.headline(figure, f"All discrete methods keep the momenta to {style.number(largest)}; their energy errors are "
+                           "bounded, the solver's grow")  # fmt: skip
     return Picture(
         "residuals",
         figure,
@@ -119,27 +125,19 @@ def _residual_line(axis: Any, run: xr.Dataset, constant: str) -> None:
     method, values = str(run["integrator"].item()), largest_so_far(run[f"{constant}_residual"])
     good = np.isfinite(values)
     time, values = run[Column.SAMPLE_TIME].values[good][1:], values[good][1:]  # all are zero at the start
-    look, grey = style.look(method), {"color": "#BBBBBB", "lw": 0.7, "zorder": 2, "label": "other discrete methods"}
-    bold = {
-        "color": look.color,
-        "lw": 1.6,
-        "ms": 0.6 * look.size,
-        "markevery": 0.12,
-        "zorder": 3,
-        "label": method,
-        "fillstyle": look.fill,
-    }
-    axis.plot(time, values, look.marker + "-", **bold) if method in NAMED else axis.plot(time, values, **grey)
+    grey = {"color": "#BBBBBB", "lw": 0.7, "zorder": 2, "label": "other discrete methods"}
+    bold = style.line(method, 0.7) | {"markevery": 0.12, "zorder": 3, "label": method}
+    axis.plot(time, values, **(bold if method in NAMED else grey))
 
 
 def draw_hope(data: xr.Dataset) -> Picture:
     """The largest energy error so far of the solver and of the discrete methods, far beyond the notebook's horizon."""
-    figure, axes = style.grid(2, 2, ("time (s)", "largest relative energy error so far"), height=3.6, sharey=True)
+    figure, axes = style.grid(2, 2, ("time (s)", "largest relative energy error so far"), height=2.5, sharey=True)
     for axis, (name, part) in zip(axes, PARTS.items(), strict=True):
         for method in (row for row in NAMED if row in data["integrator"].values):
             run, look = data.sel(scene=name, integrator=method), style.look(method)
-            line = {"color": look.color, "fillstyle": look.fill, "ms": 0.7 * look.size, "markevery": 0.1}
-            axis.plot(run[Column.LONG_TIME], run[Column.LONG_ENERGY], look.marker + "-", **line, label=method)
+            line = style.line(method, 0.8) | {"markevery": 0.1, "label": method}
+            axis.plot(run[Column.LONG_TIME], run[Column.LONG_ENERGY], **line)
             since = better_from(data, name, method) if method != SOLVER else math.inf
             if 0.0 < since < math.inf:
                 axis.axvline(since, color=look.color, lw=0.8, ls=":", zorder=1)
@@ -147,7 +145,9 @@ def draw_hope(data: xr.Dataset) -> Picture:
         end = float(data[Column.SAMPLE_TIME].sel(scene=name).max())
         axis.axvline(end, color=style.GREY, lw=1.0, zorder=1, label="end of the notebook")
     axes[0].plot([], [], ":", color=style.GREY, label="from here on better than the solver")
+    style.few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
+    style.headline(figure, words.hope_message(data))
     return Picture(
         "hope",
         figure,
@@ -160,7 +160,7 @@ def draw_hope(data: xr.Dataset) -> Picture:
 
 def draw_spheres(data: xr.Dataset) -> Picture:
     """The path that the notebook drew and the path of the axis, a quarter turn apart."""
-    figure, axes = style.panels(1, 2, height=4.6, subplot_kw={"projection": "3d"})
+    figure, axes = style.panels(1, 2, height=3.2, subplot_kw={"projection": "3d"})
     for axis, name in zip(axes.flat, PARTS, strict=True):
         run = data.sel(scene=name, integrator=SOLVER)
         drawn = axis_from_angles(run[Column.SOLVER_THETA].values, run[Column.SOLVER_PHI].values + 0.5 * math.pi)
@@ -170,11 +170,12 @@ def draw_spheres(data: xr.Dataset) -> Picture:
         lines = ((drawn, style.VERMILLION, "as the notebook drew it"), (true, style.BLACK, "where the axis is"))
         for path, color, label in lines:
             axis.plot(*path.T, color=color, lw=0.6, alpha=0.35)
-            axis.plot(*path[early].T, color=color, lw=2.2, label=label)
-            axis.plot(*path[:1].T, "o", color=color, ms=7.0)
+            axis.plot(*path[early].T, color=color, lw=1.6, label=label)
+            axis.plot(*path[:1].T, "o", color=color, ms=4.5)
         for letter, place in zip("xyz", 1.15 * np.eye(3), strict=True):
             axis.text(*place, letter, ha="center", va="center")
     style.legend_below(figure, axes)
+    style.headline(figure, "The curve that the notebook drew is the path of the axis, turned by a quarter")
     return Picture(
         "spheres",
         figure,
@@ -208,13 +209,13 @@ def draw_alpha(data: xr.Dataset) -> Picture:
     """What the printed alpha means: the cubic and the motion, against those of a release at rest."""
     second = data.sel(scene="goldstein", integrator=SOLVER)
     rest, rate = float(second[Column.ALPHA_AT_REST]), float(second[Column.ALPHA_RATE])
-    figure, (cubic, motion) = style.grid(2, 2, height=3.6)
+    figure, (cubic, motion) = style.grid(2, 2, height=2.6)
     u, start = second[Column.COSINE], math.cos(math.radians(43.0))
     cubic.plot(u, second[Column.CUBIC_AT_REST], color=style.BLUE, label=f"alpha = {rest:.6f}, at rest")
     cubic.plot(u, second[Column.CUBIC_PRINTED], "--", color=style.VERMILLION, label=f"alpha = {ALPHA:g}, as printed")
     cubic.axvline(start, color=style.GREY, lw=0.9)
     cubic.axhline(0.0, color=style.GREY, lw=0.9)
-    cubic.annotate("cos 43 deg ", (start, -0.18), fontsize=8.5, ha="right")
+    cubic.annotate("cos 43 deg ", (start, -0.18), fontsize=style.LEAST_TEXT, ha="right")
     cubic.set(xlabel=r"$u = \cos\theta$", ylabel=r"$\dot u^2$ (1/s$^2$)", xlim=(0.2, 0.95), ylim=(-0.2, 0.35))
     cubic.set_title("the nutation cubic")
     for column, color, line, label in (
@@ -226,6 +227,7 @@ def draw_alpha(data: xr.Dataset) -> Picture:
     motion.set(xlabel="time (s)", ylabel="theta (degrees)", title="the motion from each start")
     for axis in (cubic, motion):  # the panels share colours, not lines: a legend each
         axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False)
+    style.headline(figure, f"The printed alpha is no release at rest: theta starts at {rate:.3f} rad/s")
     return Picture(
         "alpha",
         figure,
@@ -240,26 +242,35 @@ def draw_alpha(data: xr.Dataset) -> Picture:
 
 def draw_modified_energy(data: xr.Dataset) -> Picture:
     """Energy and modified energy of two discrete methods, over time and against the step."""
-    figure, axes = style.panels(1, 3, width=13.0, height=3.4)
+    figure, axes = style.panels(1, 3, height=2.2)
     midpoint = data.sel(scene="spheroid", integrator=MIDPOINT)
     kinds = ((Column.ENERGY_CHANGE, "energy", "-"), (Column.MODIFIED_CHANGE, "modified energy", "--"))
     for (column, kind, _), color in zip(kinds, (style.BLUE, style.BLACK), strict=True):
         values = midpoint[f"{column}_history"]
         axes[0, 0].plot(midpoint[Column.MODIFIED_TIME], values, color=color, label=f"{kind}, midpoint, over time")
-    axes[0, 0].set(title="spheroid, 40 steps a nutation", xlabel="time (s)", ylabel="relative change since the start")
+    axes[0, 0].set(title="spheroid, 40 steps", xlabel="time (s)", ylabel="relative change")
     for axis, name in zip(axes[0, 1:], PARTS, strict=True):
         for method in MODIFIED:
             run, look = data.sel(scene=name, integrator=method), style.look(method)
             h = run[Column.MODIFIED_STEP]
             for column, kind, line in kinds:
                 face = look.color if line == "-" else "white"
-                axis.plot(h, run[column], look.marker + line, color=look.color, mfc=face, label=f"{kind}, {method}")
+                axis.plot(
+                    h,
+                    run[column],
+                    look.marker + line,
+                    color=look.color,
+                    mfc=face,
+                    ms=0.8 * look.size,
+                    label=f"{kind}, {method}",
+                )
         for power, column in ((2, Column.ENERGY_CHANGE), (4, Column.MODIFIED_CHANGE)):
             span = float(h.min()), float(h.max())
             style.slope_guide(axis, power, span, 0.2 * float(run[column].min()), f"$h^{power}$")
-        axis.set(xscale="log", yscale="log", title=name, xlabel="step size (s)", ylabel="largest relative change")
-        axis.xaxis.set_minor_formatter("")
+        axis.set(xscale="log", yscale="log", title=name, xlabel="step size (s)", ylabel="largest change")
+        style.few_ticks(axis, most=4)
     style.legend_below(figure, axes)
+    style.headline(figure, words.modified_message(data))
     return Picture(
         "modified-energy",
         figure,

@@ -12,6 +12,7 @@ from .derivations import notebook_top
 from .long_energy import answer, better_from
 from .tables import ALPHA, MIDPOINT, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION, Column
 
+PARTS = {"spheroid": "first part", "goldstein": "second part"}  # of the notebook
 MOMENTA = ("p_phi_largest", "p_psi_largest")
 KEPT = 1e-12  # relative, over 8 s: a momentum that changes by less is kept to rounding
 ORDER_TWO = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]")
@@ -55,6 +56,26 @@ def momenta(data: xr.Dataset) -> str:
 def hopes(data: xr.Dataset) -> list[str]:
     """Whether, and from when on, the methods of order two keep the energy better than the solver."""
     return answer(data, ORDER_TWO)
+
+
+def hope_message(data: xr.Dataset) -> str:
+    """How many methods of order two keep the energy better than the solver in the end, on each scene, as a title."""
+    parts = []
+    for scene in PARTS:
+        since = [better_from(data, scene, method) for method in ORDER_TWO if method in data["integrator"].values]
+        parts.append(f"{sum(math.isfinite(time) for time in since)} of {len(since)} on {scene}")
+    return f"In the long run the rules of order two keep the energy better than the solver: {', '.join(parts)}"
+
+
+def modified_message(data: xr.Dataset) -> str:
+    """The powers of the step with which energy and modified energy change, of one method, as a title."""
+    run = data.sel(scene="spheroid", integrator=MODIFIED[0])
+    slopes = [power_law(run[Column.MODIFIED_STEP].values, run[column].values).slope
+              for column in (Column.ENERGY_CHANGE, Column.MODIFIED_CHANGE)]  # fmt: skip
+    return (
+        f"The energy changes as h^{slopes[0]:.1f}, the modified energy as h^{slopes[1]:.1f}, with {MODIFIED[0]}: it "
+        "is bounded"
+    )
 
 
 def energy(data: xr.Dataset) -> str:

@@ -22,9 +22,9 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 def draw_notebook(data: xr.Dataset) -> Picture:
     """The notebook's experiment for every damping."""
-    figure, axes = style.grid(len(OSCILLATORS), 3, (TIME, "x"), height=2.5, sharex=True, sharey=True)
+    figure, axes = style.grid(len(OSCILLATORS), 3, (TIME, "x"), height=1.6, sharex=True, sharey=True)
     lines = (
-        (Column.ANALYTIC, "-", {"color": style.BLACK, "lw": 4.0, "alpha": 0.35, "label": "analytic"}),
+        (Column.ANALYTIC, "-", {"color": style.BLACK, "lw": 3.0, "alpha": 0.35, "label": "analytic"}),
         (Column.UPDATE, "-", {"color": style.BLUE, "label": "the notebook's update = midpoint rule"}),
         (Column.GUESS, "--", {"color": style.VERMILLION, "lw": 1.0, "label": "the notebook's guess at the forces"}),
     )
@@ -34,6 +34,8 @@ def draw_notebook(data: xr.Dataset) -> Picture:
             axis.plot(run[Column.NOTEBOOK_TIME], run[column], line, **options)
         axis.set(title=words.title(oscillator), ylim=(-1.3, 8.5))
     style.legend_below(figure, axes)
+    gap = style.number(float(data[Column.UPDATE_GAP].max()))
+    style.headline(figure, f"The notebook's update is the midpoint rule, to {gap}; its guess damps nothing")
     return Picture(
         "seed",
         figure,
@@ -50,7 +52,7 @@ def draw_notebook(data: xr.Dataset) -> Picture:
 
 def draw_orders(data: xr.Dataset) -> Picture:
     """Errors of the position and of the slow exponent against the step."""
-    figure, axes = style.panels(2, 6, width=13.0, height=2.7, sharex=True, sharey="row")
+    figure, axes = style.panels(2, 6, height=1.8, sharex=True, sharey="row")
     for column, (name, oscillator) in zip(axes.T, OSCILLATORS.items(), strict=True):
         for axis, error in zip(column, (Column.POSITION_ERROR, Column.EXPONENT_ERROR), strict=True):
             for method, marker in SYMBOLS.items():
@@ -58,15 +60,19 @@ def draw_orders(data: xr.Dataset) -> Picture:
                 color = style.PURPLE if method == ONE_SIDED else style.look(method).color
                 face = "none" if method == "trapezoidal" else color
                 errors = run[error].where(run[error] > 1e-13)  # above rounding
-                axis.plot(run[Column.STEP], errors, marker + "-", color=color, ms=4, mfc=face, label=method)
+                axis.plot(run[Column.STEP], errors, marker + "-", color=color, ms=2.6, lw=0.9, mfc=face, label=method)
             style.slope_guide(axis, 2.0, (1e-2, 1.0), 1e-9, "$h^2$")
             axis.set(xscale="log", yscale="log")
         style.slope_guide(column[0], 1.0, (1e-3, 1e-1), 2e-2, "$h$")
         column[0].set_title(words.title(oscillator, "\n"))
-        column[1].set_xlabel(TIME.replace("time", "step size"))
+        column[1].set_xlabel("step")
     axes[0, 0].set_ylabel("largest error of x")
     axes[1, 0].set_ylabel("relative error of\nthe slow exponent")
+    style.few_ticks(*axes.flat, most=2)
     style.legend_below(figure, axes)
+    halves = [order(data, "damping-2", m, Column.EXPONENT_ERROR).slope for m in ("trapezoidal", ONE_SIDED)]
+    style.headline(figure, f"At critical damping the slow exponent is right to order {halves[0]:.1f} (trapezoidal) and "
+                           f"{halves[1]:.1f} (one-sided force) only")  # fmt: skip
     least, most = (float(value(data[Column.STEP])) for value in (np.nanmin, np.nanmax))
     halved = (f"{m} {order(data, 'damping-2', m, Column.EXPONENT_ERROR).slope:.2f}" for m in ("trapezoidal", ONE_SIDED))
     return Picture(
@@ -89,12 +95,15 @@ def draw_decay(data: xr.Dataset) -> Picture:
     figure, axes = style.grid(len(AGAINST_RK45), 2, (TIME, "largest |E/E(exact) - 1| so far"), sharey=True)
     for axis, name in zip(axes, AGAINST_RK45, strict=True):
         for method in (*RULES, RK45):
-            run, look = data.sel(scene=name, integrator=method), style.look(method)
+            run = data.sel(scene=name, integrator=method)
             time, error = run[Column.TIME].values, largest_so_far(run[Column.ENERGY_ERROR])
-            line = {"color": look.color, "ms": 0.7 * look.size, "markevery": 0.1, "label": method}
-            axis.plot(time[1:], error[1:], look.marker + "-", **line)
+            axis.plot(time[1:], error[1:], **style.line(method, 0.8), markevery=0.1, label=method)
         axis.set(xscale="log", yscale="log", title=words.title(OSCILLATORS[name]))
     style.legend_below(figure, axes)
+    largest = np.abs(data[Column.ENERGY_ERROR]).max("sample").sel(scene=AGAINST_RK45[0])
+    ends = [f"{method} {style.number(float(largest.sel(integrator=method)))}" for method in (*RULES, RK45)]
+    free = words.title(OSCILLATORS[AGAINST_RK45[0]])
+    style.headline(figure, f"Energy at equal cost, {free}: largest relative error {', '.join(ends)}")
     return Picture(
         "decay",
         figure,
@@ -107,7 +116,7 @@ def draw_decay(data: xr.Dataset) -> Picture:
 def draw_tops(data: xr.Dataset) -> Picture:
     """Inclination, momenta and momentum balance of the damped tops."""
     names = tops(data)
-    figure, axes = style.panels(3, len(names), width=4.8 * max(2, len(names)), height=2.3, sharex="col")
+    figure, axes = style.panels(3, len(names), height=1.6, sharex="col")
     for (theta, momenta, balance), name in zip(axes.T, names, strict=True):
         first = data.sel(scene=name, integrator="midpoint")
         time = first[Column.TOP_TIME].values
@@ -126,6 +135,9 @@ def draw_tops(data: xr.Dataset) -> Picture:
     for axis, label in zip(axes[:, 0], labels, strict=True):
         axis.set_ylabel(label)
     style.legend_below(figure, axes)
+    ours, theirs = (style.number(words.largest_balance(data, some)) for some in (RULES, (RK45,)))
+    style.headline(figure, f"The momentum balance with friction holds to {ours} in the discrete rules, to {theirs} in "
+                           "RK45")  # fmt: skip
     return Picture(
         "damped-top",
         figure,
@@ -143,20 +155,24 @@ def draw_tops(data: xr.Dataset) -> Picture:
 def draw_top_orders(data: xr.Dataset) -> Picture:
     """Errors of theta of the damped tops against the step."""
     labels = ("step size (s)", "largest error of theta (rad)")
-    figure, axes = style.grid(len(tops(data)), 2, labels, height=3.2, sharey=True)
+    figure, axes = style.grid(len(tops(data)), 2, labels, height=2.3, sharey=True)
     bound = {"color": style.GREY, "lw": 3, "alpha": 0.5, "label": "error of the reference"}
     orders = []
     for axis, name in zip(axes, tops(data), strict=True):
         for method in RULES:
-            run, look = data.sel(scene=name, integrator=method), style.look(method)
+            run = data.sel(scene=name, integrator=method)
             h, error = run[Column.TOP_STEP], run[Column.THETA_ERROR]
-            axis.plot(h, error, look.marker + "-", color=look.color, label=method)
+            axis.plot(h, error, **style.line(method), label=method)
             orders.append(f"{method} on {name} {order(data, name, method, Column.THETA_ERROR)}")
         axis.axhline(float(run[Column.TOP_BOUND]), **bound)
         style.slope_guide(axis, 2.0, (float(h.min()), float(h.max())), 0.3 * float(error.min()), "$h^2$")
         axis.set(xscale="log", yscale="log", title=f"{name}, damped")
-        axis.xaxis.set_minor_formatter("")
+    style.few_ticks(*axes, most=4)
     style.legend_below(figure, axes)
+    slopes = [order(data, name, method, Column.THETA_ERROR).slope for name in tops(data) for method in RULES]
+    judged = [slope for slope in slopes if np.isfinite(slope)]
+    span = f"slopes from {min(judged):.2f} to {max(judged):.2f}" if judged else "too few steps to judge the order"
+    style.headline(figure, f"The discrete rules with friction: {span}")
     return Picture(
         "damped-top-orders",
         figure,

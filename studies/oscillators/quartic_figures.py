@@ -22,17 +22,21 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 def draw_errors(data: xr.Dataset) -> Picture:
     """Errors of the four maps against the step, one panel an oscillator."""
     labels = ("step size over the period T", "largest relative error of x")
-    figure, axes = style.grid(len(QUARTICS), 3, labels, height=2.9, sharex=True, sharey=True)
+    figure, axes = style.grid(len(QUARTICS), 3, labels, height=1.9, sharex=True, sharey=True)
     for axis, name in zip(axes, QUARTICS, strict=True):
         for method in MAPS:
             cell, look = data.sel(scene=name, integrator=method), LOOKS[method]
             errors = np.maximum(cell[quartic.ERROR], SMALLEST)
-            axis.plot(cell[quartic.STEP], errors, look.marker + "-", color=look.color, ms=4, label=method)
+            axis.plot(cell[quartic.STEP], errors, look.marker, ls=look.dash, color=look.color, ms=3, label=method)
         style.slope_guide(axis, 2.0, (1e-2, 0.4), 1e-5, "$h^2$")
         axis.axvline(0.5, color=style.GREY, lw=0.9, ls=":")
         axis.set(xscale="log", yscale="log", ylim=(1e-17, 10.0), title=name)
-    axes[0].annotate("T/2 ", (0.5, 1e-9), color="#444444", fontsize=8.5, ha="right", va="center")
+    axes[0].annotate("T/2 ", (0.5, 1e-9), color="#444444", fontsize=style.LEAST_TEXT, ha="right", va="center")
+    style.few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
+    exact = float(data[quartic.ERROR].sel(scene=list(QUARTICS), integrator=MAPS[0]).max())
+    style.headline(figure, f"With exact constants the map is the motion at any step, to {style.number(exact)}; with "
+                           "constants to order h^2 it has order 2")  # fmt: skip
     return Picture(
         "quartic-errors",
         figure,
@@ -47,8 +51,8 @@ def draw_errors(data: xr.Dataset) -> Picture:
 
 def draw_orbits(data: xr.Dataset) -> Picture:
     """|x_{n+1}|^2 over |x_n|^2 of the maps, on the curve that the motion draws."""
-    figure, axes = style.panels(len(quartic.SHOWN), len(DRAWN), width=10.5, height=3.3, sharex="col", sharey="col")
-    curve = {"color": style.ORANGES[2], "lw": 5.0, "label": "the motion: |x(t)|, |x(t + h)|"}
+    figure, axes = style.panels(len(quartic.SHOWN), len(DRAWN), height=2.3, sharex="col", sharey="col")
+    curve = {"color": style.ORANGES[2], "lw": 3.5, "label": "the motion: |x(t)|, |x(t + h)|"}
     for row, steps in enumerate(quartic.SHOWN):
         for axis, name in zip(axes[row], DRAWN, strict=True):
             true = data.sel(scene=name, integrator=MAPS[0]).isel(quartic_shown=row)
@@ -56,16 +60,20 @@ def draw_orbits(data: xr.Dataset) -> Picture:
             for method in reversed(MAPS):
                 squares = data[quartic.ORBIT].sel(scene=name, integrator=method).isel(quartic_shown=row).values
                 look, face = LOOKS[method], "none" if method == MAPS[0] else LOOKS[method].color
-                dots = {"color": look.color, "mfc": face, "ms": 5.0 if method == MAPS[0] else 2.5, "lw": 0}
+                dots = {"color": look.color, "mfc": face, "ms": 3.6 if method == MAPS[0] else 1.8, "lw": 0}
                 axis.plot(squares[:-1], squares[1:], look.marker, label=method, **dots)
             low, high = float(true[quartic.CURVE_HERE].min()), float(true[quartic.CURVE_HERE].max())
             margin = 0.25 * (high - low)
             axis.set(xlim=(low - margin, high + margin), ylim=(low - margin, high + margin))
-            axis.set_title(f"{name}, h = T/{steps:g}")
+            axis.set_title(f"{name}, T/{steps:g}", fontsize=7.5)
         axes[row, 0].set_ylabel("$|x_{n+1}|^2$ over the largest")
     for axis in axes[-1]:
         axis.set_xlabel("$|x_n|^2$ over the largest")
     style.legend_below(figure, axes)
+    far = {method: quartic.off_curve(data, DRAWN[0], method) for method in MAPS}
+    off = style.number(min(value for method, value in far.items() if method != MAPS[0]))
+    at = f"at T/{quartic.SHOWN[-1]:g} the others are off by {off} at least"
+    style.headline(figure, f"Only the exact map stays on the curve of the motion: {at}")
     away = ", ".join(f"{method} {quartic.off_curve(data, DRAWN[0], method):.1g}" for method in MAPS[1:])
     return Picture(
         "quartic-orbits",
@@ -82,7 +90,7 @@ def draw_orbits(data: xr.Dataset) -> Picture:
 
 def draw_constants(data: xr.Dataset) -> Picture:
     """A, B and delta against the step, and how their distances from the neighbours' vanish."""
-    figure, axes = style.panels(1, 3, width=11.0, height=3.3)
+    figure, axes = style.panels(1, 3, height=2.4)
     true = data.sel(scene=quartic.CHI[0], integrator=MAPS[0])
     steps = true[quartic.STEP].values
     limit = quartic.oscillator_of(quartic.CHI[0])
@@ -92,11 +100,11 @@ def draw_constants(data: xr.Dataset) -> Picture:
     axes[0, 0].plot(steps, true[quartic.A], "D-", color=LOOKS[MAPS[0]].color, ms=4)
     axes[0, 0].annotate("$A$", (0.31, 0.55), color=LOOKS[MAPS[0]].color)
     axes[0, 0].axhline(0.0, color=style.GREY, lw=0.9)
-    axes[0, 0].set(ylim=(-1.3, 1.1), xlabel="step size over T", title="A, zero at half a nutation")
+    axes[0, 0].set(ylim=(-1.3, 1.1), xlabel="step size over T", title="A")
     axes[0, 1].axhline(1.0, color=style.ORANGE)
     axes[0, 1].plot(steps, true[quartic.B_OVER], "D-", color=LOOKS[MAPS[0]].color, ms=4)
     axes[0, 1].annotate(r"$-B/\sigma h^2$", (0.3, float(true[quartic.B_OVER].min())), ha="right")
-    axes[0, 1].set(xlabel="step size over T", title=r"$-B/\sigma h^2$, one in stormer-verlet's limit")
+    axes[0, 1].set(xlabel="step size over T", title=r"$-B/\sigma h^2$")
     shades = (style.BLUE, style.VERMILLION, style.GREEN)
     labels = (("A", 4, 1.6), ("B", 4, 0.5), (r"\delta", 3, 1.0))  # the last: how far above its line's end
     for gap, (symbol, power, above), shade in zip(GAPS, labels, shades, strict=True):
@@ -105,7 +113,10 @@ def draw_constants(data: xr.Dataset) -> Picture:
         place = 0.004, above * float(values[-1])
         axes[0, 2].annotate(f"${symbol}$, $h^{power}$", place, color=shade, va="center", ha="right")
     axes[0, 2].set(xscale="log", yscale="log", xlim=(1e-3, 0.7), ylim=(1e-7, 20.0), xlabel="step size over T")
-    axes[0, 2].set_title("distance from the limit of small steps")
+    axes[0, 2].set_title("distance from the limit")
+    style.few_ticks(axes[0, 2], most=4)
+    style.headline(figure, "The exact constants leave their limit of small steps: A stays within [-1, 1] where its "
+                           "parabola does not")  # fmt: skip
     return Picture(
         "quartic-constants",
         figure,

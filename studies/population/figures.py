@@ -1,5 +1,6 @@
 """The figures of the population study: run lengths, slowdowns and wins, strata, silent failures, the guard."""
 
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,8 @@ import xarray as xr
 
 from symtop.methods.registry import split_name
 from symtop.model.charts import Array
-from symtop.report.style import BLACK, GREY, ORANGES, grid, legend_below, look, panels
+from symtop.report import style
+from symtop.report.style import LEAST_TEXT, few_ticks, grid, headline, look, number, panels
 from symtop.run.guard import EXPECTED
 from symtop.runner.study import Picture
 
@@ -16,9 +18,8 @@ from .costs import run_lengths
 from .ladder import KEPT, WRONG
 from .verdicts import ALL, UNITS, Cell
 
-NAMED = 8  # rows with a label; all others are thin and grey
-FAMILIAR = ("rk4[axis]", "rk45-compiled[axis]", "strang[axis]", "midpoint[angles]")  # always among them, dashed
-TEXT = "#222222"  # of labels: the lighter shades of a family are no colour for letters
+NAMED = 6  # rows with a label; all others are thin and grey
+FAMILIAR = ("rk4[axis]", "strang[axis]", "midpoint[angles]")  # always among them, thin
 MARKS = 9  # on a line
 SHOWN = 12  # rows of a panel of slowdowns
 FAR = 1e3  # slowdown at which an axis ends
@@ -58,11 +59,8 @@ def named(data: xr.DataTree, horizon: str, unit: str) -> list[str]:
 
 
 def drawn(name: str) -> dict[str, Any]:
-    """How a named row is drawn: its look, as in every figure, and thin and dashed if it is familiar."""
-    mark, known = look(name), name in FAMILIAR
-    style = {"lw": 1.3, "ls": "--"} if known else {"lw": 2.2, "ls": "-"}
-    shape = {"color": mark.color, "marker": mark.marker, "fillstyle": mark.fill, "ms": 5.5}
-    return {**shape, **style, "zorder": 3, "label": name}
+    """How a named row is drawn: its look, as in every figure, and thin if it is familiar."""
+    return style.line(name) | {"lw": 0.9 if name in FAMILIAR else 1.7, "zorder": 3, "label": name}
 
 
 def label_lines(axis: Any, lines: dict[str, tuple[Array, Array]], top: float) -> None:
@@ -77,11 +75,11 @@ def label_lines(axis: Any, lines: dict[str, tuple[Array, Array]], top: float) ->
         height = at if at > 0.8 * height else height  # a line that ends low does not press down those behind it
         k = min(int(np.searchsorted(y, at)), len(x) - 1)
         axis.annotate(
-            name, (x[k], at), ha="right" if k > 0.8 * len(x) else "center", va="center", fontsize=8.5,
-            color=TEXT, zorder=5,
+            name, (x[k], at), ha="right" if k > 0.8 * len(x) else "center", va="center",
+            fontsize=LEAST_TEXT, color=style.ink(look(name).color), zorder=5,
             bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
         )  # fmt: skip
-        height -= 0.085
+        height -= 0.1
 
 
 def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Picture:
@@ -89,7 +87,7 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
     targets, rows = verdicts.targets(data), named(data, horizon, unit)
     scale = 1e6 if unit != "evaluations" else 1.0
     label = "force evaluations of a run" if unit == "evaluations" else "force evaluations x time of one (us)"
-    figure, axes = grid(len(targets), 2, (label, "share of tops solved"), width=11.5, height=3.9)
+    figure, axes = grid(len(targets), 2, (label, "share of tops solved"), height=2.5)
     for axis, target in zip(axes, targets, strict=True):
         taken = verdicts.costs(data, Cell(horizon, "axis", target), unit)
         ends = [
@@ -107,20 +105,23 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
                 if share[-1] >= LEAST:
                     lines[name] = scale * budgets, share
             else:
-                axis.plot(scale * budgets, share, color=GREY, lw=0.6, alpha=0.4, zorder=1)
+                axis.plot(scale * budgets, share, color=style.GREY, lw=0.6, alpha=0.4, zorder=1)
         label_lines(axis, lines, 0.78)
         axis.set(xscale="log", ylim=(0.0, 1.03), title=f"axis error below {power(target)} rad")
         axis.set_xlim(scale * budgets[0], scale * budgets[-1])
         axis.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
         if axis is axes[0]:
             axis.annotate(
-                "faster", (0.03, 0.93), (0.17, 0.93), xycoords="axes fraction", va="center", fontsize=9.5,
+                "faster", (0.03, 0.93), (0.2, 0.93), xycoords="axes fraction", va="center",
                 arrowprops={"arrowstyle": "->"},
             )  # fmt: skip
         if lacking := [name for name in rows if name not in lines]:
             said = f"below {LEAST:.0%} within the budget:\n" + "\n".join(lacking)
-            axis.text(0.02, 0.97, said, transform=axis.transAxes, fontsize=8, color="#444444", va="top")
-    asked = verdicts.costs(data, Cell(horizon, "axis", targets[0]), unit).values.shape[1]
+            axis.text(0.02, 0.97, said, transform=axis.transAxes, fontsize=LEAST_TEXT, color="#444444", va="top")
+    few_ticks(*axes, most=5)
+    first = verdicts.costs(data, Cell(horizon, "axis", targets[0]), unit)
+    headline(figure, _ahead(data, horizon, unit))
+    asked = first.values.shape[1]
     return Picture(
         f"run-lengths-{unit}",
         figure,
@@ -128,37 +129,65 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
         f"the left is faster, one that ends higher solves more tops within {words.budget(data, horizon)} force "
         f"evaluations a nutation. {words.span(data, horizon)} ({asked:,} of them have a nutation wider than the "
         "coarsest error), no named scene. At each cost every row has the step or tolerance that suits the top. "
-        f"Cost in {UNITS[unit]}. Coloured: rows that win on the most tops; dashed: familiar ones; grey: all others. "
+        f"Cost in {UNITS[unit]}. Thick: rows that win on the most tops; thin: familiar ones; grey: all others. "
         f"{words.winner_sentence(data, Cell(horizon, 'axis', targets[0]), unit)}.",
         f"Empirical distribution functions of the cost, one panel for each axis error, {len(rows)} lines labelled.",
     )
 
 
+def _ahead(data: xr.DataTree, horizon: str, unit: str) -> str:
+    """Who wins on the most tops at the coarsest target and at the finest that anybody meets, as a title."""
+    winners = []
+    for target in verdicts.targets(data):
+        taken, won = verdicts.best(data, Cell(horizon, "axis", target), unit)
+        if won is not None:
+            winners.append((taken.names[won.row], f"on {won.share.value:.0%} of the tops at {number(target)} rad"))
+    if not winners:
+        return "No row meets a target"
+    (first, where), (last, there) = winners[0], winners[-1]
+    if len(winners) < 2:
+        return f"{first} wins {where}"
+    return f"{first} wins {where}, {there if last == first else f'{last} {there}'}"
+
+
 def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
     """The best rows of each target: median and 10 to 90 % of the slowdown, and the share of tops on which they win."""
     targets = verdicts.targets(data)
-    labels = ("evaluations x seconds of one, over the cheapest row's", "")
-    figure, axes = grid(len(targets), 2, labels, width=11.5, height=0.27 * SHOWN + 0.9)
+    labels = ("slowdown: cost over the cheapest row's", "")
+    figure, axes = grid(len(targets), 2, labels, height=0.145 * SHOWN + 0.75)
     for axis, target in zip(axes, targets, strict=True):
         listed = verdicts.standings(verdicts.costs(data, Cell(horizon, "axis", target), words.UNIT))
         listed = [one for one in listed if np.isfinite(one.slowdown[1])][:SHOWN]
         for place, one in enumerate(listed):
             low, middle, high = one.slowdown
             mark = look(one.name)
-            axis.plot([low, min(high, FAR)], [place, place], color=mark.color, lw=2.0, solid_capstyle="butt")
+            axis.plot([low, min(high, FAR)], [place, place], color=mark.color, lw=1.5, solid_capstyle="butt")
             if not np.isfinite(high):
-                axis.plot(0.8 * FAR, place, ">", color=mark.color, ms=5)
-            axis.plot(middle, place, mark.marker, color=mark.color, ms=7, fillstyle=mark.fill)
-            said = f"{words.percent(one.won)}, level {words.percent(one.level)}"
+                axis.plot(0.8 * FAR, place, ">", color=mark.color, mfc="white", ms=4)
+            axis.plot(middle, place, mark.marker, color=mark.color, ms=5, fillstyle=mark.fill)
+            said = f"{one.won.value:.0%}, {one.level.value:.0%}"
             axis.annotate(
-                said, (1.02, place), xycoords=("axes fraction", "data"), va="center", fontsize=8, annotation_clip=False
+                said,
+                (1.02, place),
+                xycoords=("axes fraction", "data"),
+                va="center",
+                fontsize=LEAST_TEXT,
+                annotation_clip=False,
             )
         axis.set(xscale="log", xlim=(0.9, FAR), ylim=(SHOWN - 0.4, -0.6), yticks=range(len(listed)))
-        axis.set_yticklabels([one.name for one in listed], fontsize=8.5)
-        axis.set_title(f"axis error below {power(target)} rad")
-        axis.annotate("wins on", (1.02, 1.02), xycoords="axes fraction", fontsize=8, va="bottom", annotation_clip=False)
-        axis.xaxis.set_major_formatter("{x:g}")
+        axis.set_yticklabels([one.name for one in listed], fontsize=LEAST_TEXT)
+        axis.set_title(f"to {power(target)} rad")
+        axis.annotate(
+            "wins,\nlevel",
+            (1.02, 1.0),
+            xycoords="axes fraction",
+            fontsize=LEAST_TEXT,
+            va="bottom",
+            annotation_clip=False,
+        )
+        axis.set_xticks([1.0, 10.0, 100.0, 1000.0], ["1", "10", "100", "1000"])
         axis.grid(visible=False, axis="y")
+    headline(figure, _ahead(data, horizon, words.UNIT))
     return Picture(
         f"slowdowns-{horizon}",
         figure,
@@ -177,12 +206,12 @@ def draw_strata(data: xr.DataTree) -> Picture:
     from matplotlib.colors import to_rgb
 
     targets, kinds, spans = verdicts.targets(data), [ALL, *verdicts.strata(data)], verdicts.horizons(data)
-    figure, axes = panels(1, len(spans), width=11.5, height=0.8 + 0.5 * len(kinds), sharey=True)
+    figure, axes = panels(1, len(spans), height=0.8 + 0.44 * len(kinds), sharey=True)
     for axis, horizon in zip(axes[0], spans, strict=True):
         for line, kind in enumerate(kinds):
             for column, target in enumerate(targets):
                 taken, won = verdicts.best(data, Cell(horizon, "axis", target, kind), words.UNIT)
-                label, color, size = "not asked" if not taken.values.size else "none", "#444444", 7.5
+                label, color = "not asked" if not taken.values.size else "none", "#444444"
                 if won is not None:
                     method, chart = split_name(taken.names[won.row])
                     strength = 0.95 if won.sure else 0.35
@@ -191,9 +220,9 @@ def draw_strata(data: xr.DataTree) -> Picture:
                     axis.fill_between(*box, color=shade, lw=0)
                     color = "white" if shade @ np.array([0.3, 0.59, 0.11]) < 0.55 else "black"
                     share = f"{won.share.value:.0%}" if won.share.count else "level"
-                    label = f"{'' if won.sure else '~'}{method}\n[{chart}] {share}"
-                    size = min(8.0, 130.0 / len(method))
-                axis.text(column, line, label, ha="center", va="center", fontsize=size, color=color, linespacing=1.2)
+                    name = "\n".join(textwrap.wrap(f"{'' if won.sure else '~'}{method}", 12))
+                    label = f"{name}\n{chart} {share}"
+                axis.text(column, line, label, ha="center", va="center", fontsize=LEAST_TEXT, color=color)
         axis.set(
             xlim=(-0.5, len(targets) - 0.5), ylim=(len(kinds) - 0.5, -0.5), yticks=range(len(kinds)),
             yticklabels=["all tops", *kinds[1:]], xticks=range(len(targets)), xticklabels=map(power, targets),
@@ -201,6 +230,7 @@ def draw_strata(data: xr.DataTree) -> Picture:
         )  # fmt: skip
         axis.grid(visible=False)
         axis.tick_params(length=0)
+    headline(figure, words.strata_message(data))
     return Picture(
         "strata",
         figure,
@@ -216,7 +246,7 @@ def draw_strata(data: xr.DataTree) -> Picture:
 def draw_silent(data: xr.DataTree) -> Picture:
     """Wrong runs, and the part of them that nothing warns of, against the steps a nutation."""
     rows = named(data, "short", words.UNIT)
-    figure, axes = panels(1, 2, width=11.5, height=4.2, sharex=True)
+    figure, axes = panels(1, 2, height=2.6, sharex=True)
     for name in verdicts.judged_rows(data):
         one = verdicts.health(data, name)
         if not one.fixed_step:
@@ -227,12 +257,14 @@ def draw_silent(data: xr.DataTree) -> Picture:
             if name in rows:
                 axis.plot(one.setting, values, **drawn(name))
             else:
-                axis.plot(one.setting, values, color=GREY, lw=0.6, alpha=0.5, zorder=1)
+                axis.plot(one.setting, values, color=style.GREY, lw=0.6, alpha=0.5, zorder=1)
     for axis, title in zip(axes[0], ("runs that are wrong", "of the wrong runs, those that look healthy"), strict=True):
         axis.set(xscale="log", ylim=(0.0, 1.03), title=title, xlabel="steps a nutation", ylabel="share")
         axis.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
         axis.xaxis.set_major_formatter("{x:g}")
-    legend_below(figure, axes)
+    few_ticks(*axes.flat, most=4)
+    style.legend_below(figure, axes)
+    headline(figure, words.silent_message(data))
     return Picture(
         "silent",
         figure,
@@ -248,22 +280,25 @@ def draw_silent(data: xr.DataTree) -> Picture:
 def draw_guard(data: xr.DataTree) -> Picture:
     """Hits of the guard against its false alarms, by the threshold of its forecast; with the one that it uses."""
     spans = verdicts.horizons(data)
-    figure, axes = panels(1, len(spans), width=9.6, height=4.2, sharey=True)
+    figure, axes = panels(1, len(spans), height=2.9, sharey=True)
     for axis, horizon in zip(axes[0], spans, strict=True):
         for score, label, color, spot in (
-            ("foretold", "the guard, before the run", BLACK, (0.03, 0.92)),
-            ("watched", "energy and momenta, after it", ORANGES[1], (0.40, 0.35)),
+            ("foretold", "the guard, before the run", style.BLACK, (0.03, 0.92)),
+            ("watched", "energy and momenta, after it", style.ORANGES[1], (0.40, 0.35)),
         ):
             curve, (hits, alarms) = verdicts.detected(data, horizon, score), verdicts.caught(data, horizon, score)
             axis.plot(np.maximum(curve.alarms, RARE), curve.hits, color=color, lw=2.0)
             axis.plot(max(alarms.value, RARE), hits.value, "o", color=color, ms=7)
             axis.annotate(
                 f"{label}\n{words.percent(hits)} of wrong runs,\n{words.percent(alarms)} of right ones",
-                (max(alarms.value, RARE), hits.value), spot, textcoords="axes fraction", fontsize=9, color=color,
-                va="top", arrowprops={"arrowstyle": "-", "color": color, "lw": 0.7},
+                (max(alarms.value, RARE), hits.value), spot, textcoords="axes fraction", fontsize=LEAST_TEXT,
+                color=color, va="top", arrowprops={"arrowstyle": "-", "color": color, "lw": 0.7},
             )  # fmt: skip
         axis.set(xscale="log", xlim=(RARE, 1.05), ylim=(-0.01, 1.03), title=words.span(data, horizon))
         axis.set(xlabel="false alarms: share of right runs with a warning", ylabel="hits: share of wrong runs")
+    hits, alarms = verdicts.caught(data, spans[0])
+    headline(figure, f"Before a run the guard finds {words.percent(hits)} of the wrong ones, and suspects "
+                     f"{words.percent(alarms)} of the right ones")  # fmt: skip
     return Picture(
         "guard",
         figure,

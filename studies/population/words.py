@@ -131,6 +131,30 @@ def strata_sentence(data: xr.DataTree, horizon: str = "short") -> str:
     )
 
 
+def strata_message(data: xr.DataTree, horizon: str = "short") -> str:
+    """How many rows win a stratum, and who most often, as a title."""
+    owners: Counter[str] = Counter()
+    for target in verdicts.targets(data):
+        for stratum in verdicts.strata(data):
+            part, won = verdicts.best(data, Cell(horizon, "axis", target, stratum), UNIT)
+            if won is not None:
+                owners[part.names[won.row]] += 1
+    if not owners:
+        return "No row wins a stratum"
+    first, times = owners.most_common(1)[0]
+    return (
+        f"{len(owners)} row{'s' * (len(owners) > 1)} share the strata: {first} wins {times} of {sum(owners.values())} "
+        "cells of stratum and accuracy"
+    )
+
+
+def silent_message(data: xr.DataTree) -> str:
+    """The share of wrong runs that nothing warns of, as a title."""
+    each = [verdicts.health(data, name) for name in verdicts.judged_rows(data)]
+    wrong, silent = sum(one.wrong.sum() for one in each), sum(one.silent.sum() for one in each)
+    return f"{silent / max(wrong, 1):.0%} of the wrong runs look healthy: they end ok and keep energy and momenta"
+
+
 def silent_sentence(data: xr.DataTree) -> str:
     """How many wrong runs nothing warns of, over all rows and for the median row."""
     each = [verdicts.health(data, name) for name in verdicts.judged_rows(data)]

@@ -27,7 +27,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 def _scene_panels(data: xr.Dataset, variable: str, labels: tuple[str, str]) -> tuple[Any, dict[str, Any]]:
     """A figure and its panels by scene, of the scenes in which a variable was measured."""
     names = list(dict.fromkeys(scene for scene, _, _ in words.cells(data, variable)))
-    figure, axes = style.grid(len(names), len(names), labels, height=4.0, sharey="row")
+    figure, axes = style.grid(len(names), len(names), labels, height=2.7, sharey="row")
     for axis, name in zip(axes, names, strict=True):
         axis.set(xscale="log", yscale="log", title=name)
         axis.xaxis.set_minor_formatter("")
@@ -40,8 +40,8 @@ def draw_commutation(data: xr.Dataset) -> Picture:
     figure, axes = _scene_panels(data, Column.GAP, labels)
     lowest: dict[tuple[str, int], float] = {}  # of the lines of each power, where its guide goes
     for name, method, cell in words.cells(data, Column.GAP):
-        gap, look = cell[Column.GAP].values, style.look(method)
-        axes[name].plot(cell[Column.STEP], np.maximum(gap, SMALLEST), look.marker + "-", color=look.color, label=method)
+        gap = cell[Column.GAP].values
+        axes[name].plot(cell[Column.STEP], np.maximum(gap, SMALLEST), **style.line(method), label=method)
         if np.nanmax(gap) > COMMUTES:
             power = name, round(commutation_order(cell))
             lowest[power] = min(float(np.nanmin(gap)), lowest.get(power, np.inf))
@@ -49,6 +49,7 @@ def draw_commutation(data: xr.Dataset) -> Picture:
         steps = data[Column.STEP].sel(scene=name)
         style.slope_guide(axes[name], power, (float(steps.min()), float(steps.max())), 0.3 * low, f"$h^{power}$")
     style.legend_below(figure, list(axes.values()))
+    style.headline(figure, words.commuting_message(data))
     return Picture(
         "commutation",
         figure,
@@ -68,6 +69,8 @@ def draw_unreduced(data: xr.Dataset) -> Picture:
             gap = largest_so_far(cell[variable])
             axes[name].plot(time[1:], gap[1:], line, color=color, label=f"{angle}, {method}")
     style.legend_below(figure, list(axes.values()))
+    gap = style.number(words.largest_gap(data))
+    style.headline(figure, f"A reduced kernel and its unreduced form differ by at most {gap} rad: they are one map")
     return Picture(
         "twins",
         figure,
@@ -84,9 +87,9 @@ def draw_charts(data: xr.Dataset) -> Picture:
     ratios = words.ratios(data)
     rows = list(dict.fromkeys(f"{method}[{ratio.chart}]" for _, method, ratio in ratios))
     markers = dict(zip(dict.fromkeys(scene for scene, _, _ in ratios), SCENE_MARKERS, strict=False))
-    figure, (times, errors) = style.grid(2, 2, height=1.6 + 0.24 * len(rows), sharey=True)
+    figure, (times, errors) = style.grid(2, 2, height=0.6 + 0.14 * len(rows), sharey=True)
     for scene, method, ratio in ratios:
-        options = {"color": CHART_COLORS[ratio.chart], "ls": "none", "ms": 6, "marker": markers[scene]}
+        options = {"color": CHART_COLORS[ratio.chart], "ls": "none", "ms": 4, "marker": markers[scene]}
         options |= {"label": f"{ratio.chart} against {ratio.base}, {scene}", "fillstyle": style.FILLS[ratio.chart]}
         row = rows.index(f"{method}[{ratio.chart}]")
         times.plot(ratio.time, row, **options)
@@ -98,8 +101,11 @@ def draw_charts(data: xr.Dataset) -> Picture:
         axis.xaxis.set_major_locator(FixedLocator(RATIO_TICKS))
         axis.xaxis.set_major_formatter("{x:g}")
         axis.xaxis.set_minor_locator(NullLocator())
+        axis.tick_params(axis="y", labelsize=style.LEAST_TEXT, length=0)
     style.legend_below(figure, (times, errors))
     spans = [ratio.time for *_, ratio in ratios]
+    style.headline(figure, f"A larger chart takes {min(spans):.2f} to {max(spans):.2f} times as long at the same step "
+                           "(logarithmic axes)")  # fmt: skip
     return Picture(
         "charts",
         figure,

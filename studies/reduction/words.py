@@ -55,6 +55,19 @@ def ratios(data: xr.Dataset) -> list[tuple[str, str, Ratio]]:
     return [(scene, method, r) for scene, method, cell in cells(data, Column.SECONDS) for r in chart_ratios(cell)]
 
 
+def commuting_message(data: xr.Dataset) -> str:
+    """For which rules the order of reducing and discretising does not matter, as a title."""
+    largest: dict[str, float] = {}
+    for _, method, cell in cells(data, Column.GAP):
+        largest[method] = max(float(cell[Column.GAP].max()), largest.get(method, 0.0))
+    same = [method for method, gap in largest.items() if gap < COMMUTES]
+    rest = [method for method in largest if method not in same]
+    return (
+        f"Reducing first or last is the same for {', '.join(same) or 'no rule'}, and another method for "
+        f"{', '.join(rest) or 'none'}"
+    )
+
+
 def commuting(data: xr.Dataset) -> str:
     """Which rules commute with the reduction, and how fast the others approach it."""
     same: dict[str, float] = {}

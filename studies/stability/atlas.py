@@ -8,7 +8,6 @@ at one step says nothing of the next step, and is not quoted.
 """
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -142,34 +141,3 @@ def pole_effect(one: OutcomeMap | None) -> PoleEffect | None:
     limits, gaps = one.reach, one.parameter
     away, near = float(np.median(limits[gaps >= FAR])), float(np.median(limits[gaps <= NEAR]))
     return PoleEffect(near, near < 0.5 * away, 1.1 * float(gaps[limits < 0.5 * away].max(initial=0.0)))
-
-
-PAGES = {
-    "discrete-lagrangian": "discrete Lagrangians",
-    "splitting-angles": "splitting methods in the angles chart",
-    "splitting-space": "splitting methods up to order 4 in charts without poles",
-    "splitting-high-order": "splitting methods above order 4 in charts without poles",
-    "runge-kutta": "explicit Runge-Kutta methods of fixed step",
-    "gauss": "implicit Runge-Kutta methods: Gauss and Kahan",
-    "lie-group": "methods on Lie groups",
-    "adaptive-angles": "adaptive methods in the angles chart",
-    "adaptive-space": "adaptive methods in charts without poles, and the exact solution",
-    "other": "other methods",
-}
-
-
-def pages(names: Sequence[str]) -> dict[str, list[str]]:
-    """The integrators of the atlas by page: one a family, or several where it is large."""
-    by_page: dict[str, list[str]] = {}
-    for name in names:
-        method = integrator(name) if split_name(name)[0] in integrators() else None
-        page = method.family if method else "other"
-        if method and page == "splitting":
-            high = "splitting-high-order" if (method.order or 2) > 4 else "splitting-space"
-            page = "splitting-angles" if method.charts() == ("angles",) else high
-        elif method and page == "runge-kutta" and method.symmetric:
-            page = "gauss"
-        elif method and not method.fixed_step:
-            page = "adaptive-angles" if method.charts() == ("angles",) else "adaptive-space"
-        by_page.setdefault(page, []).append(name)
-    return by_page

@@ -1,7 +1,7 @@
-"""The drawings of the atlas: maps of outcomes, a row an integrator.
+"""The drawings of the atlas: a page of small maps of outcomes, one a row ``method[chart]``, and one map enlarged.
 
-Three signs tell outcomes apart: colours that readers with any common colour blindness can tell apart, a hatch that is
-drawn into the map, and a word on every region that is large enough to hold one.
+Two signs tell outcomes apart in a small map: colours that readers with any common colour blindness can tell apart, and
+a hatch that is drawn into the map. The enlarged map has a word on every region that is large enough to hold one.
 """
 
 import textwrap
@@ -13,15 +13,17 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.measure.verdicts import VERDICTS
-from symtop.report.style import GREY, OUTCOME_COLORS, panels
+from symtop.methods.registry import split_name
+from symtop.report.style import GREY, LEAST_TEXT, OUTCOME_COLORS, WIDTH, headline, panels
 
 from .atlas import OutcomeMap, maps
 from .tables import Column
 
-RASTER = (110, 430)  # pixels of one map, about those it has in the figure
+RASTER = {"small": (55, 90), "enlarged": (150, 220)}  # pixels of a map: hatches stay visible
 SHADE = 0.72  # a hatch line is the same colour, darker
 DARK = ("not_finite", "not_converged", "accurate", "left_chart")  # colours that need white letters
 CONTROLS = {"step_size": "step (nutation periods)", "tolerance": "tolerance", "none": "nothing to set"}
+SHORT = {"step_size": "step / nutation", "tolerance": "tolerance"}  # below a small map
 HATCHES = {  # of the legend, and in the map: which pixels, by row and column
     "left_chart": ("////", lambda row, column: (row + column) % 10 == 0),
     "wrong_regime": ("\\\\\\\\", lambda row, column: (row - column) % 10 == 0),
@@ -35,6 +37,9 @@ LINES = {  # over the maps: label and dashes
     "third": ("a third of a turn a step", (0, (4, 2))),
     "passage": ("one step passes the pole", (0, (1, 1.5))),
 }
+COLUMNS = 6  # of small maps
+LETTERS = 17  # of a line above a small map
+AXES = {"spin": "spin r", "gap": r"gap $\delta$ (rad)"}  # what grows upwards
 FALL_SPEED, FALL_PERIOD = 1.2, 4.22  # of the grazing family: rad/s at the pole, and its nutation period, s
 
 
@@ -46,12 +51,11 @@ def sampled(outcome: NDArray[np.uint8], height: int, width: int) -> NDArray[np.u
     return outcome[row][:, column]
 
 
-def painted(outcome: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """A map of outcomes, shape (rows, columns), as an image (height, width, 3) with hatches."""
+def painted(outcome: NDArray[np.uint8], size: str = "enlarged") -> NDArray[np.float64]:
+    """A map of outcomes, shape (rows, columns), as an image (height, width, 3) with hatches; `size` is of `RASTER`."""
     from matplotlib.colors import to_rgb
 
-    height, width = RASTER
-    big = sampled(outcome, height, width)
+    big = sampled(outcome, *RASTER[size])
     image = np.ones((*big.shape, 3))
     for index, word in enumerate(VERDICTS):
         region = big == index
@@ -65,23 +69,23 @@ def _name_regions(axis: Any, outcome: NDArray[np.uint8], extent: Sequence[float]
     """Write each outcome's name where its largest region is widest, if it fits."""
     from scipy.ndimage import distance_transform_edt, label
 
-    outcome = sampled(outcome, *np.minimum(RASTER, outcome.shape).tolist())
+    outcome = sampled(outcome, *np.minimum(RASTER["enlarged"], outcome.shape).tolist())
     height, width = outcome.shape
     for index in map(int, np.unique(outcome)):
         word = VERDICTS[index].replace("_", " ")
         regions, _ = label(outcome == index)
         largest = 1 + int(np.argmax(np.bincount(regions.ravel())[1:]))
-        # a cell is seen from the text's shape: six times as wide as high
-        shape = (1.0 / height, 0.5 / width)
+        shape = (1.0 / height, 0.55 / width)  # as the text sees a cell: it is wider than high
         depth = distance_transform_edt(np.pad(regions == largest, 1), sampling=shape)[1:-1, 1:-1]
         row, column = np.unravel_index(int(np.argmax(depth)), depth.shape)
-        if depth[row, column] < 0.055:
+        if depth[row, column] < 0.05:
             continue
-        half = 0.0085 * len(word)  # of the text's width, in units of the map's
+        half = 0.012 * len(word)  # of the text's width, in units of the map's
         x, y = np.clip((column + 0.5) / width, half, 1.0 - half), np.clip((row + 0.5) / height, 0.07, 0.93)
         axis.text(
             extent[0] + x * (extent[1] - extent[0]), extent[2] + y * (extent[3] - extent[2]), word, ha="center",
-            va="center", fontsize=7.5, weight="bold", color="white" if VERDICTS[index] in DARK else "black",
+            va="center", fontsize=LEAST_TEXT, weight="bold", color="white" if VERDICTS[index] in DARK else "black",
+            zorder=5, bbox={"facecolor": OUTCOME_COLORS[VERDICTS[index]], "edgecolor": "none", "pad": 0.8},
         )  # fmt: skip
 
 
@@ -93,21 +97,24 @@ def _edges(values: NDArray[np.float64]) -> tuple[float, float]:
     return float(np.log10(values[0]) - half), float(np.log10(values[-1]) + half)
 
 
-def _ticks(ends: tuple[float, float]) -> tuple[range, list[str]]:
+def _ticks(ends: tuple[float, float], most: int) -> tuple[range, list[str]]:
     """Places and names of the powers of ten between two decimal logarithms."""
     powers = range(int(np.ceil(ends[0] - 1e-9)), int(np.floor(ends[1] + 1e-9)) + 1)
-    shown = powers[:: 1 if len(powers) <= 5 else 2 if len(powers) <= 8 else 3]
+    shown = powers[:: -(-len(powers) // most)]
     return shown, [f"{10.0**k:g}" if -3 <= k <= 2 else rf"$10^{{{k}}}$" for k in shown]
 
 
-def draw_map(axis: Any, one: OutcomeMap) -> None:
+def draw_map(axis: Any, one: OutcomeMap, size: str = "enlarged") -> None:
     """One map; parameter upwards, step or tolerance to the right, both logarithmic."""
     x, y = _edges(one.settings), _edges(one.parameter)
-    axis.imshow(painted(one.outcome), origin="lower", extent=(*x, *y), aspect="auto", interpolation="nearest")
-    _name_regions(axis, one.outcome, (*x, *y))
+    image = painted(one.outcome, size)
+    axis.imshow(image, origin="lower", extent=(*x, *y), aspect="auto", interpolation="nearest")
     axis.grid(visible=False)
-    axis.set_xticks(*(([], []) if one.control == "none" else _ticks(x)), fontsize=7.5)
-    axis.set_yticks(*_ticks(y), fontsize=7.5)
+    most = 5 if size == "enlarged" else 3
+    axis.set_xticks(*(([], []) if one.control == "none" else _ticks(x, most)))
+    axis.set_yticks(*_ticks(y, most))
+    if size == "enlarged":
+        _name_regions(axis, one.outcome, (*x, *y))
 
 
 def _line(axis: Any, x: Any, y: Any, name: str) -> list[str]:
@@ -117,50 +124,88 @@ def _line(axis: Any, x: Any, y: Any, name: str) -> list[str]:
     if np.isfinite(x).sum() < 2:
         return []
     ends = {"xlim": axis.get_xlim(), "ylim": axis.get_ylim()}
-    edge = [Stroke(linewidth=2.6, foreground="white"), Normal()]
-    axis.plot(np.log10(x), np.log10(y), color="black", lw=1.1, ls=LINES[name][1], path_effects=edge)
+    edge = [Stroke(linewidth=2.2, foreground="white"), Normal()]
+    axis.plot(np.log10(x), np.log10(y), color="black", lw=0.9, ls=LINES[name][1], path_effects=edge)
     axis.set(**ends)
     return [name]
 
 
-def atlas_page(data: xr.Dataset, family: str, names: Sequence[str], sentences: Mapping[str, str]) -> Any:
-    """One row an integrator: its map over spin and step, its map over the gap to a pole and step, its sentence."""
-    over_spin, over_gap = maps(data, family), maps(data, "grazing")
-    grazed = any(name in over_gap for name in names)
-    ratios = {"width_ratios": [1.25, 1.0][: 1 + grazed]}
-    texts = [textwrap.wrap(sentences[name], 128) for name in names]
-    height = 1.25 + 0.16 * max(map(len, texts))
-    figure, axes = panels(len(names), 1 + grazed, width=8.4, height=height, gridspec_kw=ratios)
+def _limits(axis: Any, cell: xr.Dataset, one: OutcomeMap, over: str) -> list[str]:
+    """The lines that belong on a map; returns the names of those that were drawn."""
+    if over == "gap":  # the fall at 1.1 gap past the pole takes one step
+        at = 1.1 * one.parameter / FALL_SPEED / FALL_PERIOD, one.parameter
+        return _line(axis, *at, "passage") if one.control == "step_size" else []
+    if Column.LINEAR_LIMIT not in cell:
+        return []
+    parameter = cell[Column.LIMIT_PARAMETER].values
+    kinds = ((Column.LINEAR_LIMIT, "limit"), (Column.THIRD_TURN, "third"))
+    return [name for variable, kind in kinds for name in _line(axis, cell[variable].values, parameter, kind)]
+
+
+def by_area(shown: Mapping[str, OutcomeMap]) -> list[str]:
+    """The rows of some maps, the largest accurate share first."""
+    return sorted(shown, key=lambda name: -shown[name].shares[0])
+
+
+def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) -> Any:
+    """A page of the maps over a scene's spin or gap, in the given order, each with its name and accurate share."""
+    shown = maps(data, scene)
+    columns = min(COLUMNS, len(names))
+    rows = -(-len(names) // columns)
+    titles = {name: _title(name, shown[name]) for name in names}
+    high = [max(titles[name].count("\n") for name in names[k : k + columns]) + 1 for k in range(0, len(names), columns)]
+    height = 0.62 + 0.115 * sum(high) / rows + 0.7 / rows
+    figure, axes = panels(rows, columns, width=WIDTH * max(columns, 3) / COLUMNS, height=height)
+    figure.get_layout_engine().set(w_pad=0.02, h_pad=0.015, wspace=0.01, hspace=0.01)
     drawn: dict[str, None] = {}  # outcomes and lines, for the legend
-    controls = [over_spin[name].control for name in names]
-    for line, name, lines, control, below in zip(axes, names, texts, controls, [*controls[1:], None], strict=True):
-        for axis, drawn_maps, label in zip(line, (over_spin, over_gap), ("spin r", r"gap $\delta$"), strict=False):
-            one = drawn_maps.get(name)
-            if one is None:
-                axis.set_visible(False)
-                continue
-            drawn |= dict.fromkeys(VERDICTS[k] for k in np.unique(one.outcome))
-            draw_map(axis, one)
-            axis.set_ylabel(label, fontsize=8.5)
-            if drawn_maps is over_spin and Column.LINEAR_LIMIT in data:
-                cell = data.sel(scene=family, integrator=name)
-                for variable, kind in ((Column.LINEAR_LIMIT, "limit"), (Column.THIRD_TURN, "third")):
-                    at = cell[variable].values, cell[Column.LIMIT_PARAMETER].values
-                    drawn |= dict.fromkeys(_line(axis, *at, kind))
-            elif drawn_maps is over_gap and one.control == "step_size":
-                # the fall at 1.1 gap past the pole takes one step
-                at = 1.1 * one.parameter / FALL_SPEED / FALL_PERIOD, one.parameter
-                drawn |= dict.fromkeys(_line(axis, *at, "passage"))
-            if below != control:
-                axis.set_xlabel(CONTROLS[one.control], fontsize=8.5)
-        line[0].set_title("\n".join(["", *lines]), loc="left", fontsize=8.0)
-        line[0].annotate(
-            name, (0.0, 1.0), (0.0, 5.5 + 11.2 * len(lines)), xycoords="axes fraction", textcoords="offset points",
-            fontsize=9.0, weight="bold", annotation_clip=False,
-        )  # fmt: skip
-    shown = [name for name in (*VERDICTS, *LINES) if name in drawn]
-    figure.legend(handles=list(map(_handle, shown)), loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+    for axis in axes.flat[len(names) :]:
+        axis.set_visible(False)
+    for k, (axis, name) in enumerate(zip(axes.flat, names, strict=False)):
+        one = shown[name]
+        drawn |= dict.fromkeys(VERDICTS[index] for index in np.unique(one.outcome))
+        draw_map(axis, one, "small")
+        drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, integrator=name), one, over))
+        axis.set_title(titles[name], fontsize=LEAST_TEXT, pad=2.0, linespacing=1.0)
+        axis.tick_params(length=1.5, pad=1.0, labelsize=LEAST_TEXT)
+        if k % columns:
+            axis.set_yticklabels([])
+        if k + columns < len(names):
+            axis.set_xticklabels([])
+        else:
+            axis.set_xlabel(SHORT[one.control], fontsize=LEAST_TEXT, labelpad=1.0)
+    figure.supylabel(AXES[over], fontsize=8.0)
+    _key(figure, drawn)
     return figure
+
+
+def _title(name: str, one: OutcomeMap) -> str:
+    method, chart = split_name(name)
+    share = f"{one.shares[0]:.0%}"
+    return "\n".join([*textwrap.wrap(method, LETTERS), f"{chart} {share}".strip()])
+
+
+def enlarged(data: xr.Dataset, family: str, name: str, message: str) -> Any:
+    """The two maps of one row, over spin and over the gap to a pole, with a word on every region."""
+    both = {"spin": (family, maps(data, family)), "gap": ("grazing", maps(data, "grazing"))}
+    both = {over: (scene, shown) for over, (scene, shown) in both.items() if name in shown}
+    figure, axes = panels(1, len(both), width=WIDTH * max(len(both), 1.4) / 2, height=2.9)
+    drawn: dict[str, None] = {}
+    for axis, (over, (scene, shown)) in zip(axes[0], both.items(), strict=True):
+        one = shown[name]
+        drawn |= dict.fromkeys(VERDICTS[index] for index in np.unique(one.outcome))
+        draw_map(axis, one)
+        drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, integrator=name), one, over))
+        axis.set(xlabel=CONTROLS[one.control], ylabel=AXES[over])
+        axis.set_title("another spin" if over == "spin" else "a pole next to the path")
+    headline(figure, message)
+    _key(figure, drawn)
+    return figure
+
+
+def _key(figure: Any, drawn: Mapping[str, None]) -> None:
+    shown = [name for name in (*VERDICTS, *LINES) if name in drawn]
+    columns = 4 if figure.get_figwidth() > 5.0 else 2
+    figure.legend(handles=list(map(_handle, shown)), loc="outside lower center", ncols=columns, frameon=False)
 
 
 def _handle(name: str) -> Any:

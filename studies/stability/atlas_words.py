@@ -10,7 +10,7 @@ import xarray as xr
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT
 from symtop.methods.registry import split_name
 
-from .atlas import COMMON, NOTABLE, PAGES, OutcomeMap, maps, pole_effect
+from .atlas import COMMON, NOTABLE, OutcomeMap, maps, pole_effect
 from .tables import PERIODS, Column
 
 FAILURES = {
@@ -89,25 +89,34 @@ def _commonly(one: OutcomeMap) -> str:
     return f"fails {where} (of these runs {kinds})"
 
 
-def page_caption(data: xr.Dataset, family: str, page: str, names: Sequence[str]) -> str:
-    """The caption of a page of maps: what it shows, who is accurate most widely and least, and who ends early."""
-    shown = {name: one for name, one in maps(data, family).items() if name in names}
+def ends(shown: Mapping[str, OutcomeMap]) -> tuple[str, str]:
+    """Who is accurate in the largest part of its map, and in the smallest, with the shares."""
     ranked = sorted(shown, key=lambda name: -shown[name].shares[0])
     best, worst = (f"{name} ({shown[name].shares[0]:.0%})" for name in (ranked[0], ranked[-1]))
-    smallest = f", in the smallest: {worst}." if ranked[1:] else "."
+    return best, worst
+
+
+def caption(data: xr.Dataset, scene: str, names: Sequence[str]) -> str:
+    """The caption of a page of maps: what it shows, who is accurate most widely and least, and who ends early."""
+    shown = {name: one for name, one in maps(data, scene).items() if name in names}
+    best, worst = ends(shown)
     ending = max(shown, key=lambda name: shown[name].early)
     early = (
         f"Runs end early in up to {shown[ending].early:.0%} of a map ({ending})."
         if shown[ending].early > 0.0
         else "No run ends early: an inaccurate run raises no error here."
     )
+    what = (
+        "one fall (one nutation period) of the scene grazing past a pole that the axis misses by 1.1 delta (rad)"
+        if scene == "grazing"
+        else f"the scene {scene} over {PERIODS:g} nutation periods with another spin r and everything else held fixed; "
+        "r = 1 is the spin from which a top sleeps (spins upright and stays so)"
+    )  # fmt: skip
+    control = "step" if shown[names[0]].control == "step_size" else "tolerance"
     return (
-        f"Outcome of every run of {PAGES.get(page, page)} ({len(names)} rows on this page, each a method in one "
-        f"chart). Left: the scene {family} over {PERIODS:g} nutation periods with another spin and everything else "
-        "held fixed; r = 1 is the spin from which a top sleeps (spins upright and stays so). Right: one fall (one "
-        "nutation period) past a pole that the axis misses by 1.1 delta (rad). In both, the step or the tolerance "
-        f"grows to the right. Accurate in the largest part of its map: {best}{smallest} {early}"
-        f"{_without_limit(data, family, shown)}"
+        f"Outcome of every run of {len(names)} rows, a map each, named by method and chart, with the share of its map "
+        f"that is accurate: {what}. The {control} grows to the right. Accurate in the largest part of its map: {best}; "
+        f"in the smallest: {worst}. {early}{_without_limit(data, scene, shown) if scene != 'grazing' else ''}"
     )
 
 

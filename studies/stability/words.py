@@ -4,7 +4,7 @@ Each measured mechanism stands beside what theory says. A quick or a partial stu
 """
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
@@ -14,7 +14,7 @@ from symtop.runner.study import Table
 from .atlas import NEAR, families, map_of, methods_of, pole_effect
 from .atlas_words import advice, summary
 from .failures import LONGEST, LOST, SEEN
-from .tables import MECHANISMS, PERIODS, Column
+from .tables import PERIODS, Column
 
 HOW_TO_READ = (
     "A map has one cell a run. To the right the step or the tolerance grows; upwards the spin r, or the gap delta "
@@ -45,38 +45,44 @@ def _listed(values: Mapping[str, float]) -> str:
     return ", ".join(f"{value:.4f} for {name}" for name, value in sorted(values.items(), key=lambda one: one[1]))
 
 
-def held_fixed(data: xr.Dataset) -> str:
-    """Scene, step or tolerance, and horizon of each mechanism; charts are in the names of the rows."""
+def held_fixed(data: xr.Dataset, mechanism: str) -> str:
+    """Scene, step or tolerance, and horizon of a mechanism; charts are in the names of the rows."""
 
-    def of(scene: str, *columns: str) -> list[float] | None:
-        known = scene in data["scene"].values and all(name in data for name in columns)
-        return [float(data[name].sel(scene=scene).max()) for name in columns] if known else None
+    def of(scene: str, *columns: str) -> list[float]:
+        return [float(data[name].sel(scene=scene).max()) for name in columns]
 
-    parts = []
-    if of("grazing", Column.SHOWN_SETTING):
+    if mechanism == "pole":
         shown = data[Column.SHOWN_SETTING].sel(scene="grazing")
         step = shown.where(data[Column.CONTROL].sel(scene="grazing") == "step_size").max()
-        parts.append(f"Pole: one fall (one nutation period), step {float(step):.2g} of it")
-    if values := of("steady-fast", Column.DISPLACED_STEPS):
-        parts.append(f"resonances: scene steady-fast, {values[0]:.0f} steps of each size")
-    if of("sleeping", Column.SLEEPING_STEP):
-        parts.append("the sleeping top: scene sleeping, linearised about the upright")
-    if of("separatrix", Column.EARLY_ERROR):
-        parts.append(f"the separatrix: scene separatrix, {LONGEST:g}/g, a point for each step or tolerance")
-    if values := of("goldstein", Column.SAMPLED_STEPS, Column.SAMPLED_PERIODS):
-        parts.append(f"sampling: scene goldstein, {values[0]:.0f} steps a nutation, {values[1]:.0f} nutations")
-    if values := of("goldstein", Column.SOLVER_STEP, Column.SOLVER_STEPS):
-        parts.append(f"the solver: scene goldstein, step {values[0]:g} s, {values[1]:.0f} steps")
-    return f"{'; '.join(parts)}. The name of a row is method[chart]."
+        text = f"Scene grazing, one fall (one nutation period), step {float(step):.2g} of it"
+    elif mechanism == "resonances":
+        text = f"Scene steady-fast, {of('steady-fast', Column.DISPLACED_STEPS)[0]:.0f} steps of each size"
+    elif mechanism == "sleeping":
+        text = "Scene sleeping, linearised about the upright"
+    elif mechanism == "separatrix":
+        text = f"Scene separatrix, to {LONGEST:g}/g, a point for each step or tolerance"
+    elif mechanism == "sampling":
+        steps, periods = of("goldstein", Column.SAMPLED_STEPS, Column.SAMPLED_PERIODS)
+        text = f"Scene goldstein, {steps:.0f} steps a nutation, {periods:.0f} nutations"
+    else:
+        step_size, steps = of("goldstein", Column.SOLVER_STEP, Column.SOLVER_STEPS)
+        text = f"Scene goldstein, step {step_size:g} s, {steps:.0f} steps"
+    return f"{text}. The name of a row is method[chart]."
 
 
-def poles(part: xr.Dataset) -> str:
-    """Which methods need shorter steps where a pole is next to the path."""
-    halved: dict[bool, list[bool]] = {True: [], False: []}  # by: is it in the angles chart
+def halved_at_pole(part: xr.Dataset) -> dict[bool, list[bool]]:
+    """Of every row of fixed step, whether a pole halves its accurate step; by: does it work in angles?"""
+    halved: dict[bool, list[bool]] = {True: [], False: []}
     for name, method in methods_of(part).items():
         effect = pole_effect(map_of(part.sel(integrator=name)))
         if effect is not None and method.control == "step_size":
             halved[method.charts() == ("angles",)].append(effect.halves)
+    return halved
+
+
+def poles(part: xr.Dataset) -> str:
+    """Which methods need shorter steps where a pole is next to the path."""
+    halved = halved_at_pole(part)
     if not halved[True] + halved[False]:
         return ""
     return (
@@ -113,18 +119,24 @@ def unlimited(part: xr.Dataset) -> dict[str, float]:
     }
 
 
-def resonances(part: xr.Dataset) -> str:
-    """The linearly stable steps at which hardly any displacement survives."""
-    resonant = {}
+def resonant(part: xr.Dataset) -> dict[str, float]:
+    """The linearly stable steps, as h omega, at which hardly any displacement survives, by row."""
+    found = {}
     for name, cell in _rows(part, Column.THIRD_TURN_PHASE).items():
         at, past = float(cell[Column.SURVIVING_AT_THIRD_TURN]), float(cell[Column.SURVIVING_PAST_THIRD_TURN])
         if past > REVIVAL * at and at < BARELY:
-            resonant[name] = float(cell[Column.THIRD_TURN_PHASE])
-    if not resonant:
+            found[name] = float(cell[Column.THIRD_TURN_PHASE])
+    return found
+
+
+def resonances(part: xr.Dataset) -> str:
+    """The linearly stable steps at which hardly any displacement survives, in a sentence."""
+    steps = resonant(part)
+    if not steps:
         return ""
     return (
         f"A step that advances the nutation by a third of a turn is linearly stable, but a top displaced by "
-        f"{BARELY:g} rad or more leaves its steady precession. This step is h omega = {_listed(resonant)} (theory: "
+        f"{BARELY:g} rad or more leaves its steady precession. This step is h omega = {_listed(steps)} (theory: "
         "sqrt 3 = 1.7321 for Verlet, 2 sqrt 3 = 3.4641 for the midpoint rule)."
     )
 
@@ -210,21 +222,22 @@ def solver(part: xr.Dataset) -> str:
     return ""
 
 
-SENTENCES = (  # the scene of a mechanism, a variable without which there is nothing to say, and what says it
-    ("grazing", Column.OUTCOME, poles),
-    ("steady-fast", Column.LIMIT_PHASE, limits),
-    ("steady-fast", Column.THIRD_TURN_PHASE, resonances),
-    ("sleeping", Column.SLEEPING_THRESHOLD, sleepers),
-    ("separatrix", Column.HORIZON, horizons),
-    ("goldstein", Column.ENERGY_ONCE, sampling),
-    ("goldstein", Column.TEXTBOOK_ENERGY, solver),
+SENTENCES = (  # mechanism, its scene, a variable without which there is nothing to say, and what says it
+    ("pole", "grazing", Column.OUTCOME, poles),
+    ("resonances", "steady-fast", Column.LIMIT_PHASE, limits),
+    ("resonances", "steady-fast", Column.THIRD_TURN_PHASE, resonances),
+    ("sleeping", "sleeping", Column.SLEEPING_THRESHOLD, sleepers),
+    ("separatrix", "separatrix", Column.HORIZON, horizons),
+    ("sampling", "goldstein", Column.ENERGY_ONCE, sampling),
+    ("solver", "goldstein", Column.TEXTBOOK_ENERGY, solver),
 )
 
 
-def mechanism_sentences(data: xr.Dataset, on: Collection[str] = tuple(MECHANISMS)) -> list[str]:
-    """What the dataset says of the mechanisms that are measured on the scenes `on`."""
-    measured = [one for one in SENTENCES if one[0] in on and one[0] in data["scene"].values and one[1] in data]
-    return [sentence for scene, _, speak in measured if (sentence := speak(data.sel(scene=scene)))]
+def mechanism_sentences(data: xr.Dataset, mechanism: str = "") -> list[str]:
+    """What the dataset says of a mechanism, or of all that were measured."""
+    measured = [one for one in SENTENCES if mechanism in ("", one[0])]
+    there = [one for one in measured if one[1] in data["scene"].values and one[2] in data]
+    return [sentence for _, scene, _, speak in there if (sentence := speak(data.sel(scene=scene)))]
 
 
 def sentences(data: xr.Dataset) -> list[str]:

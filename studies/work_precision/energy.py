@@ -150,6 +150,18 @@ def sentence(data: xr.Dataset, chart: str) -> str:
     )
 
 
+def message(data: xr.Dataset, chart: str) -> str:
+    """In how many pairs the energy error of a structure-preserving row is smaller at all run times, as a title."""
+    parts = []
+    for classic, compared in crossings(data, chart).items():
+        pairs = [one for listed in compared.values() for one in listed]
+        if pairs:
+            parts.append(f"{classic} in {sum(one.share == 1.0 for one in pairs)} of {len(pairs)}")
+    if not parts:
+        return "Energy errors at equal run time"
+    return f"Structure-preserving rows have less energy error at every run time than {', than '.join(parts)} pairs"
+
+
 def at_equal_steps(data: xr.Dataset, names: Sequence[str], scene: str) -> str:
     """Energy errors of rows of one chart over the long horizon at the same steps; empty if they were not run there."""
     last = data.sel(scene=scene).isel(horizon=-1)

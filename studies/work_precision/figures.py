@@ -8,18 +8,29 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
-from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import PARTS
-from symtop.report.figures import error_band, pareto
-from symtop.report.style import BLACK, GREY, grid, legend_below, look
+from symtop.report.figures import error_band, name_ends, pareto
+from symtop.report.style import (
+    BLACK,
+    GREY,
+    few_ticks,
+    grid,
+    headline,
+    lead,
+    legend_below,
+    line,
+    look,
+    number,
+    same_limits,
+)
 from symtop.runner.study import Picture
 
 from . import energy, words
 from .rankings import slowdown, winners
 
-NAMED = (  # rows with a colour of their own in the fronts; all others are thin and grey
-    "rk4[angles]", "rk4[axis]", "midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]",
-    "srkn-14-6[axis]", "gauss-8[axis]", "rk45-compiled[angles]", "taylor[axis]", "rk45[angles]", "dop853[angles]",
+NAMED = (  # rows with a colour and a name in the fronts; all others are thin and grey
+    "rk4[axis]", "midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]", "srkn-14-6[axis]",
+    "series[axis]", "taylor[axis]", "rk45[angles]",
 )  # fmt: skip
 ENERGY = {
     "axis": (
@@ -35,7 +46,7 @@ PARTS_OF = ("midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]
             "rk45-compiled[angles]", "gauss-8[axis]")  # fmt: skip
 COSTS = {"seconds": "wall time of one run (s)", "force_evaluations": "force evaluations of one run"}
 LEAST = 1e-15  # the lowest error that is drawn, where the reference has no bound
-SHARED = {"width": 11.5, "sharex": True, "sharey": True}
+OTHERS = {"color": GREY, "lw": 0.5, "alpha": 0.5, "zorder": 1}  # a line without a name
 FILLS = "Open markers: Euler angles; full ones: (e, L)."
 
 
@@ -55,26 +66,30 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 def _fronts(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     """Every run of every row, one panel a scene; the front of the compiled rows in black, and a few rows in colour."""
     scenes = [str(scene) for scene in data["scene"].values]
-    labels = (COSTS[cost], f"largest {QUANTITIES['axis']}")
-    figure, axes = grid(len(scenes), min(3, len(scenes)), labels, height=3.2, **SHARED)
+    figure, axes = lead(len(scenes), (COSTS[cost], "largest axis error (rad)"))
     ranked = ranking.ranked(data)
+    shown = [row for row in NAMED if row in ranked]
     owners: Counter[str] = Counter()
     for axis, scene in zip(axes, scenes, strict=True):
         cell = data.sel(scene=scene).isel(horizon=far)
         floor = 0.5 * error_band(axis, cell["axis_bound"].values, LEAST)
         for row in ranked:
-            if row not in NAMED:
-                x, y = _curve(cell.sel(integrator=row), "axis", cost, floor)
-                axis.plot(x, y, color=GREY, lw=0.6, alpha=0.45, zorder=1)
-        _draw(axis, cell, [row for row in NAMED if row in ranked], "axis", cost, floor)
+            if row not in shown:
+                axis.plot(*_curve(cell.sel(integrator=row), "axis", cost, floor), **OTHERS)
+        _draw(axis, cell, shown, "axis", cost, floor, 1.0 if axis is axes[0] else 0.6)
         compiled = [row for row in words.of_implementation(cell, "compiled") if row in ranked]
         owners.update(_front(axis, cell.sel(integrator=compiled), cost, floor))
         if cost == "seconds":
-            _closed_form(axis, cell)
+            _closed_form(axis, cell, named=axis is axes[0])
         axis.set_title(scene)
     axes[0].set_ylim(LEAST, 3.0)
-    axes[0].plot([], [], color=GREY, lw=0.8, label="all other rows")
-    legend_below(figure, axes)
+    same_limits(axes)
+    few_ticks(axes[0])
+    few_ticks(*axes[1:], most=4)
+    most = [row for row, _ in owners.most_common(4)]
+    unit = "time" if cost == "seconds" else "work"
+    headline(figure, f"Least {unit} {words.spans(data)[far]}: most of the front belongs to {' and '.join(most[:2])}")
+    _name_lines(axes[0], data.isel(scene=0, horizon=far), shown, "axis", cost)
     timed = (
         " A run is shown if it was timed, as its row's cheapest for some target or for the comparison of energies; all "
         "times are measured. Held fixed: the scene, the horizon, and the call, of the compiled loop alone. Dotted: the "
@@ -82,16 +97,26 @@ def _fronts(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
         if cost == "seconds"
         else " Held fixed: the scene and the horizon. A high derivative, a kick and a stage take different times."
     )
-    most = ", ".join(row for row, _ in owners.most_common(4))
     return Picture(
         name,
         figure,
-        f"Largest axis error {words.spans(data)[far]} against {labels[0]}, one panel a scene; each line is a row, a "
-        "method in one chart, whose step or tolerance varies along it. The wide grey step line is the front of the "
-        "compiled rows: none of their runs is below or left of it. Most of its points belong to "
-        f"{most}. {FILLS} Grey band: below the error bound of the reference.{timed}",
-        f"Log-log work-precision plots of the axis error against {labels[0]}, one panel a scene.",
+        f"Largest axis error {words.spans(data)[far]} against {COSTS[cost]}, one panel a scene; each line is a row, a "
+        "method in one chart, whose step or tolerance varies along it: eight are named, the others grey. The wide grey "
+        "step line is the front of the compiled rows: none of their runs is below or left of it. Most of its points "
+        f"belong to {', '.join(most)}. {FILLS} Grey band: below the error bound of the reference.{timed}",
+        f"Log-log work-precision plots of the axis error against {COSTS[cost]}, one panel a scene.",
     )
+
+
+def _name_lines(axis: Any, cell: xr.Dataset, names: Sequence[str], quantity: str, cost: str) -> None:
+    """Name each line at its end, the most accurate of its runs that is in the panel."""
+    ends = {}
+    for name in names:
+        x, y = _curve(cell.sel(integrator=name), quantity, cost, axis.get_ylim()[0])
+        if x.size:
+            last = int(np.argmax(x))
+            ends[name] = float(x[last]), float(y[last]), look(name).color
+    name_ends(axis, ends)
 
 
 def _curve(runs: xr.Dataset, quantity: str, cost: str, floor: float) -> tuple[Any, Any]:
@@ -109,73 +134,84 @@ def _front(axis: Any, cell: xr.Dataset, cost: str, floor: float) -> list[str]:
         return []
     order = np.argsort(x[on])
     x, y, owners = (part[on][order] for part in (x, y, np.broadcast_to(cell["integrator"].values[:, None], x.shape)))
-    axis.step(x, y, where="post", color=BLACK, alpha=0.2, lw=5.0, zorder=1, label="front of the compiled rows")
+    axis.step(x, y, where="post", color=BLACK, alpha=0.2, lw=4.0, zorder=1)
     return [str(owner) for owner in owners]
 
 
-def _closed_form(axis: Any, cell: xr.Dataset) -> None:
-    """The time of what takes no steps, as a dotted line with its set-up in words."""
+def _closed_form(axis: Any, cell: xr.Dataset, *, named: bool) -> None:
+    """The time of what takes no steps, as a dotted line, with its set-up in words if it is `named`."""
     for row in (name for name in map(str, cell["integrator"].values) if name not in ranking.ranked(cell)):
         at = float(cell["seconds"].sel(integrator=row).min())
         if np.isfinite(at):
-            axis.axvline(at, color=look(row).color, ls=":", lw=1.2, zorder=1)
+            axis.axvline(at, color=look(row).color, ls=":", lw=1.0, zorder=1)
+            if not named:
+                continue
             before = words.seconds(float(cell["set_up_seconds"].sel(integrator=row).min()))
             axis.annotate(
-                f"exact: set-up {before}", (at, 1.5), rotation=90, fontsize=7.5, color="#444444", ha="right", va="top"
+                f"exact: set-up {before}", (at, 1.5), rotation=90, fontsize=7.0, color="#444444", ha="right", va="top"
             )
 
 
 def _energy(data: xr.Dataset, chart: str) -> Picture:
     """Energy error of the rows of one chart against time at the long horizon."""
     scenes = [str(name) for name in data["scene"].values]
-    labels = (COSTS["seconds"], f"largest {QUANTITIES['energy']}")
-    figure, axes = grid(len(scenes), min(3, len(scenes)), labels, height=3.0, **SHARED)
+    figure, axes = lead(len(scenes), (COSTS["seconds"], "largest energy error (relative)"))
     classic, structured = energy.in_chart(data, chart)
+    shown = [row for row in ENERGY[chart] if row in classic + structured]
     for axis, scene in zip(axes, scenes, strict=True):
         cell = data.sel(scene=scene).isel(horizon=-1)
         floor = 0.5 * error_band(axis, cell["energy_bound"].values)
         for row in structured:
-            if row not in ENERGY[chart]:
-                axis.plot(*_curve(cell.sel(integrator=row), "energy", "seconds", floor), color=GREY, lw=0.6, alpha=0.5)
-        _draw(axis, cell, [row for row in ENERGY[chart] if row in classic + structured], "energy", "seconds", floor)
-        axis.set_title(scene)
-        axis.text(
-            0.03, 0.16, _ended_badly(cell.sel(integrator=classic + structured)), fontsize=8, transform=axis.transAxes
-        )
+            if row not in shown:
+                axis.plot(*_curve(cell.sel(integrator=row), "energy", "seconds", floor), **OTHERS)
+        _draw(axis, cell, shown, "energy", "seconds", floor, 1.0 if axis is axes[0] else 0.6)
+        bad = _ended_badly(cell.sel(integrator=classic + structured))
+        axis.set_title(f"{scene}{bad}")
     axes[0].set_ylim(1e-16, 30.0)
-    axes[0].plot([], [], color=GREY, lw=0.8, label="all other structure-preserving rows")
-    legend_below(figure, axes)
+    same_limits(axes)
+    few_ticks(axes[0])
+    few_ticks(*axes[1:], most=4)
+    headline(figure, energy.message(data, chart))
+    _name_lines(axes[0], data.isel(scene=0, horizon=-1), shown, "energy", "seconds")
     return Picture(
         f"energy-{chart}",
         figure,
-        f"Largest energy error {words.spans(data)[-1]} against {labels[0]}, one panel a scene, step or tolerance "
-        f"varying along each line. Every row works in the chart of {energy.CHARTS[chart]}, so that lines differ by the "
-        f"method alone. {energy.sentence(data, chart)}",
+        f"Largest energy error {words.spans(data)[-1]} against {COSTS['seconds']}, one panel a scene, step or "
+        f"tolerance varying along each line. Every row works in the chart of {energy.CHARTS[chart]}, so that lines "
+        "differ by the method alone; grey: the other structure-preserving rows. A number in brackets is that of the "
+        f"rows none of whose runs ends well. {energy.sentence(data, chart)}",
         f"Log-log plots of energy error against time at the long horizon, rows of the chart {chart}, a panel a scene.",
     )
 
 
 def _ended_badly(cell: xr.Dataset) -> str:
-    """How many rows have no run that ended well on a scene, and how their runs ended; empty if all have one."""
+    """How many rows have no run that ended well on a scene, in brackets; empty if all have one."""
     bad = ~(cell["outcome"] == "ok").any("setting").values
-    how = Counter(map(str, cell["outcome"].values[bad].ravel()))
-    del how["not_run"], how[""]
-    ended = f"\nmost runs: {how.most_common(1)[0][0].replace('_', ' ')}" if how else ""
-    return f"{bad.sum()} of {bad.size} rows have no run\nthat ends well{ended}" if bad.any() else ""
+    return f" ({bad.sum()} of {bad.size})" if bad.any() else ""
 
 
 def _parts(data: xr.Dataset) -> Picture:
     scene = data.isel(scene=0)
     name, spans = str(scene["scene"].values), words.spans(data)
     rows = [row for row in PARTS_OF if row in data["integrator"].values]
-    shape = {"width": 11.5, "height": 3.0, "sharex": True, "sharey": "row"}
+    shape = {"height": 1.9, "sharex": True, "sharey": "row"}
     figure, axes = grid(2 * len(PARTS), 2, (COSTS["force_evaluations"], ""), **shape)
     for row, (part, label) in enumerate(PARTS.items()):
         for far, axis in zip((0, -1), axes[2 * row : 2 * row + 2], strict=True):
             _draw(axis, scene.isel(horizon=far), rows, part, "force_evaluations", 5e-17)
             axis.set(title="" if row else f"{name}, {spans[far]}", ylabel="" if far else label)
+    few_ticks(*axes)
     legend_below(figure, axes)
     first, last = (f"{data['horizon'].values[far]:g}" for far in (0, -1))
+    growths = {part: [energy.growth_at_equal_settings(scene.sel(integrator=row), part) for row in rows]
+               for part in ("shape", "nutation_lag")}  # fmt: skip
+    known = [[value for value in values if np.isfinite(value)] for values in growths.values()]
+    if all(known):
+        shape_grows, lag_grows = (number(float(np.median(values))) for values in known)
+        by = f"by a factor of {shape_grows}, the lag by {lag_grows} (medians)"
+        headline(figure, f"From {first} to {last} nutations the error of the path grows {by}")
+    else:
+        headline(figure, f"Parts of the axis error over {first} and {last} nutations")
     return Picture(
         "parts",
         figure,
@@ -187,14 +223,11 @@ def _parts(data: xr.Dataset) -> Picture:
     )
 
 
-def _draw(axis: Any, cell: xr.Dataset, names: Sequence[str], quantity: str, cost: str, floor: float) -> None:
+def _draw(
+    axis: Any, cell: xr.Dataset, names: Sequence[str], quantity: str, cost: str, floor: float, scale: float = 1.0
+) -> None:
     """An error of a few rows against cost; `cell` is one scene and one horizon."""
     for name in names:
-        style = look(name)
         x, y = _curve(cell.sel(integrator=name), quantity, cost, floor)
-        line = "-" if "compiled" in cell["implementation"].sel(integrator=name) else (0, (4, 2))
-        axis.plot(
-            x, y, marker=style.marker, ls=line, color=style.color, ms=min(style.size, 6.5), fillstyle=style.fill,
-            lw=1.1, label=name, zorder=2,
-        )  # fmt: skip
+        axis.plot(x, y, **line(name, 0.9 * scale), lw=max(scale, 0.8), label=name, zorder=2)
     axis.set(xscale="log", yscale="log")

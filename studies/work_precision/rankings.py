@@ -1,5 +1,6 @@
 """Two pictures of who is the fastest: the winner of every cell, and how much slower every row is."""
 
+import textwrap
 from collections import Counter
 
 import numpy as np
@@ -8,7 +9,7 @@ import xarray as xr
 from symtop.measure import ranking
 from symtop.measure.work import TARGETS
 from symtop.methods.registry import split_name
-from symtop.report.style import GREY, legend_below, look, panels
+from symtop.report.style import GREY, headline, legend_below, look, number, panels
 from symtop.runner.study import Picture
 
 from . import words
@@ -23,25 +24,25 @@ def winners(data: xr.Dataset) -> Picture:
 
     scenes = [str(name) for name in data["scene"].values]
     wins = ranking.winners(data)
-    figure, axes = panels(1, data.sizes["horizon"], width=11.5, height=0.75 + 0.46 * len(scenes), sharey=True)
+    figure, axes = panels(1, data.sizes["horizon"], height=0.75 + 0.42 * len(scenes), sharey=True)
     for line, scene in enumerate(scenes):
         for far, axis in enumerate(axes[0]):
             for column, target in enumerate(TARGETS):
                 won = wins.get((scene, far, target))
                 box = ([column - 0.49, column + 0.49], line - 0.46, line + 0.46)
-                color, size, label = "#444444", 7.0, "narrower nutation,\nnot asked"
+                color, label = "#444444", "narrower\nnutation"
                 if won is not None:
                     method, chart = split_name(won.best.integrator)
                     strength = 0.35 if won.level else 0.95
                     shade = strength * np.array(to_rgb(look(method).color)) + (1.0 - strength)
                     axis.fill_between(*box, color=shade, lw=0)
                     color = "white" if shade @ np.array([0.3, 0.59, 0.11]) < 0.55 else "black"
-                    size, label = min(8.0, 130.0 / len(method)), f"{'~' if won.level else ''}{method}\n[{chart}]"
+                    label = "\n".join(textwrap.wrap(f"{'~' if won.level else ''}{method} {chart}", 12))
                 elif (scene, far, target) in wins:
                     cell = data.sel(scene=scene).isel(horizon=far)
                     label = f"none\n{words.reasons(cell, target).split(',')[0]}"
                     axis.fill_between(*box, facecolor="none", edgecolor=GREY, hatch="//", lw=0)
-                axis.text(column, line, label, ha="center", va="center", fontsize=size, color=color, linespacing=0.95)
+                axis.text(column, line, label, ha="center", va="center", fontsize=7.0, color=color, linespacing=0.95)
     for axis, span in zip(axes[0], words.spans(data), strict=True):
         axis.set(
             xlim=(-0.5, len(TARGETS) - 0.5), ylim=(len(scenes) - 0.5, -0.5), yticks=range(len(scenes)),
@@ -60,7 +61,12 @@ def winners(data: xr.Dataset) -> Picture:
         axes[0, 0].plot([], [], "s", color=look(name).color, ms=9, label=kind)
     legend_below(figure, axes)
     met = [won for won in wins.values() if won]
-    most = ", ".join(f"{name} ({times})" for name, times in Counter(w.best.integrator for w in met).most_common(4))
+    ranks = Counter(won.best.integrator for won in met).most_common(4)
+    most = ", ".join(f"{name} ({times})" for name, times in ranks)
+    if ranks:
+        first, times = ranks[0]
+        rows = len({won.best.integrator for won in met})
+        headline(figure, f"{first} is the fastest in {times} of {len(met)} cells; {rows} rows win one at least")
     return Picture(
         "winners",
         figure,
@@ -80,7 +86,7 @@ def slowdown(data: xr.Dataset) -> Picture:
     merged = xr.concat(costs, "problem").sel(integrator=names)
     order = ranking.leaders(merged, len(names))
     order += [name for name in names if name not in order]
-    figure, axes = panels(1, len(costs), width=9.6, height=0.9 + 0.21 * len(order), sharey=True)
+    figure, axes = panels(1, len(costs), height=0.5 + 0.133 * len(order), sharey=True)
     for far, (axis, table) in enumerate(zip(axes[0], costs, strict=True)):
         for column, target in enumerate(TARGETS):
             for line, name in enumerate(order):
@@ -90,7 +96,7 @@ def slowdown(data: xr.Dataset) -> Picture:
                 axis.fill_between(
                     [column - 0.49, column + 0.49], line - 0.47, line + 0.47, color=_heat(shade), lw=0, zorder=1
                 )
-                axis.text(column, line, text, ha="center", va="center", fontsize=7.5, color=color, zorder=2)
+                axis.text(column, line, text, ha="center", va="center", fontsize=7.0, color=color, zorder=2)
         axis.set(
             xlim=(-0.5, len(TARGETS) - 0.5), ylim=(len(order) - 0.5, -0.5), yticks=range(len(order)),
             yticklabels=order, xticks=range(len(TARGETS)), title=words.spans(data)[far], xticklabels=POWERS,
@@ -98,6 +104,13 @@ def slowdown(data: xr.Dataset) -> Picture:
         )  # fmt: skip
         axis.grid(visible=False)
         axis.tick_params(length=0)
+    ratios = merged.sel(integrator=order[0]).values
+    met = ratios[np.isfinite(ratios)]
+    asked = int(np.isfinite(merged).any("integrator").sum())
+    slower = f", at {number(float(np.median(met)))} times the fastest row's time in the median" if met.size else ""
+    headline(figure, f"{order[0]} meets {met.size} of {asked} targets{slower}")
+    for axis in axes.flat:
+        axis.tick_params(axis="y", labelsize=7.0)
     return Picture(
         "slowdown",
         figure,

@@ -51,7 +51,7 @@ def run_all(
 
     summaries: list[dict[str, Any]] = []
     for study in studies:
-        findings = run.run(study, results, fresh=fresh, workers=workers, limit=limit, save=style.save, **grid)
+        findings = run.run(study, results, fresh=fresh, workers=workers, limit=limit, save=style.publish, **grid)
         summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
         summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
         summaries.append(summary)

@@ -30,7 +30,7 @@ SIGNS = {"confirmed": "✓", "refuted": "✗", "measured": "=", "undecided": "?"
 
 def figures(ledger: Judged) -> tuple[Any, Any]:
     """Two figures: errors over the step size, and the change of the energy over the long run."""
-    (first, order), (second, energy) = (panels(1, 1, width=4.8, height=3.5) for _ in range(2))
+    (first, order), (second, energy) = (panels(1, 1, width=4.8, height=3.1) for _ in range(2))
     _order(order[0, 0], ledger)
     _energy(energy[0, 0], ledger)
     return first, second

@@ -1,6 +1,5 @@
 """An ensemble as a picture: how the errors of its members spread as time goes on."""
 
-import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.spread import LEVELS, QUANTITIES, member_errors, spread
-from symtop.report.style import look, panels, save
+from symtop.report.style import LEAST_TEXT, headline, look, panels, save
 
 LEAST = 1e-16  # what is smaller is drawn here
 BANDS = ((0, 4, 0.18, "1 to 99 %"), (1, 3, 0.38, "10 to 90 %"))  # of `LEVELS`, and how opaque
@@ -18,7 +17,7 @@ MOST = 1e3  # what is larger, and members that failed, are drawn here
 def draw(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> Path:
     """Two panels into a PNG: quantiles over members of the axis error and of the energy error against time."""
     shown = [name for name in QUANTITIES if name in data]
-    figure, axes = panels(len(shown), 1, height=2.9, sharex=True)
+    figure, axes = panels(len(shown), 1, height=2.1, sharex=True)
     for axis, name in zip(axes[:, 0], shown, strict=True):
         bands(axis, members, data, name)
         axis.label_outer()
@@ -29,7 +28,7 @@ def draw(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> Path:
     )
     if ended < 1.0:
         sentence += ", and those that failed count as infinitely wrong"
-    axes[0, 0].set_title(textwrap.fill(sentence, 110))
+    headline(figure, sentence)
     target = Path(path)
     save(figure, target)
     return target
@@ -62,6 +61,6 @@ def _bands(axis: Any, times: Any, quantiles: Any, color: str) -> None:
     for end, name in zip(ends, names, strict=True):
         place = max(end, place + least)
         axis.annotate(
-            name, (times[-1], 10.0**place), xytext=(5, 0), textcoords="offset points", fontsize=8.5, va="center"
+            name, (times[-1], 10.0**place), xytext=(5, 0), textcoords="offset points", fontsize=LEAST_TEXT, va="center"
         )
     axis.set_xlim(0.0, times[-1] * 1.07)

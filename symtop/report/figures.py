@@ -1,8 +1,11 @@
-"""What drawings of studies share: the grey band of the reference's error bound, the Pareto front, running maxima."""
+"""What drawings of studies share: names at the ends of lines, the grey band of the reference's bound, the front."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
+from symtop.report.style import LEAST_TEXT, ink
 
 SMALLEST = 1e-17  # where an error of exactly zero is drawn
 
@@ -28,3 +31,43 @@ def pareto(cost: Any, error: Any) -> Any:
 def largest_so_far(values: Any) -> Any:
     """The largest size up to each sample; zeros are `SMALLEST`, for a logarithmic axis."""
     return np.maximum.accumulate(np.maximum(np.abs(np.asarray(values)), SMALLEST))
+
+
+def spread(places: Sequence[float], gap: float) -> list[float]:
+    """Places in [0, 1] that keep their order and a distance; labels that would meet share the mean of their places."""
+    order = sorted(range(len(places)), key=lambda k: places[k])
+    blocks: list[tuple[float, int]] = []  # centre and number of labels
+    for k in order:
+        centre, count = places[k], 1
+        while True:
+            reach = 0.5 * gap * count
+            centre = min(max(centre, reach - 0.5 * gap), 1.0 - reach + 0.5 * gap)
+            if not blocks or blocks[-1][0] + 0.5 * gap * blocks[-1][1] <= centre - reach + 1e-12:
+                break
+            before, others = blocks.pop()
+            centre, count = (before * others + centre * count) / (others + count), others + count
+        blocks.append((centre, count))
+    moved = [centre + gap * (k - 0.5 * (count - 1)) for centre, count in blocks for k in range(count)]
+    placed = [0.0] * len(places)
+    for k, value in zip(order, moved, strict=True):
+        placed[k] = value
+    return placed
+
+
+def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]], size: float = LEAST_TEXT) -> None:
+    """Write each name at the right of a panel, joined to the end of its line; `ends` are x, y and colour.
+
+    Limits and layout of the panel must be final but for the room that the names take.
+    """
+    if not ends:
+        return
+    axis.figure.canvas.figure.draw_without_rendering()  # the root of a subfigure
+    height = axis.get_window_extent().height * 72.0 / axis.figure.dpi
+    places = axis.transAxes.inverted().transform(axis.transData.transform([end[:2] for end in ends.values()]))
+    heights = spread([float(np.clip(y, 0.0, 1.0)) for _, y in places], 1.2 * size / height)
+    for (name, (x, y, color)), place in zip(ends.items(), heights, strict=True):
+        axis.annotate(
+            name, (x, y), (1.04, place), textcoords="axes fraction", va="center", fontsize=size, color=ink(color),
+            arrowprops={"arrowstyle": "-", "color": color, "lw": 0.5, "shrinkA": 0, "shrinkB": 1, "relpos": (0.0, 0.5)},
+            annotation_clip=False,
+        )  # fmt: skip

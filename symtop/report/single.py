@@ -1,6 +1,5 @@
 """One run as a picture: its motion beside the true one, its errors, and the residuals of constants of the motion."""
 
-import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,20 @@ import xarray as xr
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES
 from symtop.model.scenes import Scene
-from symtop.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, legend_below, panels, save
+from symtop.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    headline,
+    legend_below,
+    panels,
+    save,
+)  # fmt: skip
 
 COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
 LEAST = 1e-17  # what is smaller is drawn here
@@ -18,13 +30,13 @@ LEAST = 1e-17  # what is smaller is drawn here
 
 def draw(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Dataset, path: str | Path) -> Path:
     """Three panels into a PNG: theta and the truth's, errors in angles, residuals of energy and momenta."""
-    figure, axes = panels(3, 1, height=2.3, sharex=True)
+    figure, axes = panels(3, 1, height=1.7, sharex=True)
     times = run["time"].values
     motion, angles, constants = axes[:, 0]
-    motion.plot(times, np.degrees(truth["theta"].values), color=ORANGE, lw=3.0, alpha=0.6, label="true theta")
+    motion.plot(times, np.degrees(truth["theta"].values), color=ORANGE, lw=2.4, alpha=0.6, label="true theta")
     motion.plot(times, np.degrees(run["theta"].values), color=BLUE, lw=1.0, label=f"theta of {run.attrs['integrator']}")
     motion.set_ylabel("theta (degrees)")
-    motion.set_title(textwrap.fill(f"{run.attrs['title']}: {run.attrs['outcome_message']}", 110))
+    headline(figure, f"{run.attrs['title']}: {run.attrs['outcome_message']}")
     for name in ("axis", "attitude", "theta"):
         if name in errors:
             _line(angles, times, errors[name].values, COLORS[name], QUANTITIES[name])

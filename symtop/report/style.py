@@ -1,9 +1,11 @@
 """One look for every figure: an integrator has the same colour, marker and line everywhere.
 
 Colours are those of Okabe and Ito, which readers with any common colour blindness can tell apart. Every series also has
-a marker or a line style of its own. Methods that run in plain Python are dashed wherever cost is drawn.
+a marker of its own, and every family a line style, so that a figure can be read in grey. A figure is as wide as a page
+of print, 6.5 inches, and its text is at least 7 points high there.
 """
 
+import textwrap
 import zlib
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +15,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from symtop.base import datasets
+
+WIDTH = 6.5  # inches, of a figure: the text block of a page
+LEAST_TEXT = 7.0  # points, of any text at that width
+DPI = 200
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
@@ -24,8 +30,9 @@ class Look(NamedTuple):
 
     color: str
     marker: str
-    size: float = 5.0
+    size: float = 4.0
     fill: str = "full"  # of the marker, matplotlib's fillstyle: the chart of a row
+    dash: Any = "-"  # of the line: the family
 
 
 # Shades of a family: light enough to tell apart, of one hue so that families stay together.
@@ -48,12 +55,16 @@ _SHADES = {
     "engine": SKIES,
     "other": PURPLES,
 }
+DASHES = {  # of a line, by family; a family that is not here has a solid one
+    "splitting": (0, (6.0, 1.2)), "runge-kutta": (0, (3.0, 1.2)), "lie-group": (0, (6.0, 1.2, 1.0, 1.2)),
+    "taylor": (0, (1.5, 0.8)), "library": (0, (1.0, 1.6)), "engine": (0, (3.0, 1.2, 1.0, 1.2)),
+}  # fmt: skip
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
 # The looks of the integrators that ship with symtop. A new one gets a line here; the others keep theirs.
 _LOOKS = {
-    "midpoint": Look(BLUE, "o", 8.0), "trapezoidal": Look(SKY, "s"), "simpson-linear": Look(PURPLE, "v"),
+    "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "simpson-linear": Look(PURPLE, "v"),
     "midpoint-unreduced": Look(BLUE, "^"), "trapezoidal-unreduced": Look(BLUES[1], "<"),
     "galerkin-simpson": Look(BLUE, "P"), "exact-discrete": Look(BLUES[2], "D"),
     "stormer-verlet": Look(GREEN, "^"), "stormer-verlet-yoshida-4": Look(GREEN, "o"),
@@ -78,7 +89,7 @@ _LOOKS = {
     "euler-poincare": Look(BLUES[1], "s"),
     "rk45": Look(VERMILLION, "D"), "dop853": Look(VERMILLION, "o"), "lsoda": Look(REDS[1], "s"),
     "radau": Look(REDS[2], "v"),
-    "taylor": Look(BLACK, "*", 8.0), "taylor-longdouble": Look(BLACK, "o"), "taylor-quad": Look(BLACKS[1], "s"),
+    "taylor": Look(BLACK, "*", 6.0), "taylor-longdouble": Look(BLACK, "o"), "taylor-quad": Look(BLACKS[1], "s"),
     "series": Look(BLACKS[1], "D"), "series-adaptive": Look(BLACKS[1], "^"),
     "exact": Look(GREY, "x"),
     "no-gyro": Look(SKY, "o"), "no-gyro-float32": Look(SKIES[2], "o"), "no-gyro-linear": Look(SKIES[1], "o"),
@@ -112,37 +123,63 @@ def look(name: str) -> Look:
     name, chart = split_name(name)
     if chart:
         return look(name)._replace(fill=FILLS[chart])
-    if name in _LOOKS:
-        return _LOOKS[name]
     registered = integrators()
-    shades = _SHADES[registered[name].family if name in registered else "other"]
+    family = registered[name].family if name in registered else "other"
+    dash = DASHES.get(family, "-")
+    if name in _LOOKS:
+        return _LOOKS[name]._replace(dash=dash)
+    shades = _SHADES[family]
     free = [Look(shade, marker) for marker in _MARKERS for shade in shades]
     free = [one for one in free if all((one.color, one.marker) != shipped[:2] for shipped in _LOOKS.values())]
-    return free[zlib.crc32(name.encode()) % len(free)]
+    return free[zlib.crc32(name.encode()) % len(free)]._replace(dash=dash)
+
+
+def line(name: str, scale: float = 1.0) -> dict[str, Any]:
+    """What ``plot`` needs to draw an integrator or a row: colour, line, and marker of `scale` times its size."""
+    mark = look(name)
+    shape = {"color": mark.color, "ls": mark.dash, "marker": mark.marker, "fillstyle": mark.fill}
+    return shape | {"ms": scale * mark.size}
+
+
+def ink(color: str) -> tuple[float, ...]:
+    """A colour as dark as letters on white need it: itself, or darker (luminance at most 0.18, a contrast of 4.5)."""
+    from matplotlib.colors import to_rgb
+
+    part = np.array(to_rgb(color))
+    linear = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+    linear *= min(1.0, 0.18 / max(float(linear @ np.array([0.2126, 0.7152, 0.0722])), 1e-9))
+    shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    return tuple(map(float, shown))
 
 
 def use() -> None:
-    """Set matplotlib up for the report: no display, legible at half the page's width, reproducible bytes."""
+    """Set matplotlib up for the report: no display, legible in print, reproducible bytes."""
     mpl.use("Agg")
     plt.rcParams.update(
         {
-            "figure.dpi": 96,
-            "savefig.dpi": 96,
+            "figure.dpi": 100,
+            "savefig.dpi": DPI,
             "figure.constrained_layout.use": True,
-            "font.size": 10.0,
-            "axes.titlesize": 10.5,
-            "axes.labelsize": 10.0,
-            "legend.fontsize": 9.0,
+            "font.size": 8.0,
+            "figure.titlesize": 9.5,
+            "axes.titlesize": 8.0,
+            "axes.labelsize": 8.0,
+            "xtick.labelsize": 7.5,
+            "ytick.labelsize": 7.5,
+            "legend.fontsize": 7.5,
+            "legend.title_fontsize": 7.5,
             "axes.grid": True,
             "grid.color": "#DDDDDD",
-            "grid.linewidth": 0.6,
+            "grid.linewidth": 0.5,
             "axes.axisbelow": True,
+            "axes.linewidth": 0.6,
             "axes.spines.top": False,
             "axes.spines.right": False,
-            "lines.linewidth": 1.3,
-            "lines.markersize": 5.0,
+            "lines.linewidth": 1.1,
+            "lines.markersize": 4.0,
             "hatch.linewidth": 0.5,
             "svg.hashsalt": "symtop",
+            "pdf.fonttype": 42,  # letters that can be searched and edited
         }
     )
 
@@ -173,16 +210,50 @@ def compact(path: str | Path) -> None:
 
 def save(figure: Any, target: Path) -> None:
     """Write a figure as a compact PNG, an SVG or a PDF, or a film as it is, whole or not at all, and close it."""
+    _write(figure, target)
+    plt.close(figure)
+
+
+def publish(figure: Any, target: Path) -> None:
+    """Write a figure as a PNG and, for print, as a PDF beside it; a film has no PDF."""
+    if target.suffix == ".png":
+        _write(figure, target.with_suffix(".pdf"))
+    save(figure, target)
+
+
+def _write(figure: Any, target: Path) -> None:
     datasets.sweep(target)
     with datasets.replacing(target, target.suffix) as partial:
         figure.savefig(partial, metadata={UNDATED.get(target.suffix, "Software"): None})
         if target.suffix == ".png":
             compact(partial)
-    plt.close(figure)
 
 
-def panels(rows: int, columns: int, width: float = 9.6, height: float = 3.4, **options: Any) -> Any:
-    """A grid of axes, always two-dimensional, with room for a legend below."""
+def least_text(figure: Any) -> tuple[float, str]:
+    """The smallest text of a figure in points, if the figure is printed `WIDTH` inches wide, and what it says."""
+    from matplotlib.text import Text
+
+    figure.draw_without_rendering()
+    texts = [one for one in figure.findobj(Text) if one.get_visible() and one.get_text().strip()]
+    sizes = ((one.get_fontsize() * WIDTH / figure.get_figwidth(), one.get_text()) for one in texts)
+    return min(sizes, default=(np.inf, ""))
+
+
+def number(value: float, digits: int = 2) -> str:
+    """A number of a title: ``1e-6``, ``0.012``, ``340``."""
+    text = f"{value:.{digits}g}" if not 10.0**digits <= abs(value) < 1e4 else f"{value:.0f}"
+    mantissa, mark, power = text.partition("e")
+    return f"{mantissa}e{int(power)}" if mark else text
+
+
+def headline(figure: Any, message: str) -> None:
+    """Write a figure's one message above it."""
+    lines = textwrap.wrap(message, round(12.3 * figure.get_figwidth()), break_on_hyphens=False)
+    figure.suptitle("\n".join(lines), x=0.01, ha="left", weight="bold")
+
+
+def panels(rows: int, columns: int, width: float = WIDTH, height: float = 2.3, **options: Any) -> Any:
+    """A grid of axes, always two-dimensional, with room for a title above and a legend below; sizes in inches."""
     use()
     return plt.subplots(rows, columns, figsize=(width, height * rows + 0.8), squeeze=False, **options)
 
@@ -205,18 +276,69 @@ def grid(count: int, columns: int, labels: tuple[str, str] = ("", ""), **options
     return figure, used
 
 
+def lead(count: int, labels: tuple[str, str], height: float = 2.9, small: float = 1.3, columns: int = 4) -> Any:
+    """A figure of one wide panel and, below it, `count` - 1 small ones, all logarithmic.
+
+    Returns the figure and its panels (one-dimensional). `same_limits` gives them the same limits once all is drawn:
+    axes that are shared between parts of a figure would draw it anew at every change.
+    """
+    use()
+    rows = -(-(count - 1) // columns)
+    figure = plt.figure(figsize=(WIDTH, height + small * rows + 0.5))
+    ratios = [height, small * rows + 0.2][: 1 + bool(rows)]
+    parts: Any = figure.subfigures(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
+    first = parts[0].subplots()
+    others: list[Any] = []
+    if rows:
+        below = parts[1].subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        others = list(below.flat[: count - 1])
+        for axis in below.flat[count - 1 :]:
+            axis.set_visible(False)
+        for axis in others[-columns:]:
+            axis.tick_params(which="both", labelbottom=True)
+    for axis in (first, *others):
+        axis.set(xscale="log", yscale="log")
+        axis.tick_params(which="minor", length=0)
+    first.set(xlabel=labels[0], ylabel=labels[1])
+    return figure, np.array([first, *others])
+
+
+def same_limits(axes: Any) -> None:
+    """Give all panels the limits that hold everything; those in y of the first, if it does not scale itself."""
+    for name in "xy":
+        limits = [getattr(axis, f"get_{name}lim")() for axis in axes]
+        if not getattr(axes[0], f"get_autoscale{name}_on")():
+            limits = limits[:1]
+        ends = min(low for low, _ in limits), max(high for _, high in limits)
+        for axis in axes:
+            getattr(axis, f"set_{name}lim")(ends)
+
+
+def few_ticks(*axes: Any, most: int = 6) -> None:
+    """At most so many labelled powers of ten on the logarithmic axes, and none of the lesser ticks is labelled."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    for panel in axes:
+        for one in (panel.xaxis, panel.yaxis):
+            if one.get_scale() == "log":
+                one.set_major_locator(LogLocator(numticks=most + 1))
+                one.set_minor_formatter(NullFormatter())
+
+
 def legend_below(figure: Any, axes: Any) -> None:
     """One legend for the whole figure, under it, in as many columns as its longest label allows."""
     seen: dict[str, Any] = {}
     for axis in np.ravel(axes):
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             seen.setdefault(label, handle)
-    columns = max(1, min(len(seen), int(12.5 * figure.get_figwidth()) // (max(map(len, seen), default=0) + 6)))
+    columns = max(1, min(len(seen), int(17.0 * figure.get_figwidth()) // (max(map(len, seen), default=0) + 6)))
     figure.legend(list(seen.values()), list(seen), loc="outside lower center", ncols=columns, frameon=False)
 
 
 def slope_guide(axis: Any, power: float, x: tuple[float, float], y: float, label: str) -> None:
-    """A thin reference line y ~ x^power from (x[0], y)."""
+    """A thin reference line y ~ x^power from (x[0], y), labelled below its middle."""
     ends = np.array(x)
     axis.plot(ends, y * (ends / ends[0]) ** power, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
-    axis.annotate(label, (ends[0], y), color="#444444", fontsize=8.5, ha="right", va="center")
+    middle = float(np.sqrt(ends[0] * ends[1]))
+    place = middle, y * (middle / ends[0]) ** power
+    axis.annotate(label, place, (3, -2), textcoords="offset points", color="#444444", fontsize=7.5, va="top")

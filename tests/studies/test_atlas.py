@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.stability import atlas, atlas_figures, atlas_words, outcome_maps, words
+from symtop_studies.stability import atlas, atlas_figures, atlas_words, figures, messages, outcome_maps, words
 from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row_plan, spin_unit, with_spin
 from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
 
@@ -19,7 +19,6 @@ from symtop.model.scenes import closed_form, scene
 from symtop.report.style import OUTCOME_COLORS
 from symtop.run.reference import reference
 from symtop.runner import run as runner, store
-from symtop.runner.grid import grid_rows
 from symtop.runner.study import Case
 
 STEPS = [0.011, 0.053, 0.17, 0.31, 0.83]
@@ -149,7 +148,7 @@ def test_the_caption_of_a_page_names_the_methods_without_a_limit():
         data = hand_made([[A, B, B]] * 4)
         for variable, value in ((Column.LINEAR_LIMIT, limit), (Column.THIRD_TURN, 0.55)):
             data[variable] = (("scene", "integrator", "curve"), [[[value, value]]])
-        caption = atlas_words.page_caption(data, "cusp", "gauss", ["midpoint"])
+        caption = atlas_words.caption(data, "cusp", ["midpoint"])
         assert ("up to steps of 1 nutation periods (h omega = 6.28): midpoint has no linear limit" in caption) is said
 
 
@@ -259,11 +258,12 @@ def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
     assert shapes == {"strang": (2, 2), "midpoint": (3, 3)}
 
 
-def test_maps_can_be_read_without_colours():
+@pytest.mark.parametrize("size", ["small", "enlarged"])
+def test_maps_can_be_read_without_colours(size):
     """Every outcome that is not plain has a hatch of its own, and any two colours differ in lightness or have one."""
     hatched = {}
     for index, word in enumerate(VERDICTS):
-        image = atlas_figures.painted(np.full((4, 6), index, dtype=np.uint8))
+        image = atlas_figures.painted(np.full((4, 6), index, dtype=np.uint8), size)
         hatched[word] = tuple(np.unique(image.reshape(-1, 3), axis=0).shape)
     plain = [word for word, shape in hatched.items() if shape[0] == 1]
     lightness = {word: 0.2126 * r + 0.7152 * g + 0.0722 * b for word in plain
@@ -274,12 +274,45 @@ def test_maps_can_be_read_without_colours():
     assert {"left_chart", "wrong_regime", "not_converged", "drifting"} <= set(VERDICTS) - set(plain)
 
 
-def test_every_integrator_has_a_page():
-    names = [row.name for row in grid_rows("axis")]
-    pages = atlas.pages(names)
-    assert sorted(name for names in pages.values() for name in names) == sorted(names)
-    assert "other" not in pages
-    assert max(map(len, pages.values())) <= 12
+def two_maps():
+    """A dataset of a method with steps and one with tolerances, the first accurate more often."""
+    step, tolerance = hand_made([[A, A, B]] * 4), hand_made([[A, L, L]] * 4, knob_name="tolerance")
+    cells = [(Case("cusp", name), one.sel(scene="cusp", integrator="midpoint", drop=True))
+             for name, one in (("rk4[axis]", step), ("strang[axis]", hand_made([[A, B, B]] * 4)),
+                               ("rk45[axis]", tolerance))]  # fmt: skip
+    return store.combine(cells)
+
+
+def test_a_page_of_small_maps_shows_every_row_once_in_the_order_of_its_accurate_share():
+    drawn = {picture.name: picture for picture in figures.pictures(two_maps())}
+    assert list(drawn) == ["atlas-cusp-enlarged", "atlas-cusp-steps", "atlas-cusp-tolerances"]
+    titles = [axis.get_title() for axis in drawn["atlas-cusp-steps"].figure.axes if axis.get_visible()]
+    assert titles == ["rk4\naxis 67%", "strang\naxis 33%"]
+    assert "2 rows" in drawn["atlas-cusp-steps"].caption
+    (title,) = (axis.get_title() for axis in drawn["atlas-cusp-tolerances"].figure.axes if axis.get_visible())
+    assert title == "rk45\naxis 33%"
+    assert "The tolerance grows to the right" in drawn["atlas-cusp-tolerances"].caption
+
+
+def test_the_enlarged_map_is_that_of_a_familiar_row_and_names_its_regions():
+    data = two_maps()
+    figure = next(figures.pictures(data)).figure
+    assert "rk4[axis] is accurate in 67% of its map" in figure.get_suptitle()
+    assert {text.get_text() for text in figure.axes[0].texts} == {"accurate", "bounded but wrong"}
+    renamed = data.assign_coords(integrator=["rk4[axis]", figures.FAMILIAR, "rk45[axis]"])
+    assert next(figures.pictures(renamed)).figure.get_suptitle().startswith(figures.FAMILIAR)
+
+
+def test_the_message_of_a_mechanism_follows_from_its_numbers():
+    def said(once, every):
+        columns = {Column.ENERGY_ONCE: ("integrator", once), Column.ENERGY_EVERY: ("integrator", every)}
+        return messages.of_mechanism(
+            "sampling", xr.Dataset(columns, coords={"integrator": ["rk4[axis]", "strang[axis]"]})
+        )
+
+    assert "up to 1e+03 times too small" in said([1e-7, 1e-6], [1e-4, 1e-6])
+    assert "not seen" not in said([1e-7, 1e-6], [1e-4, 1e-6])
+    assert "that of 1 rows is not seen at all" in said([1e-7, 1e-16], [1e-4, 1e-6])
 
 
 def test_words_of_mechanisms_come_only_from_what_is_there():

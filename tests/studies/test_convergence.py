@@ -78,14 +78,45 @@ def test_adaptive_methods_are_drawn_against_their_tolerance(data):
     assert words.tolerance_sentence(tables.stepping(data)) == []
 
 
-def test_the_first_figure_shows_the_five_named_methods_on_one_axis_of_work(data):
+def test_the_first_figure_shows_the_five_named_methods_by_step_tolerance_and_work(data):
     drawn = figures.pictures(data)
-    assert drawn[0].name == "named-methods"
-    _, labels = drawn[0].figure.axes[0].get_legend_handles_labels()
-    assert {split_name(label)[0] for label in labels if "[" in label} == set(figures.NAMED)
-    assert drawn[-1].name == "tolerance"
-    for picture in drawn:
-        picture.figure.clear()
+    assert [picture.name for picture in drawn] == ["named-methods", "constants", "tolerance"]
+    steps, tolerances, work, energy = (
+        {split_name(label)[0] for label in axis.get_legend_handles_labels()[1] if "[" in label}
+        for axis in drawn[0].figure.axes
+    )
+    assert work == steps | tolerances == set(figures.NAMED)
+    assert steps == {"midpoint", "trapezoidal", "stormer-verlet"}
+    assert energy == set()  # these cases have no history: they are not of the scene that has one
+    assert not drawn[0].figure.axes[3].get_visible()
+
+
+def test_the_energy_over_time_is_that_of_the_run_that_it_names():
+    scene = symtop.scene("spheroid")
+    verlet, taylor = (tables.energy_history(scene, integrator(name), 20.0) for name in ("stormer-verlet", "taylor"))
+    assert float(verlet["history_time"].max()) == pytest.approx(20.0)
+    run = symtop.simulate(scene, "stormer-verlet", step_size=scene.nutation_period / 100.0,
+                          horizon=20.0 * scene.nutation_period, samples=801, guard=False)  # fmt: skip
+    largest = float(np.abs(run["energy"] - run["energy"][0]).max())
+    assert float(verlet["history_energy"].max()) == pytest.approx(largest / scene.energy_scale, rel=1e-6)
+    assert float(taylor["history_energy"].max()) < 1e-12 < float(verlet["history_energy"].max())
+    assert np.isnan(verlet["history_tolerance"])
+    assert float(taylor["history_tolerance"]) > 0.0
+
+
+def test_the_work_of_an_error_constant_is_the_work_of_a_run_with_that_error(data):
+    """error = C h^p: a target that some run met costs what that run cost; four times less error, twice the work."""
+    cell = data.sel(scene="goldstein", integrator="stormer-verlet[angles]")
+    fit = tables.fits(data, "axis")["goldstein", "stormer-verlet[angles]"]
+    k = np.flatnonzero(fit.used)[-1]
+    error, work = float(cell["axis"][k]), float(tables.evaluations_a_nutation(cell, "goldstein")[k])
+    found = tables.efficiencies(data, error)["goldstein", "stormer-verlet[angles]"]
+    assert found.work == pytest.approx(work, rel=0.1)
+    assert not found.foreseen
+    beyond = tables.efficiencies(data, error / 4.0)["goldstein", "stormer-verlet[angles]"]
+    assert beyond.work == pytest.approx(2.0 * found.work, rel=1e-6)
+    assert tables.efficiencies(data, 1e-14)["goldstein", "stormer-verlet[angles]"].foreseen
+    assert ("goldstein", "rk45[angles]") not in tables.efficiencies(data, error)  # it has no step to choose
 
 
 def test_work_is_counted_per_nutation(data):

@@ -143,16 +143,6 @@ def test_shares_count_tops_within_five_degrees(measured):
     assert words.share(measured, "strang[axis]") > words.share(measured, "no-gyro[axis]")
 
 
-@pytest.mark.parametrize("places", [[0.5] * 10, [0.0, 0.01, 0.99, 1.0, 1.0], [0.2, 0.9, 0.4]])
-def test_labels_keep_their_order_and_their_distance(places):
-    placed = figures.spread(places, 0.05)
-    assert np.all(np.diff(np.sort(placed)) >= 0.05 - 1e-12)
-    assert max(placed) <= 1.0 + 1e-12
-    for one, other in ((0, 1), (1, 2)):
-        assert (places[one] < places[other]) <= (placed[one] < placed[other])
-    assert figures.spread([0.1, 0.5], 0.05) == [0.1, 0.5]
-
-
 def test_numbers_in_words():
     assert words.angle(math.pi) == "180 degrees"
     assert words.angle(1e-6) == "1.0e-06 rad"

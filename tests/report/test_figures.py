@@ -1,0 +1,156 @@
+"""Every figure of every study can be read in print: letters, colours, lines and names; and the instruments of that."""
+
+import itertools
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.text import Text
+
+import symtop
+from symtop.base import datasets
+from symtop.report import figures, style
+from symtop.runner import run as runner
+
+MOST_LINES, MOST_ENTRIES = 10, 8
+GREYS = 0.05  # of saturation: a line of less colour is drawn for context
+KEYED = ("stability",)  # whose maps have a key of colours, not names of lines
+SHOWN_BY_ORDER = ("engines", "oscillators", "truth")  # whose lines are coloured by what they are, not by method
+
+
+def saturation(color) -> float:
+    red, green, blue = to_rgb(color)
+    return max(red, green, blue) - min(red, green, blue)
+
+
+def faults(name, figure) -> list[str]:
+    """What keeps a figure from being read: nothing, of a good one."""
+    found = []
+    least, text = style.least_text(figure)
+    if least < style.LEAST_TEXT - 1e-9:
+        found.append(f"{text!r} has {least:.1f} points")
+    if not figure.get_suptitle():
+        found.append("no message")
+    legends = [*figure.legends, *(axis.get_legend() for axis in figure.axes if axis.get_legend())]
+    most = max((len(one.get_texts()) for one in legends), default=0)
+    if most > MOST_ENTRIES and name not in (*SHOWN_BY_ORDER, *KEYED):
+        found.append(f"a legend of {most} entries")
+    for axis in figure.axes if name not in SHOWN_BY_ORDER else []:
+        kinds = {line.get_label() for line in axis.get_lines() if saturation(line.get_color()) > GREYS}
+        if len(kinds - {label for label in kinds if label.startswith("_")}) > MOST_LINES:
+            found.append(f"{len(kinds)} coloured lines")
+    return found
+
+
+@pytest.mark.parametrize("name", runner.names())
+def test_every_figure_can_be_read_in_print(name, quick_results):
+    data = datasets.read_any(quick_results / f"{name}.nc")
+    drawn = [one for one in runner.load(name).pictures(data) if not hasattr(one.figure, "suffix")]
+    assert drawn
+    assert {one.name: faults(name, one.figure) for one in drawn} == {one.name: [] for one in drawn}
+    assert all(one.figure.get_figwidth() <= style.WIDTH for one in drawn)
+    assert all(one.figure.get_figheight() <= 10.0 for one in drawn)  # inches: a page
+
+
+def test_a_figure_that_cannot_be_read_is_found():
+    figure, axes = style.panels(1, 1)
+    axes[0, 0].plot([0.0, 1.0], [0.0, 1.0], label="one")
+    style.headline(figure, "A message")
+    assert faults("drift", figure) == []
+    axes[0, 0].text(0.5, 0.5, "small", fontsize=6.0)
+    assert faults("drift", figure) == ["'small' has 6.0 points"]
+    figure.set_figwidth(13.0)  # twice the width is half the size in print
+    assert faults("drift", figure)[0] == "'small' has 3.0 points"
+    for k in range(11):
+        axes[0, 0].plot([0.0, k], color="C0", label=f"line {k}")
+    style.legend_below(figure, axes)
+    assert {"a legend of 12 entries", "12 coloured lines"} <= set(faults("drift", figure))
+    figure.suptitle("")
+    assert "no message" in faults("drift", figure)
+
+
+def test_families_differ_in_their_lines_and_charts_in_their_markers():
+    names = ("midpoint", "strang", "rk4", "simo-wong", "taylor", "rk45")
+    dashes = [style.look(name).dash for name in names]
+    assert all(one != other for one, other in itertools.combinations(dashes, 2))
+    assert style.look("strang").dash == style.look("chin-4a[attitude]").dash
+    fills = {style.line(f"rk4[{chart}]")["fillstyle"] for chart in ("angles", "axis", "attitude")}
+    assert len(fills) == 3
+
+
+def contrast(color) -> float:
+    """Of a colour on white, as WCAG 2 defines it."""
+    part = np.array(to_rgb(color))
+    linear = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+    return 1.05 / (float(linear @ np.array([0.2126, 0.7152, 0.0722])) + 0.05)
+
+
+def test_letters_have_the_contrast_that_letters_need():
+    colors = {style.look(name).color for name in symtop.integrators()} | set(style.OUTCOME_COLORS.values())
+    assert min(map(contrast, colors)) < 2.0  # as they are, not all could be read
+    assert min(contrast(style.ink(color)) for color in colors) >= 4.5
+    assert style.ink(style.BLUE) == pytest.approx(to_rgb(style.BLUE))  # dark enough as it is
+
+
+def test_names_at_the_ends_of_lines_do_not_meet():
+    figure, axes = style.panels(1, 1)
+    axis = axes[0, 0]
+    axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+    figures.name_ends(axis, {})  # nothing to name
+    assert not axis.texts
+    ends = {f"name {k}": (1.0, 0.5 + 0.001 * k, style.BLUE) for k in range(8)}
+    figures.name_ends(axis, ends)
+    figure.draw_without_rendering()
+    boxes = {text.get_text(): Text.get_window_extent(text) for text in axis.texts}  # without the strokes to the lines
+    names = sorted(boxes, key=lambda name: boxes[name].y0)
+    assert names == list(ends)  # in the order of their lines
+    assert all(boxes[low].y1 <= boxes[high].y0 + 1.0 for low, high in itertools.pairwise(names))
+
+
+@pytest.mark.parametrize("places", [[0.5] * 10, [0.0, 0.01, 0.99, 1.0, 1.0], [0.2, 0.9, 0.4]])
+def test_labels_keep_their_order_and_their_distance(places):
+    placed = figures.spread(places, 0.05)
+    assert np.all(np.diff(np.sort(placed)) >= 0.05 - 1e-12)
+    assert max(placed) <= 1.0 + 1e-12
+    for one, other in ((0, 1), (1, 2)):
+        assert (places[one] < places[other]) <= (placed[one] < placed[other])
+    assert figures.spread([0.1, 0.5], 0.05) == [0.1, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [(1e-6, "1e-6"), (0.0123, "0.012"), (185.3, "185"), (1093.0, "1093"), (30012.0, "3e4"), (7.0, "7")],
+)
+def test_a_number_of_a_title(value, said):
+    assert style.number(value) == said
+
+
+def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_path):
+    written = []
+    for folder in ("one", "two"):
+        figure, axes = style.panels(1, 1)
+        axes[0, 0].plot([1.0, 2.0])
+        style.publish(figure, tmp_path / folder / "a.png")
+        written.append([(tmp_path / folder / f"a.{kind}").read_bytes() for kind in ("png", "pdf")])
+    assert written[0] == written[1]
+    assert written[0][1].startswith(b"%PDF")
+    with_pixels = np.frombuffer(written[0][0][16:24], ">u4")
+    assert with_pixels[0] == round(style.WIDTH * style.DPI)
+
+
+def test_one_wide_panel_leads_small_ones_with_its_axes():
+    figure, axes = style.lead(6, ("step", "error"))
+    assert len(axes) == 6
+    for k, axis in enumerate(axes):
+        axis.plot([10.0**-k, 1.0], [1e-6, 10.0**-k])
+    axes[0].set_ylim(1e-9, 1.0)
+    assert axes[0].get_xlim() != axes[1].get_xlim()
+    style.same_limits(axes)
+    ((low, high),) = {axis.get_xlim() for axis in axes}
+    assert low < 1e-5
+    assert high > 1.0
+    assert {axis.get_ylim() for axis in axes} == {(1e-9, 1.0)}
+    figure.draw_without_rendering()
+    widths = [axis.get_window_extent().width for axis in axes]
+    assert widths[0] > 3.0 * max(widths[1:])
+    assert len(style.lead(1, ("step", "error"))[1]) == 1
