@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from symtop.model.closed_form import ClosedForm as ClosedForm
     from symtop.model.scenes import Scene as Scene, register_scene as register_scene, scene as scene, scenes as scenes
     from symtop.model.top import Angles as Angles, Momenta as Momenta, SymmetricTop as SymmetricTop
+    from symtop.report.card import card as card
     from symtop.report.plot import plot as plot
     from symtop.run.ensemble import ensemble as ensemble
     from symtop.run.long_run import long_run as long_run
@@ -62,6 +63,7 @@ _NAMES = {  # by the module that holds them
     "run.population": "population",
     "run.reference": "reference",
     "run.simulation": "simulate",
+    "report.card": "card",
     "report.plot": "plot",
     "runner.study": "Case Picture Study Table",
     "runner.sweep": "sweep",

@@ -30,12 +30,6 @@ class Judged(Ledger):
     def __str__(self) -> str:
         return screen.screen(self.about._asdict(), self.scene, self.findings, implied=self.implied)
 
-    def card(self, file: "str | Path") -> Path:
-        """Write a page with two figures and the findings (HTML); returns the file."""
-        from symtop.report.card import card
-
-        return card(self, str(file))
-
     def dataset(self) -> xr.Dataset:
         """As of any ledger, with attributes that say what was judged."""
         return super().dataset().assign_attrs(self.about._asdict(), scene=self.scene)
