@@ -1,8 +1,8 @@
-"""The gallery: every figure in results/figures with its caption, the study that makes it and the command to type.
+"""The gallery: every figure in docs/snapshot with its caption, the study that makes it and the command to type.
 
-Captions, questions and notes on reading are those of results/report.md, in its order. A figure is of the study whose
-folder its name begins with; those of benchmarks are named in `OTHERS`. A figure that the report does not show, and one
-that nothing makes, is an error: the site does not build.
+Captions, questions and notes on reading are those of docs/snapshot/report.md, in its order. A figure is of the study
+whose folder its name begins with; those of benchmarks are named in `OTHERS`. A figure that the report does not show,
+and one that nothing makes, is an error: the site does not build.
 """
 
 import re
@@ -13,6 +13,7 @@ from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
 ROOT = Path(__file__).resolve().parents[2]
+SNAPSHOT = ROOT / "docs" / "snapshot"
 PAGE, MARK = "reference/gallery", "<!-- gallery -->"
 OTHERS = {"peers": ("make peers", "benchmarks/peers/figures.py")}  # a command and the code, by the name's beginning
 SHOWN = re.compile(r"^!\[(?P<alt>.*)\]\(figures/(?P<file>[^)]+)\)\n\n(?P<caption>\S(?:.|\n(?!\n))*)", re.MULTILINE)
@@ -51,7 +52,7 @@ def markdown(report: str, tracked: set[str], root: Path = ROOT) -> str:
     parts = sections(report)
     shown = {one.file for _, figures in parts.values() for one in figures}
     if shown != tracked:
-        raise ExtensionError(f"gallery: the report and results/figures differ by {sorted(shown ^ tracked)}")
+        raise ExtensionError(f"gallery: report and figures of docs/snapshot differ by {sorted(shown ^ tracked)}")
     lines: list[str] = []
     for title, (text, figures) in parts.items():
         command, code = maker(figures[0].file, root)
@@ -62,7 +63,7 @@ def markdown(report: str, tracked: set[str], root: Path = ROOT) -> str:
         if reading := re.search(r"^\*\*How to read it\.\*\*.*", text, re.MULTILINE):
             lines += [reading.group(), ""]
         for one in figures:
-            lines += [f"```{{figure}} ../../results/figures/{one.file}", f":name: {Path(one.file).stem}"]
+            lines += [f"```{{figure}} ../snapshot/figures/{one.file}", f":name: {Path(one.file).stem}"]
             lines += [
                 f":alt: {one.alt}",
                 ":loading: lazy",
@@ -77,8 +78,8 @@ def markdown(report: str, tracked: set[str], root: Path = ROOT) -> str:
 
 def _fill(_app: Sphinx, page: str, source: list[str]) -> None:
     if page == PAGE:
-        report = (ROOT / "results" / "report.md").read_text(encoding="utf-8")
-        tracked = {path.name for path in (ROOT / "results" / "figures").iterdir() if path.suffix in {".png", ".gif"}}
+        report = (SNAPSHOT / "report.md").read_text(encoding="utf-8")
+        tracked = {path.name for path in (SNAPSHOT / "figures").iterdir()}
         source[0] = source[0].replace(MARK, markdown(report, tracked))
 
 

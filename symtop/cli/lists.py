@@ -80,6 +80,8 @@ def _flags(method: "Integrator") -> str:
 def _described(method: "Integrator") -> Record:
     """The record of an integrator, its paragraph, its tolerances and its source."""
     described: Record = {**method.record()}
+    if method.conserves is not None and len(method.charts()) > 1:
+        described["conserves"] += " in every one of its charts"  # some keep more in one of them
     if method.default_tolerance is not None:
         described["default tolerance"] = f"{method.default_tolerance:g}"
     if method.least_tolerance > 0.0:

@@ -132,7 +132,9 @@ def test_every_derivation_and_every_public_name_is_there(site):
 @pytest.mark.slow
 def test_every_figure_has_its_study_and_command(site):
     page = (site / "reference" / "gallery.html").read_text(encoding="utf-8")
-    figures = {path.name for path in (ROOT / "results" / "figures").iterdir() if path.suffix in {".png", ".gif"}}
+    figures = {
+        path.name for path in (ROOT / "docs" / "snapshot" / "figures").iterdir() if path.suffix in {".png", ".gif"}
+    }
     assert figures
     for name in figures:
         assert f"_images/{name}" in page, name
@@ -145,7 +147,7 @@ def test_the_gallery_is_made_of_the_report():
     text = gallery.markdown(SMALL, {"convergence-a.png"})
     for wanted in (
         "## Convergence", "*At what rate?*", "`symtop study convergence`", "**How to read it.** Filled",
-        "results/figures/convergence-a.png", ":alt: Lines.", "Slope is order, for `rk4[axis]`.",
+        "snapshot/figures/convergence-a.png", ":alt: Lines.", "Slope is order, for `rk4[axis]`.",
     ):  # fmt: skip
         assert wanted in text
 

@@ -1,0 +1,61 @@
+"""The snapshot holds the report and its figures, and what the studies write is not tracked."""
+
+import importlib.util
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def _taker():
+    spec = importlib.util.spec_from_file_location("snapshot", ROOT / "docs" / "generator" / "snapshot.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def results(tmp_path):
+    (tmp_path / "results" / "figures").mkdir(parents=True)
+    for name in ("a.png", "b.gif", "left-over.png"):
+        (tmp_path / "results" / "figures" / name).write_bytes(name.encode())
+    (tmp_path / "results" / "report.md").write_text("![A](figures/a.png)\n\n![B](figures/b.gif)\n")
+    return tmp_path / "results"
+
+
+def test_what_the_report_shows_is_copied_and_what_it_shows_no_more_goes(results, tmp_path):
+    snapshot = tmp_path / "snapshot"
+    (snapshot / "figures").mkdir(parents=True)
+    (snapshot / "figures" / "old.png").touch()
+    assert _taker().take(results, snapshot) == ["a.png", "b.gif"]
+    assert sorted(path.name for path in (snapshot / "figures").iterdir()) == ["a.png", "b.gif"]
+    assert (snapshot / "report.md").read_text() == (results / "report.md").read_text()
+
+
+def test_a_report_that_is_not_whole_is_not_taken(results, tmp_path):
+    (results / "figures" / "a.png").unlink()
+    with pytest.raises(SystemExit, match=r"figures of the report are missing: a\.png"):
+        _taker().take(results, tmp_path / "snapshot")
+    with pytest.raises(SystemExit, match="run make studies first"):
+        _taker().take(tmp_path, tmp_path / "snapshot")
+    assert not (tmp_path / "snapshot").exists()
+
+
+def test_the_stored_snapshot_is_whole():
+    folder = ROOT / "docs" / "snapshot"
+    shown = set(_taker().SHOWN.findall((folder / "report.md").read_text(encoding="utf-8")))
+    assert shown == {path.name for path in (folder / "figures").iterdir()}
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is no checkout")
+def test_what_a_run_of_the_studies_writes_is_not_tracked():
+    written = ["convergence.nc", "convergence.json", "report.md", "report.html", "figures/x.png", "cases/x/y.nc"]
+    paths = [f"results/{name}" for name in written]
+    done = subprocess.run(["git", "check-ignore", *paths], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == paths
+    kept = subprocess.run(["git", "ls-files", "results"], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert set(kept.stdout.split()) <= {
+        f"results/{n}" for n in ("bench.json", "live-engines.json", "peers.json", "peers.nc")
+    }
