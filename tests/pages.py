@@ -36,9 +36,9 @@ class Block(NamedTuple):
 
 
 def pages() -> list[Path]:
-    """The README and all pages in Markdown of the site."""
-    built = ROOT / "docs" / "_build"
-    written = (path for path in sorted((ROOT / "docs").rglob("*.md")) if built not in path.parents)
+    """The README and all pages in Markdown of the site that somebody wrote."""
+    made = {ROOT / "docs" / "_build", ROOT / "docs" / "snapshot"}
+    written = (path for path in sorted((ROOT / "docs").rglob("*.md")) if not made & set(path.parents))
     return [ROOT / "README.md", *written]
 
 
