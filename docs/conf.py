@@ -27,7 +27,7 @@ extensions = [
     "generator.gallery",
     "generator.links",
 ]
-exclude_patterns = ["_build", "generator", "snapshot"]
+exclude_patterns = ["_build", "generator"]
 
 nb_execution_mode = "off"  # tests/cli/test_notebooks.py runs them and compares what they print
 myst_heading_anchors = 3

@@ -103,7 +103,7 @@ def test_what_is_fetched_is_seen():
 @pytest.mark.parametrize("width", [1280, 390])
 def test_pages_fit_and_ask_for_nothing(site, width):
     pages = ["index.html", "notebooks/first-run.html", "theory/splitting.html", "theory/discrete-lagrangians.html",
-             "reference/api.html", "reference/gallery.html", "reference/report.html", "integrators.html",
+             "reference/api.html", "reference/gallery.html", "snapshot/report.html", "integrators.html",
              "about/faq.html", "search.html?q=separatrix"]  # fmt: skip
     with Browser(width=width, height=900) as browser:
         for page in pages:
