@@ -2,13 +2,17 @@
 
 import contextlib
 import gc
+import threading
+import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
 from typing import Any
 
 from symtop.base.validate import SymtopError
 
-PATIENCE = 10  # seconds to wait for a scheduler's answer
+PATIENCE = 10  # seconds to wait for a scheduler's answer, or for a worker when there is none
+LOOKS = 2.0  # seconds between two looks at a scheduler
 
 
 def connect(address: str) -> Any:
@@ -35,10 +39,73 @@ def connect(address: str) -> Any:
 
 
 def leave(client: Any) -> None:
-    """Close the connection, whatever state it is in."""
+    """Close the connection, whatever state it is in, and do not wait for a scheduler that does not answer."""
     if client is not None:
         with contextlib.suppress(Exception):
-            client.close(timeout=PATIENCE)
+            client.close(timeout=LOOKS)
+
+
+class Watched(Executor):
+    """A client's executor whose futures end when the cluster does.
+
+    A client waits for ever for a scheduler that stands still, and for workers that are gone, in case others come. Here
+    a thread asks the scheduler for its workers every `LOOKS` seconds; when it has had no answer for `PATIENCE` seconds,
+    or there was no worker, every future that is waited for raises SymtopError, and so does whatever is submitted.
+    """
+
+    def __init__(self, client: Any) -> None:
+        self._client, self._inner = client, client.get_executor(pure=False)
+        self._waiting: set[Future[Any]] = set()
+        self._lock, self._ended, self._gone = threading.Lock(), threading.Event(), ""
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
+        """A future of the cluster's."""
+        if self._gone:
+            raise SymtopError(self._gone)
+        future: Future[Any] = Future()
+        with self._lock:
+            self._waiting.add(future)
+        self._inner.submit(function, *args, **kwargs).add_done_callback(lambda done: self._settle(future, done))
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002
+        """Look no more; the client is its owner's."""
+        self._ended.set()
+
+    def _settle(self, future: "Future[Any]", done: "Future[Any] | SymtopError") -> None:
+        """Hand on how a task ended, if nobody has before."""
+        with self._lock:
+            if future not in self._waiting:
+                return
+            self._waiting.remove(future)
+        if isinstance(done, SymtopError):
+            future.set_exception(done)
+        elif done.cancelled():  # the client has lost its scheduler
+            future.set_exception(SymtopError(self._told("has gone away")))
+        elif error := done.exception():
+            future.set_exception(error)
+        else:
+            future.set_result(done.result())
+
+    def _told(self, what: str) -> str:
+        return f"the cluster at {self._client.scheduler.address} {what}; what was computed is kept"
+
+    def _watch(self) -> None:
+        last, what = time.monotonic(), ""
+        while not self._ended.wait(LOOKS):
+            try:
+                workers = self._client.sync(self._client.scheduler.ncores, callback_timeout=LOOKS)
+                what = "" if workers else "has no workers any more"
+            except Exception:  # noqa: BLE001  (a connection ends in many ways)
+                what = "does not answer any more"
+            if not what:
+                last = time.monotonic()
+            elif time.monotonic() - last > PATIENCE:
+                self._gone = self._told(what)
+                for future in list(self._waiting):
+                    self._settle(future, SymtopError(self._gone))
+                return
 
 
 @contextlib.contextmanager
