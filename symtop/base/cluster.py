@@ -1,12 +1,14 @@
 """A dask cluster as a pool of workers. They need this version of symtop, and the plug-ins that are used."""
 
+import asyncio
 import contextlib
 import gc
+import logging
 import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any
 
 from symtop.base.validate import SymtopError
@@ -21,8 +23,11 @@ def connect(address: str) -> Any:
         import distributed
     except ImportError:
         raise SymtopError("scheduler needs the package distributed: pip install 'symtop[distributed]'") from None
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what it logs of a lost scheduler is told here
     client, failure = None, ""
     try:
+        with ThreadPoolExecutor(1) as apart:  # the caller's thread may run a loop of its own, as in a notebook
+            apart.submit(asyncio.run, _asked(address)).result()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # other versions there; the digest of every case is compared anyway
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
@@ -36,6 +41,17 @@ def connect(address: str) -> Any:
         must = "the address of a dask scheduler that answers and has workers"
         raise SymtopError(f"scheduler must be {must}, not {address!r} ({failure})")
     return client
+
+
+async def _asked(address: str) -> None:
+    """Raise TimeoutError if a scheduler does not answer: a client waits for ever for one that takes the connection."""
+    from distributed import rpc
+
+    async def ask() -> None:
+        async with rpc(address) as scheduler:
+            await scheduler.identity()
+
+    await asyncio.wait_for(ask(), PATIENCE)
 
 
 def leave(client: Any) -> None:

@@ -144,8 +144,11 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     """
     stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))
     runs, delta, off = _apart(method, scene, h, chart, NUDGE, stride)
-    first = runs[0].states[1:, :3]
-    if chart == "angles" or (first != first.astype(np.float32)).any():
+    with np.errstate(over="ignore"):  # of a run that has blown up
+        single = chart != "angles" and bool(
+            (runs[0].states[:, :3].astype(np.float32) == runs[0].states[:, :3])[1:].all()
+        )
+    if not single:
         return _grown(method, delta, stride, off + EPSILON)
     delta = _apart(method, scene, h, chart, SINGLE_NUDGE, stride)[1]
     return _grown(method, delta, stride, float(np.finfo(np.float32).eps))

@@ -148,7 +148,7 @@ def simulate(
     error is expected; the run is the same either way. Give a function to be handed the sentence instead, or False for
     no warning. `budget` is the most steps of a fixed-step run
     (`MOST_STEPS` by default; more are refused) and the most force evaluations, or Taylor steps, of an adaptive one,
-    which then ends `out_of_budget` (by default after one or two minutes).
+    which then ends `out_of_budget` (by default after about half a minute).
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
