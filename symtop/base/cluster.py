@@ -70,8 +70,8 @@ class Watched(Executor):
     """
 
     def __init__(self, client: Any) -> None:
-        self._client, self._inner = client, client.get_executor(pure=False)
-        self._waiting: set[Future[Any]] = set()
+        self._client = client
+        self._waiting: dict[Future[Any], Any] = {}  # and the client's, which cancels what nobody holds
         self._lock, self._ended, self._gone = threading.Lock(), threading.Event(), ""
         threading.Thread(target=self._watch, daemon=True).start()
 
@@ -80,29 +80,34 @@ class Watched(Executor):
         if self._gone:
             raise SymtopError(self._gone)
         future: Future[Any] = Future()
+        inner = self._client.submit(function, *args, pure=False, **kwargs)
         with self._lock:
-            self._waiting.add(future)
-        self._inner.submit(function, *args, **kwargs).add_done_callback(lambda done: self._settle(future, done))
+            self._waiting[future] = inner
+        inner.add_done_callback(lambda done: self._hand_on(future, done))
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002
         """Look no more; the client is its owner's."""
         self._ended.set()
 
-    def _settle(self, future: "Future[Any]", done: "Future[Any] | SymtopError") -> None:
-        """Hand on how a task ended, if nobody has before."""
+    def _hand_on(self, future: "Future[Any]", done: Any) -> None:
+        """How a task ended: as its function did, or lost with the scheduler or on the way from it."""
+        result, error = None, None
+        try:
+            result = done.result()
+        except Exception as raised:  # noqa: BLE001  (a future hands on what its function raised)
+            error = raised if done.status == "error" else SymtopError(self._told("has gone away"))
+        self._settle(future, result, error)
+
+    def _settle(self, future: "Future[Any]", result: Any, error: Exception | None) -> None:
+        """End a future, if nobody has before."""
         with self._lock:
-            if future not in self._waiting:
+            if self._waiting.pop(future, None) is None:
                 return
-            self._waiting.remove(future)
-        if isinstance(done, SymtopError):
-            future.set_exception(done)
-        elif done.cancelled():  # the client has lost its scheduler
-            future.set_exception(SymtopError(self._told("has gone away")))
-        elif error := done.exception():
-            future.set_exception(error)
+        if error is None:
+            future.set_result(result)
         else:
-            future.set_result(done.result())
+            future.set_exception(error)
 
     def _told(self, what: str) -> str:
         return f"the cluster at {self._client.scheduler.address} {what}; what was computed is kept"
@@ -120,7 +125,7 @@ class Watched(Executor):
             elif time.monotonic() - last > PATIENCE:
                 self._gone = self._told(what)
                 for future in list(self._waiting):
-                    self._settle(future, SymtopError(self._gone))
+                    self._settle(future, None, SymtopError(self._gone))
                 return
 
 

@@ -113,7 +113,7 @@ def figure_file(option: str, file: str | None) -> None:
 
 def standing(option: str, file: str | None) -> None:
     """Refuse a file whose folder is not there: a run should not end before its result has a place."""
-    if file is not None and not Path(file).absolute().parent.is_dir():
+    if file is not None and not (file and Path(file).absolute().parent.is_dir()):
         raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
 
 

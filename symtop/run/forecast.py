@@ -37,6 +37,8 @@ POINTS = 300  # of a probe that are compared with the closed form
 ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
 PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
 AFFORDED = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method: 0.2 to 5 ms
+MOST_WORK = {"compiled": 5e6, "python": 5e5}  # evaluations of any probe: 20 nutations take a hundredth; beside a pole
+# the steps of a solver may shrink to nothing, and the probe would take as long as the run
 LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nutation: a few of its steps, milliseconds
 LEAST_GROWTH = 0.05  # of the error of a piece: less growth from the first to the second is luck
 COMMITTED = 1e4, 1e7  # tolerances: an error that an adaptive method commits now and then, and one of variable order
@@ -129,7 +131,9 @@ def _probe(
     if method.fixed_step:
         piece = Plan.steps(step, _marks(max(1, round(duration / step))))
     else:
-        piece = Plan.until(duration * (_places() / POINTS), plan.tolerance)
+        piece = Plan.until(
+            duration * (_places() / POINTS), plan.tolerance, min(plan.most(math.inf), MOST_WORK[method.implementation])
+        )
     run = solve(method, chart, scene.top, start, piece)
     with np.errstate(all="ignore"):
         error = form.axis_distance(since + piece.times, axis_of(chart, np.asarray(run.states)))

@@ -39,6 +39,7 @@ SINGLE_NUDGE = 1e-3  # rad, of a method in single precision: rounding is 1e-4
 BEGUN = 4  # strides before those that are compared: a multistep method has begun by then
 LEFT, LEFT_OUT = 2e-3, 5e-4  # of the difference that the recurrence may leave; of a method that leaves out a term: less
 STRIDE = 0.5  # rad of nutation between two places of a recurrence of `nutation_growth`
+SLOWEST = 1e-6  # growth of a step below which rounding adds up for a million of them
 MOST_STRIDE = {"compiled": 50, "python": 5}  # steps
 TILT = 1e-5  # rad, of the sleeping top
 STEPS = 4
@@ -149,9 +150,9 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
             (runs[0].states[:, :3].astype(np.float32) == runs[0].states[:, :3])[1:].all()
         )
     if not single:
-        return _grown(method, delta, stride, off + EPSILON)
+        return _grown(method, delta, stride, off, EPSILON)
     delta = _apart(method, scene, h, chart, SINGLE_NUDGE, stride)[1]
-    return _grown(method, delta, stride, float(np.finfo(np.float32).eps))
+    return _grown(method, delta, stride, 0.0, float(np.finfo(np.float32).eps))
 
 
 def _apart(
@@ -176,8 +177,11 @@ def _apart(
         return runs, 0.5 * (one - other)[BEGUN * stride :: stride], off
 
 
-def _grown(method: Integrator, delta: np.ndarray, stride: int, size: float) -> Growth:
-    """The growth of a step, from a difference that should obey a recurrence of two terms."""
+def _grown(method: Integrator, delta: np.ndarray, stride: int, off: float, rounding: float) -> Growth:
+    """The growth of a step, from a difference that should obey a recurrence of two terms.
+
+    Rounding comes anew in every step and adds up, as a random walk, until what came first has grown by e.
+    """
     if not np.isfinite(delta).all() or not delta.any():
         return UNKNOWN
     known = np.stack([delta[1:-1], delta[:-2]], axis=1)
@@ -185,7 +189,8 @@ def _grown(method: Integrator, delta: np.ndarray, stride: int, size: float) -> G
     left = np.max(np.abs(known @ np.array([t, minus_d]) - delta[2:])) / np.max(np.abs(delta))
     if not left < (LEFT if method.order else LEFT_OUT):
         return UNKNOWN
-    return Growth(float(np.max(np.abs(np.roots([1.0, -t, -minus_d])))) ** (1.0 / stride), size)
+    factor = float(np.max(np.abs(np.roots([1.0, -t, -minus_d])))) ** (1.0 / stride)
+    return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), SLOWEST)))
 
 
 def sleep_margin(method: Integrator, spin: float, h: float, top: SymmetricTop | None = None) -> float:

@@ -31,11 +31,7 @@ class Stream:
 
     def __init__(self, path: Path, job: Job, labels: dict[str, Any], words: dict[str, Any]) -> None:
         self.path, self.n, self.samples, self.labels, self.words = path, len(job.numbers), job.samples, labels, words
-        try:
-            folder = path.is_dir()
-        except (OSError, ValueError) as error:  # a name that is too long, or holds a null character
-            raise SymtopError(f"cannot write {str(path)[:80]!r}: {error.args[-1]}") from None
-        if folder:
+        if path.is_dir():
             raise SymtopError(f"cannot write {path}: it is a folder")
         self.folder = path.with_name(f"{path.name}.parts")
         identity, told = _identity(job, labels), self.folder / IDENTITY
