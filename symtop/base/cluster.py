@@ -9,6 +9,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from queue import SimpleQueue
 from typing import Any
 
 from symtop.base.validate import SymtopError
@@ -73,7 +74,9 @@ class Watched(Executor):
         self._client = client
         self._waiting: dict[Future[Any], Any] = {}  # and the client's, which cancels what nobody holds
         self._lock, self._ended, self._gone = threading.Lock(), threading.Event(), ""
-        threading.Thread(target=self._watch, daemon=True).start()
+        self._done: SimpleQueue[tuple[Future[Any], Any] | None] = SimpleQueue()
+        for work in (self._watch, self._hand_on):
+            threading.Thread(target=work, daemon=True).start()
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
         """A future of the cluster's."""
@@ -83,21 +86,28 @@ class Watched(Executor):
         inner = self._client.submit(function, *args, pure=False, **kwargs)
         with self._lock:
             self._waiting[future] = inner
-        inner.add_done_callback(lambda done: self._hand_on(future, done))
+        inner.add_done_callback(lambda done: self._done.put((future, done)))
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002
         """Look no more; the client is its owner's."""
         self._ended.set()
+        self._done.put(None)
 
-    def _hand_on(self, future: "Future[Any]", done: Any) -> None:
-        """How a task ended: as its function did, or lost with the scheduler or on the way from it."""
-        result, error = None, None
-        try:
-            result = done.result()
-        except Exception as raised:  # noqa: BLE001  (a future hands on what its function raised)
-            error = raised if done.status == "error" else SymtopError(self._told("has gone away"))
-        self._settle(future, result, error)
+    def _hand_on(self) -> None:
+        """How tasks end: as their functions do, or lost with the scheduler or on the way from it.
+
+        A result that is on its way from a scheduler that has gone is waited for without end, and not by a thread of the
+        client's: those are waited for when the process exits.
+        """
+        while (entry := self._done.get()) is not None:
+            future, done = entry
+            result, error = None, None
+            try:
+                result = done.result()
+            except Exception as raised:  # noqa: BLE001  (a future hands on what its function raised)
+                error = raised if done.status == "error" else SymtopError(self._told("has gone away"))
+            self._settle(future, result, error)
 
     def _settle(self, future: "Future[Any]", result: Any, error: Exception | None) -> None:
         """End a future, if nobody has before."""

@@ -47,7 +47,8 @@ ANY = [
     range(3), object(), Unprintable(), int, len, np.float16(1.0), np.longdouble(1.0), np.int8(3), np.array(1.0),
     np.array([1.0, 2.0]), np.array([]), np.array(["x"]), np.array([None]), np.zeros((2, 3, 4)),
     np.datetime64("2020"),
-    np.ma.masked, decimal.Decimal("1e-30"), decimal.Decimal("NaN"), fractions.Fraction(1, 3), slice(2), NotImplemented, ...,
+    np.ma.masked, decimal.Decimal("1e-30"), decimal.Decimal("NaN"), fractions.Fraction(1, 3), slice(2),
+    NotImplemented, ...,
     xr.Dataset(), xr.DataArray([1.0]), symtop.SymtopError("x"), TOP, START,
 ]  # fmt: skip
 RUN = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.5, samples=11)
