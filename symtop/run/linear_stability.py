@@ -40,6 +40,7 @@ BEGUN = 4  # strides before those that are compared: a multistep method has begu
 LEFT, LEFT_OUT = 2e-3, 5e-4  # of the difference that the recurrence may leave; of a method that leaves out a term: less
 STRIDE = 0.5  # rad of nutation between two places of a recurrence of `nutation_growth`
 SLOWEST = 1e-6  # growth of a step below which rounding adds up for a million of them
+LONG = 120  # strides that a difference is followed which obeys no recurrence of two terms
 MOST_STRIDE = {"compiled": 50, "python": 5}  # steps
 TILT = 1e-5  # rad, of the sleeping top
 STEPS = 4
@@ -140,8 +141,9 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     delta_{k+1} = t delta_k - d delta_{k-1}: what both drift by in a step, `trace` takes for growth (0.6 % in a step of
     1/17 nutation of `commutator-free-4`, which neither grows nor shrinks), and what is even in the distance cancels.
     Beside a pole the difference is that of e_x + i e_y, and t and d are complex. Some steps of a fine h are one of the
-    recurrence, so that it turns by a good part of a radian; `frequency` is that of small nutations. `UNKNOWN` where the
-    difference does not obey it.
+    recurrence, so that it turns by a good part of a radian; `frequency` is that of small nutations. Where the
+    difference does not obey it (a method with more roots than two, say), its size is followed for longer. Rounding
+    comes anew in every step and adds up, as a random walk, until what came first has grown by e.
     """
     stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))
     runs, delta, off = _apart(method, scene, h, chart, NUDGE, stride)
@@ -149,14 +151,23 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
         single = chart != "angles" and bool(
             (runs[0].states[:, :3].astype(np.float32) == runs[0].states[:, :3])[1:].all()
         )
-    if not single:
-        return _grown(method, delta, stride, off, EPSILON)
-    delta = _apart(method, scene, h, chart, SINGLE_NUDGE, stride)[1]
-    return _grown(method, delta, stride, 0.0, float(np.finfo(np.float32).eps))
+    nudge, rounding = (SINGLE_NUDGE, float(np.finfo(np.float32).eps)) if single else (NUDGE, EPSILON)
+    if single:
+        delta, off = _apart(method, scene, h, chart, nudge, stride)[1], 0.0
+    factor = _root(delta, LEFT if method.order else LEFT_OUT)
+    if math.isnan(factor) and method.order:
+        long = np.abs(_apart(method, scene, h, chart, nudge, stride, LONG)[1])
+        third = long.size // 3
+        with np.errstate(all="ignore"):
+            factor = float(np.max(long[-third:]) / np.max(long[:third])) ** (1.0 / (2 * third))
+    if not math.isfinite(factor):
+        return UNKNOWN
+    factor **= 1.0 / stride
+    return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), SLOWEST)))
 
 
 def _apart(
-    method: Integrator, scene: Scene, h: float, chart: str, nudge: float, stride: int
+    method: Integrator, scene: Scene, h: float, chart: str, nudge: float, stride: int, count: int = STEPS
 ) -> tuple[list[Run], np.ndarray, float]:
     """Two runs at a distance of two nudges, half their difference every `stride` steps, how far off their middle is."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
@@ -167,7 +178,7 @@ def _apart(
         pair = [Angles(tilt, phi, psi_dot=spin) for phi in (0.0, math.pi)]
     else:
         pair = [with_momenta(top, min(max(theta + side, nudge), math.pi - nudge), momenta) for side in (nudge, -nudge)]
-    runs = [few_steps(method, chart, top, at, h, (STEPS + BEGUN) * stride) for at in pair]
+    runs = [few_steps(method, chart, top, at, h, (count + BEGUN) * stride) for at in pair]
     with np.errstate(all="ignore"):
         if beside:
             one, other = (axis[:, 0] + 1j * axis[:, 1] for axis in (axis_of(chart, run.states) for run in runs))
@@ -177,20 +188,14 @@ def _apart(
         return runs, 0.5 * (one - other)[BEGUN * stride :: stride], off
 
 
-def _grown(method: Integrator, delta: np.ndarray, stride: int, off: float, rounding: float) -> Growth:
-    """The growth of a step, from a difference that should obey a recurrence of two terms.
-
-    Rounding comes anew in every step and adds up, as a random walk, until what came first has grown by e.
-    """
+def _root(delta: np.ndarray, left_over: float) -> float:
+    """The largest root of the recurrence of two terms that a difference obeys, in size; NaN if it does not."""
     if not np.isfinite(delta).all() or not delta.any():
-        return UNKNOWN
+        return math.nan
     known = np.stack([delta[1:-1], delta[:-2]], axis=1)
     t, minus_d = np.linalg.lstsq(known, delta[2:], rcond=None)[0]
     left = np.max(np.abs(known @ np.array([t, minus_d]) - delta[2:])) / np.max(np.abs(delta))
-    if not left < (LEFT if method.order else LEFT_OUT):
-        return UNKNOWN
-    factor = float(np.max(np.abs(np.roots([1.0, -t, -minus_d])))) ** (1.0 / stride)
-    return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), SLOWEST)))
+    return float(np.max(np.abs(np.roots([1.0, -t, -minus_d])))) if left < left_over else math.nan
 
 
 def sleep_margin(method: Integrator, spin: float, h: float, top: SymmetricTop | None = None) -> float:

@@ -22,6 +22,8 @@ SILENT = [
     *((k, 20_000) for k in (16036, 16754, 17553, 18038, 18170, 18335)),
     (3649, 1),
     (13968, 2),
+    (6006, 4),
+    (6460, 4),
 ]
 FALSE = [74, 511, 780, 990, 1929, 2413, 4178, 5013]  # right runs that were warned of growth that was none
 
@@ -61,7 +63,7 @@ def nutating():
 
 
 def test_growth_is_that_of_linear_theory_for_methods_that_are_not_symmetric():
-    """rk4 damps: |R(i x)|^2 = 1 - x^6/72 + x^8/576. An engine's Euler step grows, though its angle is right."""
+    """rk4 damps: |R(i x)|^2 = 1 - x^6/72 + x^8/576. Of engines of first order some grow and some damp."""
     scene = nutating()
     frequency = landmarks(scene).frequency
     for turn in (0.5, 1.0, 1.5):
@@ -70,8 +72,9 @@ def test_growth_is_that_of_linear_theory_for_methods_that_are_not_symmetric():
         assert found.factor == pytest.approx(expected, rel=5e-3)
     symmetric = nutation_growth(symtop.integrator("strang"), scene, 0.5 / frequency, "axis", frequency)
     assert symmetric.factor == pytest.approx(1.0, abs=1e-5)
-    for name in ("bullet", "physx"):
-        assert nutation_growth(symtop.integrator(name), scene, 0.1 / frequency, "axis", frequency).factor > 1.0 + 1e-4
+    for name, sign in (("physx", 1.0), ("rapier", 1.0), ("yade", -1.0), ("bullet", -1.0)):
+        found = nutation_growth(symtop.integrator(name), scene, 0.1 / frequency, "axis", frequency)
+        assert sign * (found.factor - 1.0) > 1e-3
 
 
 def test_growth_does_not_see_what_two_runs_share():
