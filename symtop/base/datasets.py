@@ -13,6 +13,7 @@ import os
 import platform
 import shutil
 import subprocess
+import sys
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -188,7 +189,7 @@ def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
     with deferred(), replacing(path) as partial:
         try:
             parts = {f"/{name}": _encoding(group) for name, group in groups(data).items()}
-            with _one_thread:
+            with _one_thread, _no_lock_elsewhere():
                 data.to_netcdf(
                     partial, engine="netcdf4", encoding=parts if isinstance(data, xr.DataTree) else parts["/"]
                 )
@@ -196,6 +197,22 @@ def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
             full = shutil.disk_usage(partial.parent).free < LITTLE
             raise OSError(None, f"no room is left in {partial.parent}" if full else str(error)) from error
     return Path(path)
+
+
+@contextlib.contextmanager
+def _no_lock_elsewhere() -> Iterator[None]:
+    """In a worker of dask, xarray asks the scheduler for a lock before it writes, and waits for ever if that is gone.
+
+    The case that the worker computes would be locked as long, and nobody else could compute it. A file that is being
+    written has a name of its own, so that no lock is needed.
+    """
+    if "distributed" not in sys.modules:
+        yield
+        return
+    import dask
+
+    with dask.config.set(scheduler="threads"):
+        yield
 
 
 def alone() -> contextlib.AbstractContextManager[Any]:

@@ -81,6 +81,28 @@ def deferred() -> Iterator[None]:
             signal.raise_signal(heard[0])
 
 
+@contextlib.contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    """Raise TimeoutError in Python code of the main thread that has taken so much processor time, and every second on.
+
+    Compiled code hears it when it returns; elsewhere, and where the system has no such timer, there is no limit.
+    """
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def stop(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+        raise TimeoutError(f"it was not done after {seconds:g} s")
+
+    before = signal.signal(signal.SIGVTALRM, stop)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds, 1.0)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
+
+
 def is_of_user(error: BaseException) -> bool:
     """Is it a request of the user? Without `told_apart` every KeyboardInterrupt counts as one."""
     if isinstance(error, KeyboardInterrupt):

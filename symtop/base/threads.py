@@ -10,6 +10,7 @@ from typing import TypeVar
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
 
+MOST_THREADS = 1024
 AHEAD = 2  # pieces a thread that are begun or done before they are asked for: what is waiting takes memory
 _stop = threading.local()
 

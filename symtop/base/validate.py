@@ -2,8 +2,13 @@
 
 import difflib
 import math
+import os
 import re
 from collections.abc import Iterable
+from pathlib import Path
+
+LONGEST_PART = 255  # bytes of a name in a folder
+SHOWN = 80  # characters of a name that is told
 
 
 class SymtopError(ValueError):
@@ -13,19 +18,31 @@ class SymtopError(ValueError):
     The command line prints it without a traceback and exits with code 2.
     """
 
+    def __init__(self, sentence: object = "") -> None:
+        super().__init__(" ".join(str(sentence).split()))  # some values print in many lines
+
 
 class SymtopWarning(UserWarning):
     """A result that is valid but probably not what its user wants."""
 
 
+def shown(value: object) -> str:
+    """A value in words, whatever it is: its own `repr` may raise anything."""
+    try:
+        return repr(value)
+    except Exception:  # noqa: BLE001
+        return f"a {type(value).__name__} that cannot be printed"
+
+
 def finite(name: str, value: object) -> float:
     """Return `value` as a float; refuse anything that is not one finite real number."""
-    if isinstance(value, (bool, str, bytes, bytearray)):  # float() would read a number in them
-        raise SymtopError(f"{name} must be a finite number, not {value!r}")
+    # float() would read a number in them
+    if isinstance(value, (bool, str, bytes, bytearray)) or type(value).__name__ == "MaskedConstant":
+        raise SymtopError(f"{name} must be a finite number, not {shown(value)}")
     try:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise SymtopError(f"{name} must be a finite number, not {value!r}") from None
+        raise SymtopError(f"{name} must be a finite number, not {shown(value)}") from None
     if not math.isfinite(number):
         raise SymtopError(f"{name} must be a finite number, not {number!r}")
     return number
@@ -39,26 +56,52 @@ def positive(name: str, value: object) -> float:
     return number
 
 
-def whole(name: str, value: object, least: int) -> int:
-    """Return `value` as an int; refuse anything that is not a whole number of at least `least`."""
+def whole(name: str, value: object, least: int, most: float = math.inf) -> int:
+    """Return `value` as an int; refuse anything that is not a whole number from `least` to `most`."""
     number = finite(name, value)
     if number != int(number) or number < least:
-        raise SymtopError(f"{name} must be a whole number of at least {least}, not {value!r}")
+        raise SymtopError(f"{name} must be a whole number of at least {least}, not {shown(value)}")
+    if number > most:
+        raise SymtopError(f"{name} must be at most {most:g}, not {shown(value)}")
     return int(number)
+
+
+def truth(name: str, value: object) -> bool:
+    """Return `value` if it is True or False, also NumPy's."""
+    if type(value).__name__ in ("bool", "bool_"):
+        return bool(value)
+    raise SymtopError(f"{name} must be True or False, not {shown(value)}")
+
+
+def place(name: str, value: object) -> Path:
+    """Return a file's name as a path; refuse what can name none. Nothing is looked for on the disk."""
+    if isinstance(value, (str, os.PathLike)):
+        path = Path(value)
+        if (
+            path.name
+            and "\0" not in str(path)
+            and all(len(part.encode(errors="replace")) <= LONGEST_PART for part in path.parts)
+        ):
+            return path
+    raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}")
 
 
 def row(name: str, values: object) -> list[float]:
     """Return `values` as a list of finite floats; refuse anything that is not a row of them."""
-    if isinstance(values, (str, bytes, dict)) or not isinstance(values, Iterable):
-        raise SymtopError(f"{name} must be a row of numbers, not {values!r}")
-    return [finite(f"an entry of {name}", value) for value in values]
+    try:
+        entries = None if isinstance(values, (str, bytes, dict)) else list(values)  # type: ignore[call-overload]
+    except TypeError:  # nothing to go through, such as an array without dimensions
+        entries = None
+    if entries is None:
+        raise SymtopError(f"{name} must be a row of numbers, not {shown(values)}")
+    return [finite(f"an entry of {name}", value) for value in entries]
 
 
 def label(name: str, value: object) -> str:
     """Return `value` if it can name a scene or an integrator in a file, a table and a command."""
     if isinstance(value, str) and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}", value):
         return value
-    raise SymtopError(f"{name} must be 1 to 64 letters, digits or ._+- (a letter or digit first), not {value!r}")
+    raise SymtopError(f"{name} must be 1 to 64 letters, digits or ._+- (a letter or digit first), not {shown(value)}")
 
 
 def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
@@ -66,8 +109,8 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     known = list(allowed)
     if isinstance(value, str) and value in known:
         return value
-    near = difflib.get_close_matches(str(value), known, n=3, cutoff=0.5)
+    near = difflib.get_close_matches(value, known, n=3, cutoff=0.5) if isinstance(value, str) else []
     hint = (
         f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known[:12])}{' ...' * (len(known) > 12)}"
     )
-    raise SymtopError(f"{name} {value!r} is unknown; {hint}")
+    raise SymtopError(f"{name} {shown(value)} is unknown; {hint}")

@@ -1,5 +1,6 @@
 """What the commands share: options, plug-ins, files to write, errors without a traceback, text that fits."""
 
+import errno
 import re
 import shutil
 import sys
@@ -14,6 +15,7 @@ from symtop.base import cache
 from symtop.base.signals import told_apart
 from symtop.base.validate import SymtopError
 
+LONGEST_NAME = 80  # characters of a file that are told
 FIGURES = (".png", ".svg", ".pdf")
 
 
@@ -37,7 +39,10 @@ results_option = click.option(
 
 
 class Group(click.Group):
-    """Prints a SymtopError as one sentence and exits with code 2; arguments are named as the options are."""
+    """Prints a SymtopError, or a file that cannot be used, as one sentence and exits with code 2.
+
+    Arguments are named as the options are.
+    """
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
@@ -46,6 +51,12 @@ class Group(click.Group):
                 return super().invoke(ctx)
         except SymtopError as error:
             warn(self._spoken(str(error)))
+            ctx.exit(2)
+        except OSError as error:
+            if error.errno == errno.EPIPE or error.filename is None:  # a reader that has left is click's
+                raise
+            name = str(error.filename)
+            warn(f"cannot use {name[:LONGEST_NAME]}{'...' if name[LONGEST_NAME:] else ''}: {error.strerror}")
             ctx.exit(2)
 
     def _spoken(self, sentence: str) -> str:
@@ -102,7 +113,7 @@ def figure_file(option: str, file: str | None) -> None:
 
 def standing(option: str, file: str | None) -> None:
     """Refuse a file whose folder is not there: a run should not end before its result has a place."""
-    if file is not None and not Path(file).absolute().parent.is_dir():
+    if file is not None and not (file and Path(file).absolute().parent.is_dir()):
         raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
 
 

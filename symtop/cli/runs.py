@@ -112,6 +112,7 @@ def long(
     from symtop.run.long_run import PER_NUTATION, long_run
 
     standing("--output", output)
+    standing("--checkpoint", checkpoint)
     h = scenes.scene(scene).nutation_period / PER_NUTATION if step_size is None else step_size
     count = whole("steps", steps, 1)
     try:

@@ -5,11 +5,13 @@ returns but a `Run` that fits its plan. A run whose states are not finite and th
 cease to be.
 """
 
+import contextlib
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
+from symtop.base.signals import at_most
 from symtop.base.strangers import door
 from symtop.base.validate import SymtopError
 from symtop.methods.outcomes import OUTCOMES
@@ -18,6 +20,7 @@ from symtop.methods.registry import Integrator
 from symtop.model.charts import DIMENSIONS
 from symtop.model.top import Angles, SymmetricTop, flat
 
+PATIENCE = 10.0  # seconds of processor time for the few steps backwards that probes of reversibility ask for
 OWN = "symtop.methods."  # solvers of these modules spoil nothing, and are given no copies
 COUNTS = ("steps", "force_evaluations", "newton_iterations", "reached")
 
@@ -32,7 +35,10 @@ def solve(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan
     with door(f"integrator {method.name}{context}"):
         own = getattr(solver, "__module__", "").startswith(OWN)
         given = plan if own else plan._replace(times=plan.times.copy(), marks=plan.marks.copy())
-        with np.errstate(all="ignore"):
+        backwards = (
+            not own and plan.step_size < 0.0
+        )  # a loop up to the horizon that counts on a step forwards never ends
+        with np.errstate(all="ignore"), at_most(PATIENCE) if backwards else contextlib.nullcontext():
             run = solver(top, start, given)
         if not own:
             _restore(method, top, start, before)

@@ -28,7 +28,7 @@ from symtop.methods.runge_kutta import later_stages, plus, store, weighted
 from symtop.model.top import Angles, SymmetricTop
 
 BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
-EVALUATIONS = 2_000_000_000  # a run's limit: about two minutes
+EVALUATIONS = 1_000_000_000  # a run's limit: about half a minute
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 

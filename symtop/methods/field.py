@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from symtop.base.compiled import compile_kernel, register_jitable
-from symtop.base.validate import one_of
+from symtop.base.validate import SymtopError, one_of
 from symtop.methods.angles import BareTop
 from symtop.methods.euler_lagrange import field_angles
 from symtop.methods.formulations import FORMULATIONS
@@ -94,6 +94,8 @@ def field(chart: str, top: SymmetricTop, *, compiled: bool = False) -> Field:
     ``f.state(start)`` is an `Angles` as y. With `compiled` each call runs compiled code (y must be an array of floats);
     ``f.kernel(*f.parameters, y)`` can be called from functions that numba compiles.
 
-    Raises SymtopError for a chart that is none of the three.
+    Raises SymtopError for a chart that is none of the three, and for a top that is none.
     """
+    if not isinstance(top, SymmetricTop):
+        raise SymtopError(f"top must be a SymmetricTop, not {type(top).__name__}")
     return Field(one_of("chart", chart, CHARTS), top, compiled=compiled)

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from symtop.base.signals import is_of_user
 from symtop.base.strangers import words_of
-from symtop.base.validate import SymtopError, SymtopWarning, finite, label, one_of, positive, whole
+from symtop.base.validate import SymtopError, SymtopWarning, finite, label, one_of, positive, shown, whole
 from symtop.base.walk import by_name
 from symtop.methods.about import paragraphs
 from symtop.methods.plan import Plan, Run
@@ -120,13 +120,15 @@ class Integrator:
             whole("order", self.order, 1)
         one_of("family", self.family, FAMILIES)
         one_of("implementation", self.implementation, IMPLEMENTATIONS)
-        if self.control not in CONTROLS:
-            raise SymtopError(f"control must be 'step_size', 'tolerance' or None, not {self.control!r}")
+        if not isinstance(self.control, str | None) or self.control not in CONTROLS:
+            raise SymtopError(f"control must be 'step_size', 'tolerance' or None, not {shown(self.control)}")
         if self.energy_error not in ENERGY_ERRORS:
             raise SymtopError(f"energy_error must be 'kept', 'bounded' or None, not {self.energy_error!r}")
         given = self.solvers if isinstance(self.solvers, Mapping) else {}
         if not given or not set(given) <= {"angles", "axis", "attitude"} or not all(map(callable, given.values())):
-            raise SymtopError(f"solvers must map one of angles, axis, attitude to a function, not {self.solvers!r}")
+            raise SymtopError(
+                f"solvers must map one of angles, axis, attitude to a function, not {shown(self.solvers)}"
+            )
         object.__setattr__(self, "solvers", MappingProxyType(dict(self.solvers)))
         positive("speed", self.speed)
         if self.exact_steps and (self.order is not None or not self.fixed_step):

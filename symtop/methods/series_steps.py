@@ -29,7 +29,7 @@ from symtop.model.top import Angles, SymmetricTop, flat
 
 ORDERS = (8, 12, 16, 20)
 BLOCK = 1_000_000  # series between returns to Python
-SERIES = 2_000_000_000  # of one run: about two minutes
+SERIES = 200_000_000  # of one run: about half a minute
 ACCEPTED, SAFETY, GROW, EARLIER = 4.0, 0.95, 4.0, 0.25
 
 

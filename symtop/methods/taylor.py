@@ -32,7 +32,7 @@ from symtop.model.view import space_momenta
 
 START_DIGITS = 60  # of the multiprecision that a start is converted in
 EPSILON = float(np.finfo(np.float64).eps)
-MOST_STEPS = {"double": 30_000_000, "longdouble": 5_000_000, "quad": 100_000}  # of one run: about two minutes
+MOST_STEPS = {"double": 30_000_000, "longdouble": 5_000_000, "quad": 100_000}  # of one run: 10 to 25 s
 
 
 def equations(chart: str) -> list[Any]:

@@ -103,6 +103,9 @@ class ClosedForm:
     """
 
     def __init__(self, top: SymmetricTop, start: Angles) -> None:
+        if not isinstance(top, SymmetricTop) or not isinstance(start, Angles):
+            kinds = f"{type(top).__name__} and {type(start).__name__}"
+            raise SymtopError(f"top and start must be a SymmetricTop and Angles, not {kinds}")
         self.top, self.start = top, start
         self._all, failed = short_constants(np.array((flat(top, start),)))
         self._constants = self._all[0]

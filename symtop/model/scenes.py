@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from symtop.base.numbers import EPSILON, TINY
-from symtop.base.validate import SymtopError, finite, label, one_of, positive
+from symtop.base.validate import SymtopError, finite, label, one_of, positive, shown
 from symtop.base.walk import by_name
 from symtop.model.top import Angles, SymmetricTop
 
@@ -55,9 +55,9 @@ class Scene:
     def __post_init__(self) -> None:
         label("name", self.name)
         if not isinstance(self.top, SymmetricTop):
-            raise SymtopError(f"top must be a SymmetricTop, not {self.top!r}")
+            raise SymtopError(f"top must be a SymmetricTop, not {shown(self.top)}")
         if not isinstance(self.start, Angles):
-            raise SymtopError(f"start must be Angles, not {self.start!r}")
+            raise SymtopError(f"start must be Angles, not {shown(self.start)}")
         object.__setattr__(self, "horizon", horizon_of(self.horizon))
         one_of("observes", self.observes, OBSERVABLES)
         one_of("units", self.units, UNITS)
@@ -262,7 +262,7 @@ _added: dict[str, Scene] = {}
 def register_scene(entry: Scene) -> Scene:
     """Add a scene to the catalogue, so that studies and commands know it by name."""
     if not isinstance(entry, Scene):
-        raise SymtopError(f"register_scene needs a Scene, not {entry!r}")
+        raise SymtopError(f"register_scene needs a Scene, not {shown(entry)}")
     if entry.name in _catalogue() or _added.get(entry.name, entry) != entry:
         raise SymtopError(f"scene {entry.name!r} is already known; choose another name")
     _added[entry.name] = entry

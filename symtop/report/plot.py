@@ -37,6 +37,8 @@ def plot(
     """
     if not isinstance(data, xr.Dataset):
         raise SymtopError(f"data must be a dataset of simulate, sweep or ensemble, not {type(data).__name__}")
+    if not isinstance(quantity, str):
+        raise SymtopError(f"quantity must be the name of one, not {type(quantity).__name__}")
     drawn = _ensemble if "member" in data.dims else _sweep if "setting" in data.dims else _over_time
     if ax is None:
         ax = plt.subplots(figsize=(7.2, 4.4), layout="constrained")[1]

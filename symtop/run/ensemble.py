@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from symtop.base import cluster, datasets
-from symtop.base.threads import cores, in_order, in_threads
-from symtop.base.validate import SymtopError, positive, whole
+from symtop.base.threads import MOST_THREADS, cores, in_order, in_threads
+from symtop.base.validate import SymtopError, place, positive, truth, whole
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, horizon_of
@@ -24,7 +24,7 @@ from symtop.run.columns import as_dataset
 from symtop.run.members import Members, for_each, read_members
 from symtop.run.pieces import SHOWN, Job
 from symtop.run.schedule import nutation_periods
-from symtop.run.simulation import MOST_STEPS, MOST_SWINGS, chart_of
+from symtop.run.simulation import MOST_SAMPLES, MOST_STEPS, MOST_SWINGS, chart_of
 from symtop.run.streamed import Stream
 
 Array = NDArray[np.float64]
@@ -71,7 +71,8 @@ def ensemble(
     Raises SymtopError for arguments that make no sense, and for members that are no top or no start, by number.
     """
     read, method = read_members(members), find_integrator(integrator)
-    count, workers = whole("samples", samples, 2), cores() if threads is None else whole("threads", threads, 1)
+    count, silent = whole("samples", samples, 2, MOST_SAMPLES), truth("quiet", quiet)
+    workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
     chart = chart_of(method, read.observes, observe)
     shown = _shown(variables, chart)
     if path is None:
@@ -84,12 +85,12 @@ def ensemble(
         "title": f"{method.name} on {n} tops", "units": read.units, "integrator": method.name, "chart": chart,
         "implementation": method.implementation, "execution": job.execution,
     }  # fmt: skip
-    stream = None if path is None else Stream(Path(path), job, read.labels, words)
+    stream = None if path is None else Stream(place("path", path), job, read.labels, words)
     rest = pieces if stream is None else stream.missing(pieces)
     columns = dict[str, Any]()
     done = sum(piece.stop - piece.start for piece in pieces) - sum(piece.stop - piece.start for piece in rest)
     with (
-        tqdm(total=n, initial=done, desc=words["title"], unit="top", disable=quiet or None, leave=False) as bar,
+        tqdm(total=n, initial=done, desc=words["title"], unit="top", disable=silent or None, leave=False) as bar,
         contextlib.closing(_computed(job, rest, workers, scheduler)) as parts,
     ):
         for piece, part in zip(rest, parts, strict=True):
@@ -111,8 +112,8 @@ def _computed(
     if scheduler is None:
         yield from in_threads(Job.columns, parts, threads)
     else:
-        with cluster.connected(scheduler) as client:
-            yield from in_order(client.get_executor(pure=False), Job.columns, parts, cluster.width(client))
+        with cluster.connected(scheduler) as client, cluster.Watched(client) as pool:
+            yield from in_order(pool, Job.columns, parts, cluster.width(client))
 
 
 def _fill(columns: dict[str, Any], part: dict[str, Any], piece: slice, n: int) -> None:

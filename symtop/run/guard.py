@@ -19,17 +19,21 @@ and `simulate` dithers samples that would fall on the same phases.
 
 import math
 
+from symtop.base.numbers import EPSILON
 from symtop.methods.outcomes import sentence
 from symtop.methods.plan import Plan
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.forecast import Forecast, Landmarks, forecast, landmarks
-from symtop.run.linear_stability import trace
+from symtop.run.linear_stability import Growth, nutation_growth, trace
 
 EXPECTED = 1e-2  # rad; a larger forecast is worth a warning: the axis error from which a verdict calls a run wrong
 AIM = 1e-3  # rad, what a remedy aims at
 SMALL_TURN = 0.3  # h omega below which no method loses small nutations
 GROWS = 1e-3  # a step that multiplies small nutations by more than 1 + GROWS loses them
+NO_GROWTH = 3e-8  # rounding of the growth of a step
+NONLINEAR = 0.03  # of the nutation that a method adds of its own may pass for growth: 8e-6 at 4e-4 rad
+MOST_FOLDS = 100.0  # e times that a nutation grows: any is too much
 NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a resonance
 COARSE = 1.0  # rad of precession in a step
 
@@ -39,22 +43,46 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan) -> str:
     if method.control is None:
         return ""
     expected, marks = forecast(scene, method, chart, plan), landmarks(scene)
-    reason = _unstable(scene, method, chart, plan, marks) or _cause(scene, method, chart, plan, marks, expected)
+    reason = _unstable(scene, method, chart, plan, marks, expected) or _cause(
+        scene, method, chart, plan, marks, expected
+    )
     return f"{method.name} on {scene.name}: {reason}" if reason else ""
 
 
-def _unstable(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks) -> str:
-    step = plan.step_size
-    if not step * marks.frequency > SMALL_TURN or not trace(method, scene, step, chart).growth > 1.0 + GROWS:
+def _growth(scene: Scene, method: Integrator, chart: str, step: float, frequency: float) -> Growth:
+    """What a step does to small nutations; a symmetric method neither adds to them nor makes fine steps unstable."""
+    if not method.symmetric:
+        return nutation_growth(method, scene, step, chart, frequency)
+    return Growth(trace(method, scene, step, chart).growth if step * frequency > SMALL_TURN else 1.0, EPSILON)
+
+
+def _unstable(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks, expected: Forecast) -> str:
+    """Small nutations that grow until they are seen, and what to do; empty if they do not, or a probe has shown it."""
+    step, frequency = plan.step_size, marks.frequency
+    seen = expected.whole and expected.outcome == "ok" and expected.axis_error <= EXPECTED
+    if method.adaptive or seen:
         return ""
-    good, bad = SMALL_TURN / marks.frequency, step
-    while bad - good > 1e-3 * bad:
-        middle = 0.5 * (good + bad)
-        stable = trace(method, scene, middle, chart).growth <= 1.0 + GROWS
-        good, bad = (middle, bad) if stable else (good, middle)
+    growth, steps = _growth(scene, method, chart, step, frequency), plan.horizon / step
+    size, folds = marks.width + growth.size, steps * math.log(max(growth.factor, 1.0))
+    if (
+        not growth.factor > 1.0 + max(NO_GROWTH, NONLINEAR * growth.size)
+        or not size * math.expm1(min(folds, MOST_FOLDS)) > EXPECTED
+    ):
+        return ""
+    good, bad = SMALL_TURN / frequency, step
+    if growth.factor > 1.0 + GROWS and good < bad:
+        while bad - good > 1e-3 * bad:
+            middle = 0.5 * (good + bad)
+            stable = _growth(scene, method, chart, middle, frequency).factor <= 1.0 + GROWS
+            good, bad = (middle, bad) if stable else (good, middle)
+        return (
+            f"small nutations (frequency {frequency:.4g}) grow at a step of {step:.4g}, the method is stable up to "
+            f"{good:.4g} (h omega = {good * frequency:.3f}); take a step below {0.5 * good:.2g}"
+        )
+    finer = step * math.pow(math.log1p(AIM / size) / folds, 1.0 / (method.order or 1))
     return (
-        f"small nutations (frequency {marks.frequency:.4g}) grow at a step of {step:.4g}, the method is stable up to "
-        f"{good:.4g} (h omega = {good * marks.frequency:.3f}); take a step below {0.5 * good:.2g}"
+        f"small nutations (frequency {frequency:.4g}) of {size:.1g} rad grow by {growth.factor - 1.0:.1g} of "
+        f"themselves in each of {steps:.3g} steps; take a step of about {finer:.2g}"
     )
 
 

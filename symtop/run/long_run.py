@@ -28,7 +28,7 @@ from symtop.base.compiled import code_of
 from symtop.base.fingerprint import digest, file_reasons, hashed
 from symtop.base.numbers import GOLDEN
 from symtop.base.signals import ending_on_sigterm
-from symtop.base.validate import SymtopError, SymtopWarning, positive, whole
+from symtop.base.validate import SymtopError, SymtopWarning, place, positive, whole
 from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.loop import Loop, Position
 from symtop.methods.outcomes import OK, OUTCOMES, sentence
@@ -211,7 +211,7 @@ class _Book:
     def __init__(self, file: "str | Path | bool", identity: str) -> None:
         own = cache_root() / "runs" / f"{identity}.nc"
         self.own = file is True
-        self.file = own if file is True else Path(file) if file else None
+        self.file = own if file is True else None if file is False else place("checkpoint", file)
         self.identity = identity
         self.saved = time.monotonic()
         self.latest: tuple[Position, list[list[float]]] | None = None

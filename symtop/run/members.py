@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.base.validate import SymtopError, positive
+from symtop.base.validate import SymtopError, positive, shown
 from symtop.model.closed_forms import NUMBERS, checked
 from symtop.model.scenes import OBSERVABLES, Scene, scene
 from symtop.model.top import flat
@@ -36,8 +36,11 @@ def read_members(given: "xr.Dataset | Iterable[str | Scene]") -> Members:
     if isinstance(given, xr.Dataset):
         return _from_dataset(given)
     if isinstance(given, (str, bytes, Scene)) or not isinstance(given, Iterable):
-        raise SymtopError(f"members must be a dataset or a list of scenes, not {given!r}")
-    chosen = [scene(entry) for entry in given]
+        raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(given)}")
+    try:
+        chosen = [scene(entry) for entry in given]
+    except TypeError:  # an array without dimensions
+        raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(given)}") from None
     if not chosen:
         raise SymtopError("members must be at least one")
     names = np.array([entry.name for entry in chosen])

@@ -39,6 +39,8 @@ from numpy.typing import NDArray
 from symtop.base import datasets
 from symtop.base.validate import one_of, whole
 
+MOST = 1e9  # members
+
 Array = NDArray[np.float64]
 
 DRAWS = 16  # uniform numbers a member: a new quantity must not move those that are there
@@ -220,7 +222,7 @@ def population(n: int, *, seed: int = 0, kind: str = "all") -> xr.Dataset:
 
     Raises SymtopError for arguments that make no sense.
     """
-    count = whole("n", n, 1)
+    count = whole("n", n, 1, MOST)
     chosen, start = one_of("kind", kind, KINDS), whole("seed", seed, 0)
     generator = np.random.Philox(start)
     columns: dict[str, Any] = {name: np.empty(count) for name in NUMBERS}

@@ -17,7 +17,7 @@ import xarray as xr
 from symtop.base import datasets
 from symtop.base.numbers import GOLDEN
 from symtop.base.over_time import over_time
-from symtop.base.validate import SymtopError, SymtopWarning, one_of, positive, whole
+from symtop.base.validate import SymtopError, SymtopWarning, one_of, positive, shown, whole
 from symtop.methods.calling import solve
 from symtop.methods.outcomes import sentence
 from symtop.methods.plan import Plan, Run
@@ -101,7 +101,7 @@ def make_plan(
     period = scene.nutation_period
     if method.fixed_step:
         if tolerance is not None:
-            raise SymtopError(f"{method.name} has a fixed step: give step_size, not tolerance = {tolerance!r}")
+            raise SymtopError(f"{method.name} has a fixed step: give step_size, not tolerance = {shown(tolerance)}")
         if step_size is None:
             proposal = likely_step(scene, method, horizon, USUAL)
             raise SymtopError(f"{method.name} has a fixed step and needs step_size, for example {proposal:.1g}")
@@ -117,9 +117,9 @@ def make_plan(
         _, marks, dithered = sample_times(horizon, samples, period, steps)
         return Plan.steps(horizon / steps, marks, horizon), dithered
     if step_size is not None:
-        raise SymtopError(f"{method.name} chooses its own steps: give tolerance, not step_size = {step_size!r}")
+        raise SymtopError(f"{method.name} chooses its own steps: give tolerance, not step_size = {shown(step_size)}")
     if not method.adaptive and tolerance is not None:
-        raise SymtopError(f"{method.name} has nothing to tune: leave tolerance out, not {tolerance!r}")
+        raise SymtopError(f"{method.name} has nothing to tune: leave tolerance out, not {shown(tolerance)}")
     bound = method.check_tolerance(tolerance) if method.adaptive else math.nan
     swings = horizon * max(1.0 / period, math.sqrt(abs(scene.top.mgl) / scene.top.I1) / (2.0 * math.pi))
     if method.adaptive and swings > MOST_SWINGS:
@@ -148,15 +148,13 @@ def simulate(
     error is expected; the run is the same either way. Give a function to be handed the sentence instead, or False for
     no warning. `budget` is the most steps of a fixed-step run
     (`MOST_STEPS` by default; more are refused) and the most force evaluations, or Taylor steps, of an adaptive one,
-    which then ends `out_of_budget` (by default after one or two minutes).
+    which then ends `out_of_budget` (by default after about half a minute).
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
     chosen, method = _scene(scene), _integrator(integrator)
     end = chosen.horizon if horizon is None else horizon_of(horizon)
-    count = whole("samples", samples, 2)
-    if count > MOST_SAMPLES:
-        raise SymtopError(f"samples must be at most {MOST_SAMPLES}, not {count}")
+    count = whole("samples", samples, 2, MOST_SAMPLES)
     chart = chart_of(method, chosen.observes, observe)
     limit = None if budget is None else positive("budget", budget)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, horizon=end, samples=count, budget=limit)

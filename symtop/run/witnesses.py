@@ -58,10 +58,14 @@ def integrate(scene: Scene, times: charts.Array, precision: str, chart: str = "a
     return flight.states, flight.steps
 
 
+MOST_NUTATIONS = 1e4  # that the discrete map is iterated over
+
+
 def iterated(scene: Scene, times: charts.Array, per_nutation: float = MAP_STEPS[0]) -> tuple[Any, int]:
     """Attitudes (w, x, y, z) of the discrete map at times above zero, each a whole number of steps; and all steps."""
     solve = integrator("exact-discrete").solvers["attitude"]
     nutation, attitudes, made = min(scene.nutation_period, scene.horizon), [], 0
+    nutation = max(nutation, float(np.max(times)) / MOST_NUTATIONS)  # of a horizon that is no part of a nutation
     for t in map(float, times):
         steps = math.ceil(t / nutation * per_nutation)
         attitudes.append(solve(scene.top, scene.start, Plan.steps(t / steps, [steps])).states[0, :4])

@@ -8,7 +8,7 @@ its process can be told from the others.
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from pathlib import Path
 
 from symtop.base.validate import SymtopError
@@ -131,8 +131,6 @@ def _result(future: "Future[Result]", task: Task, workers: Workers) -> Result:
         return future.result()
     except (SymtopError, BrokenExecutor):
         raise
-    except CancelledError as error:
-        raise SymtopError(f"the cluster at {workers.scheduler} has gone away") from error
     except Exception as error:
         if not workers.scheduler:
             raise

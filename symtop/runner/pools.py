@@ -41,7 +41,7 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         self._pools: dict[int, Executor] = {HERE: InProcess()}
         if scheduler:
             self._client = cluster.connect(scheduler)
-            self._pools[CLUSTER] = self._client.get_executor(pure=False)
+            self._pools[CLUSTER] = cluster.Watched(self._client)
 
     def pool(self, size: int) -> Executor:
         """The executor of so many processes, of HERE or of the CLUSTER."""
@@ -65,6 +65,8 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         pool = self._pools.pop(size, None)
         if isinstance(pool, ProcessPoolExecutor):
             _kill(pool)
+        elif pool is not None:
+            pool.shutdown()
 
     def close(self) -> None:
         """End all processes at once, with what they are computing, for good; what was computed is on disk.

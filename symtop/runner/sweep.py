@@ -17,8 +17,8 @@ import xarray as xr
 from tqdm import tqdm
 
 from symtop.base import datasets, fingerprint
-from symtop.base.threads import cores, in_threads
-from symtop.base.validate import SymtopError, positive, whole
+from symtop.base.threads import MOST_THREADS, cores, in_threads
+from symtop.base.validate import SymtopError, place, positive, row, truth, whole
 from symtop.base.walk import Walk
 from symtop.measure.accuracy import as_table, enough_samples, error_row
 from symtop.measure.errors import QUANTITIES
@@ -71,17 +71,18 @@ def sweep(
     """
     chosen = [find_scene(one) for one in _listed(scenes)]
     methods = [find_integrator(one) for one in _listed(integrators)]
-    workers = cores() if threads is None else whole("threads", threads, 1)
+    silent = truth("quiet", quiet)
+    workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
     for words, names in (("scenes", [one.name for one in chosen]), ("integrators", [one.name for one in methods])):
         if not names or len(set(names)) < len(names):
             raise SymtopError(f"{words} must be one or more, each once, not {names!r}")
     given = {
-        name: [positive(name, value) for value in np.ravel(np.asarray(values, dtype=object)).tolist()]
+        name: _settings(name, values)
         for name, values in (("step_size", step_size), ("per_nutation", per_nutation), ("tolerance", tolerance))
         if values is not None
     }
     asked = [_cell(one, method, given, horizon, observe) for one in chosen for method in methods]
-    file = None if path is None else Path(path)
+    file = None if path is None else place("path", path)
     done = {} if file is None else _stored(file)
     rest = [cell for cell in asked if cell.made_of not in done]
 
@@ -95,7 +96,7 @@ def sweep(
 
     kept = time.monotonic()
     with tqdm(
-        total=len(asked), initial=len(asked) - len(rest), desc="sweep", disable=quiet or None, leave=False
+        total=len(asked), initial=len(asked) - len(rest), desc="sweep", disable=silent or None, leave=False
     ) as bar:
         try:
             for cell, table in zip(rest, in_threads(_table, rest, workers), strict=True):
@@ -118,7 +119,21 @@ def _listed(things: Any) -> list[Any]:
     """One thing, or several, as a list."""
     if isinstance(things, (str, Scene, Integrator)) or not isinstance(things, Iterable):
         return [things]
-    return list(things)
+    try:
+        return list(things)
+    except TypeError:  # an array without dimensions
+        return [things]
+
+
+def _settings(name: str, values: object) -> list[float]:
+    """One setting, or several."""
+    if isinstance(values, np.ndarray):
+        values = values.ravel()
+    one = isinstance(values, (str, bytes)) or not isinstance(values, Iterable)
+    settings = [positive(name, value) for value in ([values] if one else row(name, values))]
+    if not settings:
+        raise SymtopError(f"{name} must be one or more numbers, not none")
+    return settings
 
 
 def _rows(cells: list[_Cell], width: int) -> Iterator[list[_Cell]]:

@@ -121,6 +121,14 @@ def signals_itself(top, start, plan):
     return midpoint(top, start, plan)
 
 
+def forwards_only(top, start, plan):
+    """Adds up the size of its step until the horizon, which a step backwards never reaches."""
+    t = 0.0
+    while t != plan.horizon and (t < plan.horizon or plan.step_size < 0.0):
+        t += abs(plan.step_size)
+    return midpoint(top, start, plan)
+
+
 REFUSED = {
     "returns-none": returning(None),
     "returns-list": returning([1.0, 2.0]),
@@ -198,5 +206,11 @@ BROKEN = {
     "reached-nan": changed(outcome=lambda _: "not_finite", reached=lambda _: np.nan),
 }  # each is a run that failed, exit code 3
 
-for name, solve in {**REFUSED, **TOLERATED, **BROKEN, "signals-itself": signals_itself}.items():
+for name, solve in {
+    **REFUSED,
+    **TOLERATED,
+    **BROKEN,
+    "signals-itself": signals_itself,
+    "forwards-only": forwards_only,
+}.items():
     symtop.register(symtop.Integrator(name, "other", "misbehaves", {"angles": solve}, implementation="python"))

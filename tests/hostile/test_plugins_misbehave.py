@@ -91,6 +91,15 @@ def test_an_interrupt_of_the_user_is_not_that_of_a_plugin(misbehaving):
             solve(symtop.integrator(name), "angles", scene.top, scene.start, plan)
 
 
+def test_a_solver_that_expects_steps_forwards_is_ended(misbehaving, monkeypatch):
+    """Probes of reversibility ask for a step backwards: `claims` waited for ever for a loop up to the horizon."""
+    monkeypatch.setattr("symtop.methods.calling.PATIENCE", 0.2)
+    scene, method = symtop.scene("spheroid"), symtop.integrator("forwards-only")
+    assert solve(method, "angles", scene.top, scene.start, Plan.steps(0.01, [1])).outcome == "ok"
+    with pytest.raises(symtop.SymtopError, match=r"forwards-only failed: TimeoutError: it was not done after 0\.2 s"):
+        solve(method, "angles", scene.top, scene.start, Plan.steps(-0.01, [1]))
+
+
 @pytest.mark.slow
 def test_in_processes_of_their_own():
     for name, code in (("raises-system-exit", 2), ("raises-interrupt", 2), ("raises-base", 2), ("signals-itself", 1)):

@@ -104,7 +104,7 @@ def test_a_bad_run_is_the_same_run_with_a_warning():
 @pytest.mark.parametrize(("law", "straight"), [(lambda t: 3e-6 * t, True), (lambda t: 1e-6 * t + 4e-7 * t * t, False)])
 def test_errors_are_grown_by_their_law(law, straight):
     times = np.linspace(0.0, 10.0, 401)[1:]
-    probe = Probe(times, law(times), "ok", 10.0)
+    probe = Probe(times, law(times), "ok", 10.0, 0)
     assert grown(probe, 1000.0, straight=straight) == pytest.approx(law(1000.0), rel=0.03)
     assert grown(probe, 10.0, straight=straight) == law(10.0)
     if not straight:  # the wrong law would be silent
@@ -139,10 +139,10 @@ def test_the_limits_of_verlet_and_rk4_are_found():
     scene = steady(20.0)
     frequency = landmarks(scene).frequency
     for name, limit in (("stormer-verlet", 2.0), ("rk4", 2.0 * math.sqrt(2.0))):
-        warned = said(scene, name, step_size=1.02 * limit / frequency, observe="nutation")
+        warned = said(scene, name, step_size=1.02 * limit / frequency, observe="nutation", horizon=2000.0)
         assert float(re.search(r"h omega = ([\d.]+)\)", warned).group(1)) == pytest.approx(limit, abs=3e-3)
         assert "grow" in warned
-        assert "grow" not in said(scene, name, step_size=0.98 * limit / frequency, observe="nutation")
+        assert "grow" not in said(scene, name, step_size=0.98 * limit / frequency, observe="nutation", horizon=2000.0)
     assert said(scene, "midpoint", step_size=3.0 / frequency) == ""
     for name in ("gauss-2", "gauss-4", "gauss-12"):
         for phase in (2.0, 5.0, 10.0):

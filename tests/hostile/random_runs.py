@@ -1,0 +1,335 @@
+"""Random guarded runs: every method in every chart on sixteen kinds of scenes, and what the guard had said of them.
+
+python -m tests.hostile.random_runs 20000 --into runs.jsonl     resumable: runs that the file has are not run again
+python -m tests.hostile.random_runs --told runs.jsonl           what became of them
+
+Run k is drawn from a seed of its own and can be run again alone (`one`). A run is wrong if it ends `ok` and its axis
+was ever further than `WRONG` from the closed form; it is silent if the guard had said nothing. A run is right below
+`RIGHT`. A run that takes more than `LONGEST` of processor time ends its process and is recorded by the next.
+"""
+
+import argparse
+import collections
+import json
+import math
+import random
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import symtop
+from symtop.methods.registry import integrators
+from symtop.model import charts
+from symtop.model.scenes import Scene, closed_form
+from symtop.model.top import Angles, SymmetricTop
+
+WRONG, RIGHT = 0.05, 1e-3  # rad
+LONGEST = 60.0  # s of processor time
+MOST_STEPS = 1.5e5
+SEED = 20_000
+BATCH = 1000  # runs of a process
+FAILED = 77  # exit code of a process that has met an exception that is none of the package's
+
+
+class Outcome(NamedTuple):
+    """One run: what was done, what the guard said, what came of it, and what it took."""
+
+    k: int
+    kind: str
+    top: tuple[float, ...]  # I1, I3, mgl
+    start: tuple[float, ...]  # theta, phi, psi and their rates
+    integrator: str
+    observe: str
+    control: dict[str, float]
+    horizon: float
+    nutations: float
+    warning: str
+    outcome: str
+    error: float  # of the axis, rad, largest over the samples
+    seconds: float  # of processor time
+
+    @property
+    def wrong(self) -> bool:
+        """It ended well, and its axis was somewhere else."""
+        return self.outcome == "ok" and not self.error <= WRONG
+
+    @property
+    def right(self) -> bool:
+        """It ended well, and its axis was where it should be."""
+        return self.outcome == "ok" and self.error < RIGHT
+
+    def scene(self) -> Scene:
+        """What was run."""
+        return Scene(f"{self.kind}-{self.k}", SymmetricTop(*self.top), Angles(*self.start), self.horizon)
+
+
+# ---- scenes ----------------------------------------------------------------------------------------------------------
+
+
+def _top(draw, ratio=None, weight=None):
+    I1 = 10.0 ** draw.uniform(-0.7, 0.7)
+    mgl = weight or draw.choice([1.0, 1.0, 1.0, -1.0]) * 10.0 ** draw.uniform(-1.0, 1.2)
+    return SymmetricTop(I1, I1 * (ratio or draw.uniform(0.05, 2.0)), mgl * I1)
+
+
+def _swing(top):
+    """The frequency of small swings without spin."""
+    return math.sqrt(abs(top.mgl) / top.I1)
+
+
+def _turns(draw):
+    return draw.uniform(-3.0, 3.0), draw.uniform(-3.0, 3.0)
+
+
+def _rates(draw, top):
+    g = _swing(top)
+    return g * draw.uniform(-2.0, 2.0), g * draw.uniform(-3.0, 3.0), g * draw.uniform(-8.0, 8.0)
+
+
+def _any_start(draw, top):
+    return top, Angles(draw.uniform(0.05, 3.05), *_turns(draw), *_rates(draw, top))
+
+
+def _fast(draw):
+    top = _top(draw)
+    spin = _swing(top) * 10.0 ** draw.uniform(0.0, 1.7)
+    return top, Angles(draw.uniform(0.05, 3.0), *_turns(draw), psi_dot=spin)
+
+
+def _very_fast(draw):
+    top = _top(draw)
+    spin = _swing(top) * 10.0 ** draw.uniform(2.0, 6.0)
+    return top, Angles(draw.uniform(0.05, 3.0), *_turns(draw), psi_dot=spin)
+
+
+def _upright(draw):
+    top = _top(draw)
+    spin = _swing(top) * draw.uniform(0.5, 6.0) * top.I1 / top.I3
+    return top, Angles(10.0 ** draw.uniform(-3.0, -0.7), *_turns(draw), psi_dot=spin)
+
+
+def _sleeper(draw):
+    """Let go almost upright, mostly below the spin from which the top sleeps."""
+    top = _top(draw, weight=10.0 ** draw.uniform(-1.0, 1.2))
+    spin = 2.0 * _swing(top) * draw.uniform(0.1, 1.1) * top.I1 / top.I3
+    return top, Angles(10.0 ** draw.uniform(-8.0, -2.0), *_turns(draw), psi_dot=spin)
+
+
+def _through_upright(draw, spin, energy):
+    """Through the upright position with almost the energy of standing there."""
+    top = _top(draw, weight=10.0 ** draw.uniform(-1.0, 1.2))
+    theta, p = draw.uniform(0.3, 2.9), spin * 2.0 * top.I1 * _swing(top)
+    turn = p / (top.I1 * (1.0 + math.cos(theta)))
+    height = p * turn * (1.0 - math.cos(theta)) / 2.0 + top.mgl * math.cos(theta)
+    theta_dot = math.sqrt(max(2.0 * (top.mgl * (1.0 + energy) - height) / top.I1, 0.0))
+    at = Angles(theta, *_turns(draw), draw.choice([-1.0, 1.0]) * theta_dot, turn, p / top.I3 - turn * math.cos(theta))
+    return top, at
+
+
+def _separatrix(draw):
+    return _through_upright(draw, draw.uniform(0.0, 0.99), draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-12.0, -1.0))
+
+
+def _pendulum(draw):
+    return _through_upright(draw, 0.0, draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-12.0, 0.0))
+
+
+def _aimed(draw):
+    """At one of the poles, past it by a little."""
+    top, lower = _top(draw), draw.random() < 0.3
+    g, gap = _swing(top), draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-9.0, -0.5)
+    theta, spin = draw.uniform(0.5, 2.5), g * draw.uniform(0.1, 3.0) * top.I1 / top.I3
+    turn = top.I3 * spin * ((-1.0 if lower else 1.0) + gap - math.cos(theta)) / (top.I1 * math.sin(theta) ** 2)
+    rate = g * draw.uniform(1.0, 4.0) * (1.0 if lower else -1.0)
+    return top, Angles(theta, *_turns(draw), rate, turn, spin - turn * math.cos(theta))
+
+
+def _hanging(draw):
+    """Let go beside theta = pi, where a top of positive weight hangs and one of negative weight stands."""
+    top = _top(draw)
+    spin = _swing(top) * draw.uniform(0.0, 6.0) * top.I1 / top.I3
+    return top, Angles(math.pi - 10.0 ** draw.uniform(-9.0, -1.0), *_turns(draw), psi_dot=spin)
+
+
+def _steady(draw):
+    top = _top(draw, weight=10.0 ** draw.uniform(-1.0, 1.2))
+    theta, spin = draw.uniform(0.2, 1.4), _swing(top) * draw.uniform(3.0, 20.0) * top.I1 / top.I3
+    weight = top.I1 * math.cos(theta)
+    turn = 2.0 * top.mgl / (top.I3 * spin + math.sqrt(max((top.I3 * spin) ** 2 - 4.0 * weight * top.mgl, 0.0)))
+    turn *= draw.choice([1.0, 1.0 + 10.0 ** draw.uniform(-8.0, -1.0), 1.1])
+    return top, Angles(theta, *_turns(draw), phi_dot=turn, psi_dot=spin - turn * math.cos(theta))
+
+
+def _units(draw):
+    """Any motion in units of inertia, weight and time from 1e-9 to 1e9."""
+    top, at = _any_start(draw, _top(draw))
+    mass, clock = 10.0 ** draw.uniform(-9.0, 9.0), 10.0 ** draw.uniform(-9.0, 9.0)
+    rates = (rate / clock for rate in (at.theta_dot, at.phi_dot, at.psi_dot))
+    return (
+        SymmetricTop(top.I1 * mass, top.I3 * mass, top.mgl * mass / clock**2),
+        Angles(at.theta, at.phi, at.psi, *rates),
+    )
+
+
+KINDS = {
+    "anything": lambda draw: _any_start(draw, _top(draw)),
+    "ball": lambda draw: _any_start(draw, _top(draw, 1.0)),
+    "disc": lambda draw: _any_start(draw, _top(draw, 2.0)),
+    "needle": lambda draw: _any_start(draw, _top(draw, 10.0 ** draw.uniform(-12.0, -2.0))),
+    "weightless": lambda draw: _any_start(draw, _top(draw, weight=10.0 ** draw.uniform(-12.0, -3.0))),
+    "heavy": lambda draw: _any_start(draw, _top(draw, weight=10.0 ** draw.uniform(2.0, 6.0))),
+    "units": _units,
+    "fast": _fast,
+    "very-fast": _very_fast,
+    "upright": _upright,
+    "sleeper": _sleeper,
+    "separatrix": _separatrix,
+    "pendulum": _pendulum,
+    "aimed": _aimed,
+    "hanging": _hanging,
+    "steady": _steady,
+}
+
+
+# ---- runs ------------------------------------------------------------------------------------------------------------
+
+
+def drawn(k: int, seed: int = SEED) -> Outcome:
+    """What run k does: 1 to 500 steps a nutation or a tolerance of 0.1 to 1e-13, over 1 to 1000 nutations."""
+    draw = random.Random(f"{seed}/{k}")
+    kind = draw.choice([*KINDS])
+    top, at = KINDS[kind](draw)
+    method = draw.choice([entry for entry in integrators().values() if entry.control is not None])
+    period = Scene("drawn", top, at, 1.0).nutation_period
+    if not math.isfinite(period):
+        period = 10.0 / _swing(top)
+    nutations, steps = 10.0 ** draw.uniform(0.0, 3.0), 10.0 ** draw.uniform(0.0, 2.7)
+    tolerance = 10.0 ** draw.uniform(-13.0, -1.0)
+    if method.control == "step_size":
+        control = {"step_size": period / steps}
+        most = MOST_STEPS if method.implementation == "compiled" else MOST_STEPS / 300.0
+        nutations = max(min(nutations, most / steps), 3.0 / steps)
+    else:
+        control = {"tolerance": max(tolerance, method.least_tolerance)}
+        if method.implementation == "python" and draw.random() < 0.98:
+            nutations = min(nutations, 10.0 ** draw.uniform(0.0, 1.5))
+        if method.name in ("radau", "taylor-quad"):
+            nutations = min(nutations, 10.0 ** draw.uniform(0.0, 1.0))
+    numbers = top.I1, top.I3, top.mgl
+    start = at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot
+    observe = draw.choice(["nutation", "axis", "attitude"])
+    horizon = nutations * period
+    return Outcome(k, kind, numbers, start, method.name, observe, control, horizon, nutations, "", "", math.nan, 0.0)
+
+
+def one(k: int, seed: int = SEED) -> Outcome:
+    """Draw run k and do it; a run that is refused has the outcome `refused` and the sentence for a warning."""
+    asked, told = drawn(k, seed), []
+    began = time.process_time()
+    try:
+        scene = asked.scene()
+        controls = {**asked.control, "observe": asked.observe, "samples": 501}
+        try:
+            run = symtop.simulate(scene, asked.integrator, guard=told.append, **controls)
+        except symtop.SymtopError as error:
+            if "does not show" not in str(error):
+                raise
+            run = symtop.simulate(scene, asked.integrator, guard=told.append, **{**controls, "observe": "axis"})
+    except symtop.SymtopError as error:
+        return asked._replace(outcome="refused", warning=str(error), seconds=time.process_time() - began)
+    seconds = time.process_time() - began
+    with np.errstate(all="ignore"):
+        error = charts.axis_distance(run["axis"].values, closed_form(scene).axis(run["time"].values))
+    ended = run.attrs["outcome"]
+    largest = float(np.max(error)) if ended == "ok" else math.inf
+    return asked._replace(warning=" ".join(told), outcome=ended, error=largest, seconds=seconds)
+
+
+def work(ks: list[int], path: Path, seed: int = SEED) -> None:
+    """Do these runs and add a line for each to the file; before each, the line of its beginning."""
+    warnings.simplefilter("ignore", symtop.SymtopWarning)
+    with path.open("a", buffering=1) as file:
+        for k in ks:
+            file.write(json.dumps({"begun": k}) + "\n")
+            signal.setitimer(signal.ITIMER_PROF, LONGEST + 5.0)  # its signal ends the process
+            try:
+                done = one(k, seed)
+            except Exception as error:  # noqa: BLE001
+                done = drawn(k, seed)._replace(outcome="crashed", warning=f"{type(error).__name__}: {error}")
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+            file.write(json.dumps(done._asdict()) + "\n")
+
+
+def read(path: Path, seed: int = SEED) -> dict[int, Outcome]:
+    """The runs of a file; one that was begun before another and never ended has the outcome `endless`."""
+    lines = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    done = {entry["k"]: Outcome(**entry) for entry in lines if "k" in entry}
+    for entry in lines[:-1] if lines and "begun" in lines[-1] else lines:
+        if "begun" in entry and entry["begun"] not in done:
+            done[entry["begun"]] = drawn(entry["begun"], seed)._replace(outcome="endless", seconds=LONGEST)
+    return done
+
+
+def told(runs: list[Outcome]) -> str:
+    """The figures of so many runs, and each run that should not be."""
+    ended = collections.Counter(run.outcome for run in runs)
+    wrong, right = [run for run in runs if run.wrong], [run for run in runs if run.right]
+    silent, false = [run for run in wrong if not run.warning], [run for run in right if run.warning]
+    slow = [run for run in runs if run.seconds >= LONGEST or run.outcome == "endless"]
+    share = 100.0 * len(false) / max(1, len(right))
+    crashed = [run for run in runs if run.outcome == "crashed"]
+    lines = [
+        f"{len(runs)} runs: " + ", ".join(f"{count} {name}" for name, count in ended.most_common()),
+        f"{len(wrong)} wrong by more than {WRONG} rad, of them silent: {len(silent)}",
+        f"{len(right)} right to {RIGHT} rad, of them warned of: {len(false)} ({share:.2f} %)",
+        f"longest {max((run.seconds for run in runs), default=0.0):.1f} s, beyond {LONGEST:.0f} s: {len(slow)}",
+    ]
+    named = {
+        "silent": silent,
+        "slow": slow,
+        "crashed": crashed,
+        "refused": [r for r in runs if r.outcome == "refused"][:20],
+    }
+    for name, group in named.items():
+        lines += [
+            f"{name} {run.k} {run.kind} {run.integrator} {run.observe} {run.control} {run.nutations:.3g} nutations, "
+            f"error {run.error:.2g}, {run.seconds:.1f} s {run.warning}"
+            for run in group
+        ]
+    return "\n".join(lines)
+
+
+def run_all(count: int, path: Path, seed: int = SEED) -> dict[int, Outcome]:
+    """Do the first `count` runs, in processes one after another: each goes on where the last one was ended."""
+    while missing := sorted({*range(count)} - {*read(path, seed)}):
+        batch = missing[:BATCH]
+        command = [sys.executable, "-m", "tests.hostile.random_runs", "--into", str(path), *map(str, batch)]
+        code = subprocess.run([*command, "--these", "--seed", str(seed)], check=False).returncode
+        if code not in (0, -signal.SIGPROF):
+            print(f"a process ended with {code}", flush=True)
+        if code:  # the run that ended it stands last in the file
+            with path.open("a") as file:
+                file.write("{}\n")
+    return read(path, seed)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("numbers", nargs="*", type=int)
+    parser.add_argument("--into", type=Path, default=Path("random-runs.jsonl"))
+    parser.add_argument("--these", action="store_true", help="the numbers are runs, and not how many")
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--told", type=Path)
+    asked = parser.parse_args()
+    if asked.told:
+        print(told([*read(asked.told, asked.seed).values()]))
+    elif asked.these:
+        work(asked.numbers, asked.into, asked.seed)
+    else:
+        print(told([*run_all(asked.numbers[0], asked.into, asked.seed).values()]))

@@ -1,0 +1,158 @@
+"""A dask cluster that is gone, or goes: a result or one sentence within 30 s, and what was computed is kept."""
+
+import contextlib
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.commands import PROBE, ended, leftovers, stop, symtop
+
+pytest.importorskip("distributed")
+pytestmark = pytest.mark.slow
+
+SECONDS = 30.0  # from what happens to the cluster to the end of the command
+STARTS = 10.0  # s that a command may take to import and to connect, on a machine with other work
+
+
+class Cluster:
+    """A scheduler and its workers, each a process of its own."""
+
+    def __init__(self, log, workers=2):
+        environment = {**os.environ, "PROBE_LOG": str(log), "PROBE_PAUSE": "0.5"}
+        self.started = []
+        self.scheduler = self._start(environment, "scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1")
+        self.address = self._said(self.scheduler, r"Scheduler at:\s+(tcp://\S+)")
+        self.workers = [
+            self._start(environment, "worker", self.address, "--no-nanny", "--no-dashboard", "--nthreads", "1")
+            for _ in range(workers)
+        ]
+        for worker in self.workers:
+            self._said(worker, r"Registered to:\s+(tcp://\S+)")
+
+    def _start(self, environment, role, *words):
+        line = [sys.executable, "-m", f"distributed.cli.dask_{role}", *words]
+        process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment)
+        self.started.append(process)
+        return process
+
+    def _said(self, process, pattern):
+        for line in process.stderr:
+            if told := re.search(pattern, line):
+                return told[1]
+        raise AssertionError("it ended")
+
+    def end(self):
+        for process in self.started:
+            process.kill()
+            process.communicate()
+
+
+@pytest.fixture
+def log(tmp_path):
+    return tmp_path / "log"
+
+
+@pytest.fixture
+def cluster(log):
+    with contextlib.ExitStack() as stack:
+        made = Cluster(log)
+        stack.callback(made.end)
+        yield made
+
+
+def computed(results):
+    """The finished cases, and the identity of the file of each."""
+    return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in results.rglob("cases/*/*.nc")}
+
+
+def after(cluster, log, results, happens):
+    """How a study's command ends to whose cluster something happens midway, and how many seconds later."""
+    process = symtop("study", PROBE, "--results", results, "--scheduler", cluster.address)
+    try:
+        began = time.monotonic()
+        while len(computed(results)) < 3:
+            assert process.poll() is None, process.communicate()
+            assert time.monotonic() - began < 120.0
+            time.sleep(0.05)
+        happens()
+        began = time.monotonic()
+        told = ended(process, 300.0)
+        return *told, time.monotonic() - began
+    finally:
+        stop(process)
+
+
+def assert_nothing_is_lost(log, results, before):
+    """The same command without a cluster computes the rest, and nothing again."""
+    code, out, err = ended(symtop("study", PROBE, "--results", results, "--jobs", 1))
+    assert code == 0, err
+    assert f"{12 - len(before)} of 12 cases computed" in out
+    assert before.items() <= computed(results).items()
+    assert not leftovers(results)
+
+
+@pytest.mark.parametrize("how", ["killed", "stopped", "without workers"])
+def test_a_cluster_that_goes_midway_is_one_sentence(cluster, log, tmp_path, how):
+    def happens():
+        if how == "without workers":
+            for worker in cluster.workers:
+                worker.kill()
+        else:
+            cluster.scheduler.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
+
+    code, _, err, seconds = after(cluster, log, tmp_path / "r", happens)
+    print(f"{how}: {code} after {seconds:.1f} s, {err!r}")
+    assert code == 2
+    assert "symtop: the cluster at" in err
+    assert err.count("\n") <= 2
+    assert seconds < SECONDS
+    time.sleep(2.0)  # a worker may still write what it had begun
+    assert_nothing_is_lost(log, tmp_path / "r", computed(tmp_path / "r"))
+
+
+def test_a_worker_that_dies_costs_nothing(cluster, log, tmp_path):
+    code, out, err, seconds = after(cluster, log, tmp_path / "r", cluster.workers[0].kill)
+    print(f"a worker: {code} after {seconds:.1f} s, {err!r}")
+    assert code == 0, err
+    assert "12 of 12 cases computed" in out
+    assert seconds < SECONDS
+    assert len(log.read_text().split()) - 12 <= 1  # what the killed one was computing
+    assert_nothing_is_lost(log, tmp_path / "r", computed(tmp_path / "r"))
+
+
+@pytest.mark.parametrize("how", ["killed", "stopped", "without workers"])
+@pytest.mark.parametrize("what", ["study", "ensemble"])
+def test_a_cluster_that_is_gone_before_is_one_sentence(log, tmp_path, what, how):
+    made = Cluster(log, workers=0)
+    try:
+        if how != "without workers":
+            made.scheduler.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
+        words = ["study", PROBE, "--results", tmp_path / "r"]
+        if what == "ensemble":
+            words = ["ensemble", "strang", "--members", 90, "--step-size", 0.1, "--horizon", 1]
+        began = time.monotonic()
+        code, _, err = ended(symtop(*words, "--scheduler", made.address), 300.0)
+        seconds = time.monotonic() - began
+    finally:
+        made.end()
+    print(f"{what}, {how}: {code} after {seconds:.1f} s, {err!r}")
+    assert code == 2
+    assert "scheduler must be the address of a dask scheduler that answers and has workers" in err
+    assert seconds < SECONDS
+
+
+def test_an_address_that_never_answers_is_one_sentence(tmp_path):
+    """A port that takes connections and says nothing, as a firewall or another service may."""
+    with socket.create_server(("127.0.0.1", 0)) as deaf:
+        address = f"tcp://127.0.0.1:{deaf.getsockname()[1]}"
+        began = time.monotonic()
+        code, _, err = ended(symtop("study", PROBE, "--results", tmp_path, "--scheduler", address), 300.0)
+    assert code == 2
+    assert "scheduler must be" in err
+    assert time.monotonic() - began < SECONDS

@@ -1,0 +1,185 @@
+"""Every command, every option, every kind of bad value: one sentence, exit code 2, and no file anywhere."""
+
+import os
+import warnings
+
+import click
+import pytest
+from click.testing import CliRunner
+
+import symtop
+from symtop.cli.main import main
+
+GOOD = {
+    "cite": [],
+    "claims": ["strang", "--quick"],
+    "doctor": [],
+    "ensemble": ["strang", "--members", "2", "--step-size", "0.1", "--horizon", "0.2", "--samples", "2"],
+    "explore": ["--no-browser"],
+    "integrators": ["strang"],
+    "judge": ["own.py:step", "--order", "4", "--quick"],
+    "long": ["spheroid", "strang", "--steps", "10", "--step-size", "0.01"],
+    "recommend": ["spheroid", "--accuracy", "1e-3", "--horizon", "1"],
+    "report": [],
+    "run": ["spheroid", "strang", "--step-size", "0.02", "--horizon", "0.2", "--samples", "2"],
+    "scenes": ["spheroid"],
+    "study": ["notebook", "--quick", "--status"],
+}
+NOT_NUMBERS = [
+    "",
+    " ",
+    "x",
+    "1,5",
+    "0x10",
+    "1e",
+    "--",
+    "nano",
+    "½",
+    "1+2j",
+    "[1]",
+    "None",
+    "1 2",
+    "\0",
+    "é",
+    "0.1.2",
+    "'1'",
+]
+NOT_FINITE = ["nan", "inf", "-inf", "1e999", "-1e999"]
+NOT_POSITIVE = ["0", "-1", "-0.0", "-1e-300", "1e-400"]
+NOT_WHOLE = ["1.5", "1e3", "-1", "9" * 400]
+NAMES = [
+    "",
+    " ",
+    "no-such",
+    "Spheroid ",
+    "STRANG!",
+    "é",
+    "a\nb",
+    "../x",
+    "/",
+    "x" * 5000,
+    "None",
+    "-",
+    "*",
+    "%s",
+    "{}",
+    "\x1b[31m",
+]
+FILES = ["", "/", ".", "/dev/null/x.nc", "/proc/x.nc", "missing/../../x/y.nc", "a" * 300 + ".nc", "no/such/folder/x.nc"]
+FOLDERS = ["/dev/null", "/dev/null/x", "/proc/x", "no-such", "own.py", "a" * 300]
+PLUGINS = [
+    "",
+    ".",
+    "/",
+    "no-such.py",
+    "own.txt",
+    "/dev/null/x.py",
+    "/etc/hostname",
+    "x" * 5000,
+    "broken.py",
+    "leaves.py",
+]
+ADDRESSES = ["nowhere", "ftp://x", "tcp://[::1:0", "tcp://:", "/", "x" * 300]
+NUMBERS = NOT_NUMBERS + NOT_FINITE + NOT_POSITIVE
+WHOLE = NOT_NUMBERS + NOT_FINITE + NOT_WHOLE
+BAD = {
+    "--seed": WHOLE, "--members": [*WHOLE, "0"], "--samples": [*WHOLE, "0", "1"], "--threads": [*WHOLE, "0"],
+    "--jobs": [*WHOLE, "0"], "--port": [*WHOLE, "70000"], "--order": [*WHOLE, "0"],
+    "--step-size": [*NUMBERS, "1e300"], "--tolerance": [*NUMBERS, "1e300"], "--horizon": NUMBERS,
+    "--per-nutation": NUMBERS, "--nutations": NUMBERS, "--budget": NUMBERS, "--steps": [*NUMBERS, "1e300"],
+    "--accuracy": [*NUMBERS, "1e300"], "--limit": NUMBERS,
+    "--scene": NAMES, "--kind": NAMES, "--observe": NAMES, "--quantity": NAMES, "--i-use": NAMES, "--chart": NAMES,
+    "--form": NAMES, "--energy": NAMES, "--only": NAMES, "--conserves": NAMES,
+    "--output": FILES, "--figure": FILES, "--card": FILES, "--badge": FILES, "--checkpoint": FILES,
+    "--results": FOLDERS, "--plugin": PLUGINS, "--scheduler": ADDRESSES,
+}  # fmt: skip
+MAKES = ("missing/../../x/y.nc", "no/such/folder/x.nc")  # files whose folder `judge` makes
+FINE = {
+    ("doctor", "--results"),  # it says what it finds there
+    ("study", "--results"),  # --status of a folder that is not there: nothing is computed
+    ("study", "--limit"), ("study", "--jobs"), ("study", "--scheduler"),  # --status has no use for them
+    ("long", "--step-size"),  # a step of 1e300 ends the run at once, which is 3
+}  # fmt: skip
+WORDS_FINE = {"--checkpoint=/proc/x.nc"}  # ten steps write none
+FLAGS = ["=1", "=", "=no"]
+
+
+def lines():
+    """Every command line: its words, and whether it might be right."""
+    context = click.Context(main)
+    for name in main.list_commands(context):
+        command, good = main.get_command(context, name), [name, *GOOD[name]]
+        yield [*good, "--no-such-option"]
+        yield [*good, "-q"]
+        yield [*good, "--no-such=1"]
+        if name not in ("cite", "claims", "study"):
+            yield [*good, "one", "too", "many"]
+        for part in command.params:
+            option = part.opts[0]
+            if not isinstance(part, click.Option):
+                for value in NAMES if part.nargs == 1 else ():
+                    words = [name, *GOOD[name]]
+                    words[1 + [p for p in command.params if not isinstance(p, click.Option)].index(part)] = value
+                    yield words
+            elif part.is_flag:
+                yield from ([*good, f"{option}{value}"] for value in FLAGS)
+            else:
+                yield [*good, option]
+                assert option in BAD, f"{name} {option} is not tried"
+                bad = (value for value in BAD[option] if not (name == "judge" and value in MAKES))
+                yield from ([*good, f"{option}={value}"] for value in bad)
+
+
+LINES = [words for words in lines() if words]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("hostile")
+    (place / "own.py").write_text("def step(f, t, y, h):\n    return y + h * f(t, y)\n")
+    (place / "own.txt").write_text("no Python\n")
+    (place / "broken.py").write_text("def\n")
+    (place / "leaves.py").write_text("raise SystemExit(0)\n")
+    return place
+
+
+def outcome(words):
+    """Exit code, output and exception of a command line in this process."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return CliRunner().invoke(main, words)
+
+
+@pytest.mark.parametrize("name", sorted(GOOD))
+def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
+    """513 of them and more; the same lines without what is bad are right."""
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("socketserver.BaseServer.serve_forever", lambda *_: pytest.fail("it serves"))
+    before = sorted(path.name for path in folder.iterdir())
+    above = sorted(path.name for path in folder.parent.iterdir())
+    faults = []
+    for words in LINES:
+        if words[0] != name:
+            continue
+        done = outcome(words)
+        option = next((word.split("=")[0] for word in reversed(words) if word.startswith("--")), "")
+        told = [line for line in done.output.splitlines() if line.startswith(("symtop: ", "Error: "))]
+        allowed = (0, 1, 2, 3) if (name, option) in FINE or words[-1] in WORDS_FINE else (2,)
+        if done.exit_code not in allowed or not isinstance(done.exception, SystemExit | None):
+            faults.append((words, done.exit_code, repr(done.exception), done.output[-300:]))
+        elif "Traceback" in done.output or (done.exit_code == 2 and len(told) != 1):
+            faults.append((words, done.exit_code, done.output[-300:]))
+        if sorted(path.name for path in folder.iterdir()) != before:
+            faults.append((words, "wrote", sorted(path.name for path in folder.iterdir())))
+            for path in folder.iterdir():
+                if path.name not in before:
+                    os.system(f"rm -rf '{path}'")
+    if sorted(path.name for path in folder.parent.iterdir()) != above:
+        faults.append("wrote beside the folder")
+    assert not faults, "\n".join(repr(fault).replace("a" * 290, "aaa").replace("x" * 4990, "xxx") for fault in faults)
+
+
+def test_they_are_many():
+    assert len(LINES) >= 500
+    assert {words[0] for words in LINES} == {*GOOD}
+    assert symtop.scenes()
