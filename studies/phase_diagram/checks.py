@@ -12,6 +12,7 @@ import xarray as xr
 
 from symtop.methods.registry import integrator
 
+from ..population.costs import cost_to_reach
 from . import tables
 from .runs import QUANTITIES, horizons, measured, tops_of
 
@@ -24,7 +25,9 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
     for quantity in QUANTITIES:
         panel = tables.diagram(data, tables.SCENE, quantity)
         found[quantity] = []
-        for at in zip(*np.nonzero(panel.foretold & (panel.ratio >= tables.TIE) & np.isfinite(panel.ratio)), strict=True):
+        for at in zip(
+            *np.nonzero(panel.foretold & (panel.ratio >= tables.TIE) & np.isfinite(panel.ratio)), strict=True
+        ):
             pair = [panel.names[panel.winner[at]], panel.names[panel.second[at]]]
             parts = [_settings(data, name, quantity, at) for name in pair]
             horizon = float(panel.horizons[at[1]])
@@ -67,7 +70,7 @@ def check(asked: Any) -> xr.Dataset:
         shown[rank] = [errors[place].max() for errors, _ in runs]
         work = np.array([each for _, each in runs])
         with_errors = shown[rank][:, np.newaxis]
-        taken[rank] = tables.cost_to_reach(work, with_errors, (asked["target"],))[0, 0]
+        taken[rank] = cost_to_reach(work, with_errors, (asked["target"],))[0, 0]
     return xr.Dataset(
         {
             "errors": (("rank", "side"), shown),

@@ -1,4 +1,4 @@
-"""The picture: the cheapest row of every allowed error and horizon, three errors wide, population above and scene below."""
+"""The picture: the cheapest row of every allowed error and horizon; three errors wide, population above scene."""
 
 from collections import Counter
 from typing import Any
@@ -65,7 +65,7 @@ def draw(data: xr.DataTree) -> Picture:
         f"measured growth of its own run; pale: another row within {TIE:g}; grey: no row reaches it. "
         f"{words.spot_sentence(data)} Gauss methods take no part in energy and shape, which they keep at any step. "
         "Closed forms (exact, exact-discrete) take no part: they cost the same at every horizon.",
-        "Maps of the cheapest method over horizon and allowed error, three panels for random tops and three for a scene.",
+        "Maps of the cheapest method over horizon and allowed error, three panels for random tops, three for a scene.",
     )
 
 

@@ -8,6 +8,11 @@ minimising sum (E(H_k)/E_k - 1)^2. The single power with the least sum is taken;
 criterion n log(sum/n) + k log(n) says so and the second power carries at least `SHARE` of the error at the end. Points
 above `SATURATED`, where an angle cannot grow any further, and points before the last `DECADES` are left out.
 
+A map that loses energy loses as much in every nutation, so that energy and shape grow as H at most. The phase is the
+integral of a frequency that hangs on the energy: its power is at most 1 more than that of the energy, and where the
+energy drifts a quadratic part of the phase is sure to come: the pair needs `SURE` alone. A drift that is still hidden
+below an oscillation at the last measured horizon is not foretold.
+
 What rounding adds is a walk: with w the smallest energy error over sqrt(evaluations) that any setting of a row showed,
 but no more than the rounding of the energy itself,
 
@@ -30,7 +35,7 @@ PAIRS = ((0.0, 0.5), (0.0, 1.0), (0.0, 1.5), (0.0, 2.0), (1.0, 2.0))
 DECADES = 2.5
 SATURATED = 0.2
 FEWEST = 4  # points of a fit
-SHARE = 0.3
+SHARE, SURE = 0.1, 0.01  # of the error at the end: the least of a second power, and where it is sure to come
 
 
 class Laws(NamedTuple):
@@ -53,9 +58,16 @@ class Laws(NamedTuple):
         return np.asarray(terms[:, 0] + np.where(np.isnan(terms[:, 1]), 0.0, terms[:, 1]))
 
 
-def fit(horizons: Array, errors: Array) -> Laws:
-    """Laws of errors (n, horizons), NaN where a run was not measured; NaN where too few points are left."""
+def fit(horizons: Array, errors: Array, energy: Array | None = None) -> Laws:
+    """Laws of errors (n, horizons), NaN where a run was not measured; NaN where too few points are left.
+
+    `energy` (n,) is the leading power of the energy's law, if the errors are those of the phase; otherwise they are
+    those of the energy or the shape.
+    """
     n = len(errors)
+    most = np.ones(n) if energy is None else np.where(np.isfinite(energy), energy + 1.0, 2.0)
+    sure = most == 2.0
+    share = np.where(sure, SURE, SHARE)
     good = np.isfinite(errors) & (errors > 0.0) & (errors < SATURATED)
     last = np.max(np.where(good, horizons, 0.0), axis=1)
     good &= horizons >= last[:, np.newaxis] * 10.0**-DECADES
@@ -66,7 +78,7 @@ def fit(horizons: Array, errors: Array) -> Laws:
     def columns(power: float) -> Array:
         return np.asarray(weight * horizons**power)
 
-    def score(rest: Array, parameters: int) -> Array:
+    def score(rest: Array, parameters: "int | Array") -> Array:
         return np.asarray(count * np.log(np.maximum(rest, 1e-20) / np.maximum(count, 1)) + parameters * np.log(count))
 
     powers, coefficients, best = np.full((n, 2), np.nan), np.full((n, 2), np.nan), np.full(n, np.inf)
@@ -75,7 +87,7 @@ def fit(horizons: Array, errors: Array) -> Laws:
             x = columns(power)
             a = x.sum(axis=1) / (x * x).sum(axis=1)
             found = score(((a[:, np.newaxis] * x - good) ** 2).sum(axis=1), 1)
-            better = enough & (found < best)
+            better = enough & (found < best) & (power <= most)
             powers[better], coefficients[better] = (power, np.nan), np.stack([a, a * np.nan], axis=1)[better]
             best = np.where(better, found, best)
         for low, high in PAIRS:
@@ -85,8 +97,8 @@ def fit(horizons: Array, errors: Array) -> Laws:
             a, b = (yy * x1 - xy * y1) / det, (xx * y1 - xy * x1) / det
             rest = ((a[:, np.newaxis] * x + b[:, np.newaxis] * y - good) ** 2).sum(axis=1)
             carried = b * last**high / (a * last**low + b * last**high)
-            found = score(rest, 2)
-            better = enough & (found < best) & (a > 0.0) & (b > 0.0) & (carried >= SHARE)
+            found = score(rest, np.where(sure, 1, 2))
+            better = enough & (found < best) & (a > 0.0) & (b > 0.0) & (carried >= share) & (high <= most)
             powers[better], coefficients[better] = (low, high), np.stack([a, b], axis=1)[better]
             best = np.where(better, found, best)
         u, v = np.log(horizons) * good, np.log(np.where(good, errors, 1.0))

@@ -1,4 +1,4 @@
-"""One row on some tops: its errors at all horizons with each setting, measured as far as its budget goes, then foretold.
+"""One row on some tops: its errors at all horizons with each setting, measured as far as a budget goes, then foretold.
 
 A horizon H ends a stretch of the run in which `SAMPLES` whole steps are looked at, golden fractions apart, so that no
 two fall on the same phase of the nutation. The error up to H is the largest so far:
@@ -167,7 +167,12 @@ def ladder(row: Integrator, tops: Tops, levels: int, steps: float, budget: float
     """
     far, n = horizons(), len(tops.period)
     blank = np.full((len(QUANTITIES), levels, far.size, n), np.nan)
-    seen, work, reach, values = blank.copy(), np.full((levels, n), np.nan), np.full(levels, np.nan), np.full(levels, np.nan)
+    seen, work, reach, values = (
+        blank.copy(),
+        np.full((levels, n), np.nan),
+        np.full(levels, np.nan),
+        np.full(levels, np.nan),
+    )
     for level in range(levels):
         setting = setting_of(row, level)
         if math.isnan(setting):
@@ -200,10 +205,11 @@ def foretold(seen: Array, work: Array, far: Array, grain: Array) -> xr.Dataset:
     w = np.minimum(laws.walk(seen[1], work[:, np.newaxis] * far[:, np.newaxis]), grain)
     evaluations = np.swapaxes(work[:, np.newaxis] * far[:, np.newaxis], 1, 2)  # settings, n, horizons
     error, columns = np.empty_like(seen), {name: np.full(seen.shape[:2] + seen.shape[3:], np.nan) for name in LAW}
-    for q, name in enumerate(QUANTITIES):
-        for s in range(seen.shape[1]):
+    for s in range(seen.shape[1]):
+        energy = laws.fit(far, seen[QUANTITIES.index("energy"), s].T).leading
+        for q, name in enumerate(QUANTITIES):
             runs = seen[q, s].T
-            found = laws.fit(far, runs)
+            found = laws.fit(far, runs, energy if name == "axis" else None)
             noise = laws.rounding(name, w[:, np.newaxis], far, evaluations[s])
             beyond = np.hypot(found.at(far), noise)
             beyond = np.where(np.isinf(runs).any(axis=1, keepdims=True), np.inf, beyond)

@@ -1,10 +1,10 @@
 """From errors at all horizons to a diagram: the cost of each row for each target and horizon, and who is the cheapest.
 
-    cost(row)   median over the tops of seconds a nutation: force evaluations a nutation of the cheapest setting that
-                keeps the error below the target up to the horizon, interpolated in logarithms between settings
-                (`population.costs.cost_to_reach`), times the measured seconds of an evaluation
-    winner      the row of the least cost; level with it is every row within `TIE`
-    foretold    if for most tops one of the two settings of the winner was not run as far as the horizon
+cost(row)   median over the tops of seconds a nutation: force evaluations a nutation of the cheapest setting that
+            keeps the error below the target up to the horizon, interpolated in logarithms between settings
+            (`population.costs.cost_to_reach`), times the measured seconds of an evaluation
+winner      the row of the least cost; level with it is every row within `TIE`
+foretold    if for most tops one of the two settings of the winner was not run as far as the horizon
 """
 
 from typing import NamedTuple
@@ -43,7 +43,7 @@ class Diagram(NamedTuple):
 
 def where(data: xr.DataTree) -> list[str]:
     """What was run: the population, the scene."""
-    return [str(name) for name in data[LADDERS]["scene"].values]
+    return [str(name) for name in data[LADDERS].to_dataset()["scene"].values]
 
 
 def rows_of(data: xr.DataTree, scene: str, quantity: str) -> list[str]:
@@ -51,7 +51,7 @@ def rows_of(data: xr.DataTree, scene: str, quantity: str) -> list[str]:
     group = data[LADDERS].to_dataset().sel(scene=scene)
     return [
         str(name) for name in group["integrator"].values
-        if quantity == "axis" or not float(group["conserves_energy"].sel(integrator=name)) == 1.0
+        if quantity == "axis" or float(group["conserves_energy"].sel(integrator=name)) != 1.0
     ]  # fmt: skip
 
 
@@ -101,6 +101,6 @@ def diagram(data: xr.DataTree, scene: str, quantity: str) -> Diagram:
     with np.errstate(invalid="ignore"):
         ratio = best[1] / best[0]
     foretold = np.take_along_axis(np.array(unseen), order[:1], axis=0)[0]
-    far = data[LADDERS]["horizon"].values
+    far = data[LADDERS].to_dataset()["horizon"].values
     winner = np.where(solved, order[0], -1)
     return Diagram(names, far, table, winner, order[1], ratio, foretold & solved)

@@ -31,8 +31,8 @@ HOW_TO_READ = (
     "does not depend on the horizon or the error."
 )
 CELLS = ["tops", "quantity", "target", "nutations", "cheapest", "ns a nutation", "next", "ratio", "kind"]
-SPOTS = ["quantity", "target", "nutations", "cheapest, foretold", "ns a nutation, foretold", "measured", "next, measured",
-         "right"]  # fmt: skip
+SPOTS = ["quantity", "target", "nutations", "cheapest, foretold", "ns a nutation, foretold", "measured",
+         "next, measured", "right"]  # fmt: skip
 LAWS = ["tops", "row", "setting", "measured to", *(f"{name}: power" for name in QUANTITIES),
         *(f"{name}: exponent" for name in QUANTITIES)]  # fmt: skip
 
@@ -70,7 +70,9 @@ def spots(data: xr.DataTree) -> list[Spot]:
         target, horizon = float(one["target"]), float(one["checked_horizon"])
         panel = panels[quantity]
         foretold = 1e9 * float(panel.costs[panel.names.index(rows[0]), *panel.place(target, horizon)])
-        costs = [1e9 * float(n) * diagrams.price(data, row) for n, row in zip(one["evaluations"].values, rows, strict=True)]
+        costs = [
+            1e9 * float(n) * diagrams.price(data, row) for n, row in zip(one["evaluations"].values, rows, strict=True)
+        ]
         found.append(Spot(quantity, target, horizon, rows, foretold, costs))
     return found
 
@@ -113,7 +115,9 @@ def winners_sentence(data: xr.DataTree, quantity: str) -> str:
 def population_sentence(data: xr.DataTree) -> str:
     """What was run."""
     group = data[LADDERS].to_dataset()
-    members = int(group["error"].sel(scene=POPULATION).notnull().any(["integrator", "quantity", "setting", "horizon"]).sum())
+    members = int(
+        group["error"].sel(scene=POPULATION).notnull().any(["integrator", "quantity", "setting", "horizon"]).sum()
+    )
     reach = float(group["reach"].max())
     return (
         f"{group.sizes['integrator']} rows on {members} random tops (seed 1) and on {SCENE}: measured to "
@@ -158,22 +162,27 @@ def _spots(data: xr.DataTree) -> Table:
             [one.quantity, f"{one.target:.1e}", f"{one.horizon:.2g}", one.rows[0], f"{one.foretold:.4g}", costs[0],
              f"{one.rows[1]} {costs[1]}", right or "neither"]
         )  # fmt: skip
-    return Table(f"Foretold cells run in full on {SCENE}; right: the winner, or the cost within {CLOSE:.0%}", SPOTS, lines)
+    return Table(
+        f"Foretold cells run in full on {SCENE}; right: the winner, or the cost within {CLOSE:.0%}", SPOTS, lines
+    )
 
 
 def _laws(data: xr.DataTree) -> Table:
     lines = []
     for name in diagrams.where(data):
-        for row in map(str, data[LADDERS]["integrator"].values):
+        for row in map(str, data[LADDERS].to_dataset()["integrator"].values):
             one = diagrams.cell(data, name, row)
             for k, value in enumerate(one["setting_value"].values):
                 part = one.isel(setting=k)
                 middle = {key: part[key].median("member").values for key in ("power", "slope", "interval")}
+                slopes = zip(middle["slope"], middle["interval"], strict=True)
                 if not np.isfinite(middle["power"]).any():
                     continue
                 lines.append(
                     [named(name), row, f"{value:.3g}", f"{float(part['reach']):.2g}",
                      *(f"{power:g}" for power in middle["power"]),
-                     *(f"{slope:.2f} +- {wide:.2f}" for slope, wide in zip(middle["slope"], middle["interval"], strict=True))]
+                     *(f"{slope:.2f} +- {wide:.2f}" for slope, wide in slopes)]
                 )  # fmt: skip
-    return Table("Growth of the error with the horizon, by setting (steps a nutation or tolerance), medians", LAWS, lines)
+    return Table(
+        "Growth of the error with the horizon, by setting (steps a nutation or tolerance), medians", LAWS, lines
+    )
