@@ -4,14 +4,15 @@ The largest errors E_k in stretches that end at the horizons H_k are fitted in r
 
     E(H) = a H^p    or    a H^p + b H^q,    a, b >= 0,    p < q of 0, 1/2, 1, 3/2, 2 (see `symtop.measure.growth`)
 
-minimising sum (E(H_k)/E_k - 1)^2. The single power with the least sum is taken; a pair replaces it if Schwarz's
-criterion n log(sum/n) + k log(n) says so and the second power carries at least `SHARE` of the error at the end. Points
-above `SATURATED`, where an angle cannot grow any further, and points before the last `DECADES` are left out.
+minimising sum (E(H_k)/E_k - 1)^2. The single power with the least sum is taken, or a pair with a smaller one if both
+of its coefficients are positive at the level of `DOUBT` (Student) and the second carries at least `SHARE` of the error
+at the end: an oscillation whose largest values scatter must not pass for a drift. Points above `SATURATED`, where an
+angle cannot grow any further, and points before the last `DECADES` are left out.
 
 A map that loses energy loses as much in every nutation, so that energy and shape grow as H at most. The phase is the
-integral of a frequency that hangs on the energy: its power is at most 1 more than that of the energy, and where the
-energy drifts a quadratic part of the phase is sure to come: the pair needs `SURE` alone. A drift that is still hidden
-below an oscillation at the last measured horizon is not foretold.
+integral of a frequency that hangs on the energy: where the energy drifts a quadratic part of the phase is sure to come,
+and the pair needs no more than `SURE`. A drift that is still hidden below an oscillation at the last measured horizon
+is not foretold.
 
 What rounding adds is a walk: with w the smallest energy error over sqrt(evaluations) that any setting of a row showed,
 but no more than the rounding of the energy itself,
@@ -26,6 +27,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import stdtrit
 
 from symtop.measure.statistics import student
 from symtop.model.charts import Array
@@ -35,6 +37,7 @@ PAIRS = ((0.0, 0.5), (0.0, 1.0), (0.0, 1.5), (0.0, 2.0), (1.0, 2.0))
 DECADES = 2.5
 SATURATED = 0.2
 FEWEST = 4  # points of a fit
+DOUBT = 1e-4
 SHARE, SURE = 0.1, 0.01  # of the error at the end: the least of a second power, and where it is sure to come
 
 
@@ -65,28 +68,26 @@ def fit(horizons: Array, errors: Array, energy: Array | None = None) -> Laws:
     those of the energy or the shape.
     """
     n = len(errors)
-    most = np.ones(n) if energy is None else np.where(np.isfinite(energy), energy + 1.0, 2.0)
-    sure = most == 2.0
-    share = np.where(sure, SURE, SHARE)
+    most = np.full(n, 1.0 if energy is None else 2.0)
+    sure = np.zeros(n, bool) if energy is None else energy >= 1.0
+    share, doubt = np.where(sure, SURE, SHARE), np.where(sure, 0.025, DOUBT)
     good = np.isfinite(errors) & (errors > 0.0) & (errors < SATURATED)
     last = np.max(np.where(good, horizons, 0.0), axis=1)
     good &= horizons >= last[:, np.newaxis] * 10.0**-DECADES
     count = good.sum(axis=1)
     enough = count >= FEWEST
+    times = stdtrit(np.maximum(count - 2, 1), 1.0 - doubt)  # standard errors that a coefficient must exceed
     weight = np.where(good, 1.0 / np.where(good, errors, 1.0), 0.0)
 
     def columns(power: float) -> Array:
         return np.asarray(weight * horizons**power)
-
-    def score(rest: Array, parameters: "int | Array") -> Array:
-        return np.asarray(count * np.log(np.maximum(rest, 1e-20) / np.maximum(count, 1)) + parameters * np.log(count))
 
     powers, coefficients, best = np.full((n, 2), np.nan), np.full((n, 2), np.nan), np.full(n, np.inf)
     with np.errstate(all="ignore"):
         for power in POWERS:
             x = columns(power)
             a = x.sum(axis=1) / (x * x).sum(axis=1)
-            found = score(((a[:, np.newaxis] * x - good) ** 2).sum(axis=1), 1)
+            found = ((a[:, np.newaxis] * x - good) ** 2).sum(axis=1)
             better = enough & (found < best) & (power <= most)
             powers[better], coefficients[better] = (power, np.nan), np.stack([a, a * np.nan], axis=1)[better]
             best = np.where(better, found, best)
@@ -97,10 +98,11 @@ def fit(horizons: Array, errors: Array, energy: Array | None = None) -> Laws:
             a, b = (yy * x1 - xy * y1) / det, (xx * y1 - xy * x1) / det
             rest = ((a[:, np.newaxis] * x + b[:, np.newaxis] * y - good) ** 2).sum(axis=1)
             carried = b * last**high / (a * last**low + b * last**high)
-            found = score(rest, np.where(sure, 1, 2))
-            better = enough & (found < best) & (a > 0.0) & (b > 0.0) & (carried >= share) & (high <= most)
+            error = np.sqrt(rest / (count - 2) / det)
+            clear = (a > times * np.sqrt(yy) * error) & (b > times * np.sqrt(xx) * error)
+            better = enough & (rest < best) & clear & (carried >= share) & (high <= most)
             powers[better], coefficients[better] = (low, high), np.stack([a, b], axis=1)[better]
-            best = np.where(better, found, best)
+            best = np.where(better, rest, best)
         u, v = np.log(horizons) * good, np.log(np.where(good, errors, 1.0))
         du = np.where(good, u - (u.sum(axis=1) / count)[:, np.newaxis], 0.0)
         slope = (du * v).sum(axis=1) / (du * du).sum(axis=1)

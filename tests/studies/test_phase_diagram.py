@@ -61,7 +61,7 @@ def test_rounding_adds_a_walk_and_its_phase():
 def test_a_law_foretells_a_measured_horizon_that_was_left_out_of_the_fit(name):
     row, tops = integrator(name), runs.tops_of("spheroid", 1, 0)
     ends = FAR[FAR <= 1.0001e4]
-    setting = {"strang[axis]": 140.0, "midpoint[angles]": 140.0, "rk4[axis]": 140.0}.get(name, 12.0)
+    setting = {"strang[axis]": 140.0, "midpoint[angles]": 140.0, "rk4[axis]": 140.0}.get(name, 13.11)
     seen, _ = runs.measured(row, tops, setting, ends, np.inf)
     energy = laws.fit(FAR, np.where(SHORT, padded(seen[1, :, 0]), np.nan)).leading
     for place, quantity in enumerate(runs.QUANTITIES):
