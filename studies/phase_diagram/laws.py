@@ -10,9 +10,10 @@ at the end: an oscillation whose largest values scatter must not pass for a drif
 angle cannot grow any further, and points before the last `DECADES` are left out.
 
 A map that loses energy loses as much in every nutation, so that energy and shape grow as H at most. The phase is the
-integral of a frequency that hangs on the energy: where the energy drifts a quadratic part of the phase is sure to come,
-and the pair needs no more than `SURE`. A drift that is still hidden below an oscillation at the last measured horizon
-is not foretold.
+integral of a frequency that hangs on the energy, and grows as H^2 at most. Which form a law has is known in part: a row
+that is neither symplectic nor keeps the energy by construction drifts, however small its drift beside its oscillation,
+so that of such a row any positive second coefficient of energy and shape is taken, and one of the phase at the level
+`LOOSE`. A drift that is still hidden at the last measured horizon is not foretold.
 
 What rounding adds is a walk: with w the smallest energy error over sqrt(evaluations) that any setting of a row showed,
 but no more than the rounding of the energy itself,
@@ -37,8 +38,8 @@ PAIRS = ((0.0, 0.5), (0.0, 1.0), (0.0, 1.5), (0.0, 2.0), (1.0, 2.0))
 DECADES = 2.5
 SATURATED = 0.2
 FEWEST = 4  # points of a fit
-DOUBT = 1e-4
-SHARE, SURE = 0.1, 0.01  # of the error at the end: the least of a second power, and where it is sure to come
+DOUBT, LOOSE = 1e-4, 0.025
+SHARE = 0.1  # of the error at the end
 
 
 class Laws(NamedTuple):
@@ -61,16 +62,13 @@ class Laws(NamedTuple):
         return np.asarray(terms[:, 0] + np.where(np.isnan(terms[:, 1]), 0.0, terms[:, 1]))
 
 
-def fit(horizons: Array, errors: Array, energy: Array | None = None) -> Laws:
+def fit(horizons: Array, errors: Array, most: float = 2.0, *, drifts: bool = False) -> Laws:
     """Laws of errors (n, horizons), NaN where a run was not measured; NaN where too few points are left.
 
-    `energy` (n,) is the leading power of the energy's law, if the errors are those of the phase; otherwise they are
-    those of the energy or the shape.
+    `most` is the largest power that can be, `drifts` whether it is known to come.
     """
     n = len(errors)
-    most = np.full(n, 1.0 if energy is None else 2.0)
-    sure = np.zeros(n, bool) if energy is None else energy >= 1.0
-    share, doubt = np.where(sure, SURE, SHARE), np.where(sure, 0.025, DOUBT)
+    doubt, share = (0.5 if most == 1.0 else LOOSE, 0.0) if drifts else (DOUBT, SHARE)
     good = np.isfinite(errors) & (errors > 0.0) & (errors < SATURATED)
     last = np.max(np.where(good, horizons, 0.0), axis=1)
     good &= horizons >= last[:, np.newaxis] * 10.0**-DECADES

@@ -35,6 +35,7 @@ from ..population.tops import Body, Tops, numbers_of
 from . import laws
 
 QUANTITIES = ("axis", "energy", "shape")
+MOST = {"axis": 2.0, "energy": 1.0, "shape": 1.0}  # the largest power of the horizon (see `laws`)
 POPULATION = "population"
 PER_DECADE = 4  # stretches; every other end is a column of the picture
 FIRST, LAST = 1.0, 9.0  # decades of the horizon, in nutations
@@ -44,6 +45,11 @@ LOOSEST = 1e-2  # tolerance; divided by ten
 LEAST_STEPS = 4.0  # a nutation, of what energy and shape are asked: longer steps may keep them and miss the motion
 DONE = 3e-13  # an error at ten nutations that no finer setting is asked to improve
 BITS = 24  # of a step
+
+
+def drifts_of(row: Integrator) -> bool:
+    """Is it known that the energy of a row drifts: neither symplectic nor kept by construction?"""
+    return not row.symplectic and "energy" not in (row.conserves or ())
 
 
 class Shown(NamedTuple):
@@ -191,13 +197,13 @@ def ladder(row: Integrator, tops: Tops, levels: int, steps: float, budget: float
         if np.median(tried[:, 0], axis=1).max() < DONE:
             break
     grain = EPSILON * np.maximum((np.abs(tops.energy) + np.abs(tops.numbers[:, 2])) / tops.energy_scale, 1.0)
-    return foretold(seen, work, far, grain).assign(
+    return foretold(seen, work, far, grain, drifts=drifts_of(row)).assign(
         setting_value=("setting", values), reach=("setting", reach), chart=((), row.charts()[0]),
         conserves_energy=((), float("energy" in (row.conserves or ()))),
     )  # fmt: skip
 
 
-def foretold(seen: Array, work: Array, far: Array, grain: Array) -> xr.Dataset:
+def foretold(seen: Array, work: Array, far: Array, grain: Array, *, drifts: bool) -> xr.Dataset:
     """Errors at all horizons from the largest in the measured stretches (quantities, settings, horizons, n).
 
     `grain` (n,) is the rounding of the energy in one evaluation: no walk has longer steps.
@@ -206,10 +212,9 @@ def foretold(seen: Array, work: Array, far: Array, grain: Array) -> xr.Dataset:
     evaluations = np.swapaxes(work[:, np.newaxis] * far[:, np.newaxis], 1, 2)  # settings, n, horizons
     error, columns = np.empty_like(seen), {name: np.full(seen.shape[:2] + seen.shape[3:], np.nan) for name in LAW}
     for s in range(seen.shape[1]):
-        energy = laws.fit(far, seen[QUANTITIES.index("energy"), s].T).leading
         for q, name in enumerate(QUANTITIES):
             runs = seen[q, s].T
-            found = laws.fit(far, runs, energy if name == "axis" else None)
+            found = laws.fit(far, runs, MOST[name], drifts=drifts)
             noise = laws.rounding(name, w[:, np.newaxis], far, evaluations[s])
             beyond = np.hypot(found.at(far), noise)
             beyond = np.where(np.isinf(runs).any(axis=1, keepdims=True), np.inf, beyond)

@@ -29,7 +29,7 @@ def data(quick_results):
 @pytest.mark.parametrize("power", laws.POWERS)
 def test_a_power_is_found_and_continued_over_six_decades(power):
     errors = np.where(SHORT, 1e-9 * FAR**power, np.nan)[np.newaxis]
-    found = laws.fit(FAR, errors, np.array([power - 1.0]))
+    found = laws.fit(FAR, errors)
     assert found.leading[0] == power
     assert found.slope[0] == pytest.approx(power, abs=1e-6)
     np.testing.assert_allclose(found.at(FAR)[0], 1e-9 * FAR**power, rtol=1e-9)
@@ -61,16 +61,18 @@ def test_rounding_adds_a_walk_and_its_phase():
 def test_a_law_foretells_a_measured_horizon_that_was_left_out_of_the_fit(name):
     row, tops = integrator(name), runs.tops_of("spheroid", 1, 0)
     ends = FAR[FAR <= 1.0001e4]
-    setting = {"strang[axis]": 140.0, "midpoint[angles]": 140.0, "rk4[axis]": 140.0}.get(name, 13.11)
+    within = 2.0 if name == "series[axis]" else 1.2  # at order 16 a factor of 2 in the error is one of 1.04 in the step
+    setting = {"strang[axis]": 140.0, "midpoint[angles]": 140.0, "rk4[axis]": 140.0, "series[axis]": 11.3}.get(
+        name, 13.11
+    )
     seen, _ = runs.measured(row, tops, setting, ends, np.inf)
-    energy = laws.fit(FAR, np.where(SHORT, padded(seen[1, :, 0]), np.nan)).leading
     for place, quantity in enumerate(runs.QUANTITIES):
         full = padded(seen[place, :, 0])
         known = np.where(SHORT, full, np.nan)
         if full[0, ends.size - 1] < 0.1:
-            law = laws.fit(FAR, known, energy if quantity == "axis" else None)
+            law = laws.fit(FAR, known, runs.MOST[quantity], drifts=runs.drifts_of(row))
             told = float(law.at(ends[-1:])[0, 0])
-            assert told == pytest.approx(full[0, ends.size - 1], rel=0.2), quantity
+            assert full[0, ends.size - 1] / within < told < full[0, ends.size - 1] * within, quantity
 
 
 def test_a_wrong_law_would_not_foretell_it():
