@@ -1,4 +1,7 @@
 """The studies that ship with symtop: one folder a question."""
 
 # of the report; others follow
-ORDER = ("population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction")
+ORDER = (
+    "population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction",
+    "phase_diagram",
+)  # fmt: skip

@@ -18,7 +18,7 @@ from symtop.runner.grid import grid_rows
 
 STUDIES = (
     "population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction", "claims",
-    "notebook", "oscillators", "engines",
+    "notebook", "oscillators", "engines", "phase_diagram",
 )  # fmt: skip
 MUST_SAY = {
     "a step or a tolerance": r"\bsteps?\b|\btolerances?\b",

@@ -1,0 +1,84 @@
+"""Ten cells that were foretold, run in full: is the winner right, and what does it cost?
+
+A cell is chosen on the one scene if it was foretold, its winner is beyond a tie, and its runs are within a number of
+force evaluations; from each panel in turn that whose horizon is furthest beyond the last one that was measured. The
+winner and the next row run at the two settings on both sides of the target, to the horizon of the cell.
+"""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.methods.registry import integrator
+
+from ..population.costs import cost_to_reach
+from . import tables
+from .runs import QUANTITIES, horizons, measured, tops_of
+
+COUNT = 10
+
+
+def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
+    """Settings of the checks: quantity, target, horizon, and of two rows the two settings."""
+    found: dict[str, list[tuple[float, dict[str, Any]]]] = {}
+    for quantity in QUANTITIES:
+        panel = tables.diagram(data, tables.SCENE, quantity)
+        found[quantity] = []
+        for at in zip(
+            *np.nonzero(panel.foretold & (panel.ratio >= tables.TIE) & np.isfinite(panel.ratio)), strict=True
+        ):
+            pair = [panel.names[panel.winner[at]], panel.names[panel.second[at]]]
+            parts = [_settings(data, name, quantity, at) for name in pair]
+            horizon = float(panel.horizons[at[1]])
+            if max(work for _, work, _ in parts) * horizon > limit:
+                continue
+            settings = {"integrators": pair, "quantity": quantity, "target": tables.TARGETS[at[0]], "horizon": horizon,
+                        "settings": [values for values, _, _ in parts]}  # fmt: skip
+            found[quantity].append((horizon / parts[0][2], settings))
+    queues = [sorted(each, key=lambda one: -one[0]) for each in found.values()]
+    taken: list[dict[str, Any]] = []
+    while any(queues) and len(taken) < COUNT:
+        for queue in queues:
+            if queue and len(taken) < COUNT:
+                taken.append(queue.pop(0)[1])
+    return taken
+
+
+def _settings(data: xr.DataTree, name: str, quantity: str, at: tuple[int, int]) -> tuple[list[float], float, float]:
+    """The coarser and the finer setting of a row in a cell, the evaluations a nutation of the finer, its reach."""
+    one = tables.cell(data, tables.SCENE, name)
+    _, level = tables.work_to_reach(one, quantity)
+    fine = min(int(level[at][0]), one.sizes["setting"] - 1)
+    pair = [max(fine - 1, 0), fine]
+    values, reach = one["setting_value"].values[pair], one["reach"].values[pair].min()
+    return values.tolist(), float(one["work"].values[fine].max()), float(reach)
+
+
+def check(asked: Any) -> xr.Dataset:
+    """Evaluations a nutation that the cell takes, of the winner and of the next row: ``evaluations`` over ``rank``.
+
+    ``errors`` over rank and ``side`` are those at the coarser and at the finer setting; infinite evaluations mean that
+    neither reaches the target. ``quantity``, ``target``, ``horizon`` and ``row`` say which cell it is.
+    """
+    tops, far = tops_of(tables.SCENE, 1, 0), horizons()
+    ends = far[far <= 1.0001 * asked["horizon"]]
+    place = QUANTITIES.index(asked["quantity"])
+    shown, taken = np.full((2, 2), np.nan), np.full(2, np.nan)
+    for rank, (name, pair) in enumerate(zip(asked["integrators"], asked["settings"], strict=True)):
+        runs = [measured(integrator(name), tops, setting, ends, np.inf) for setting in pair]
+        shown[rank] = [errors[place].max() for errors, _ in runs]
+        work = np.array([each for _, each in runs])
+        with_errors = shown[rank][:, np.newaxis]
+        taken[rank] = cost_to_reach(work, with_errors, (asked["target"],))[0, 0]
+    return xr.Dataset(
+        {
+            "errors": (("rank", "side"), shown),
+            "evaluations": ("rank", taken),
+            "setting_value": (("rank", "side"), np.array(asked["settings"])),
+            "row": ("rank", list(asked["integrators"])),
+            "quantity": ((), asked["quantity"]),
+            "target": ((), asked["target"]),
+            "checked_horizon": ((), asked["horizon"]),
+        }
+    )

@@ -1,0 +1,233 @@
+"""One row on some tops: its errors at all horizons with each setting, measured as far as a budget goes, then foretold.
+
+A horizon H ends a stretch of the run in which `SAMPLES` whole steps are looked at, golden fractions apart, so that no
+two fall on the same phase of the nutation. The error up to H is the largest so far:
+
+    axis     angle between the axes at the same time, rad
+    energy   |E - E0| / (E0 - p_psi^2/2 I3 - min V)
+    shape    distance of (u, u'/omega), u = cos(theta), from the true orbit u'^2 = f(u), to first order in it:
+             |u'^2 - f(u)| / |grad|,  grad = (f'(u), 2 omega u'),  f = (1 - u^2)(alpha - beta u) - (b - a u)^2
+
+The last has no time in it: neither a phase nor a turn about the vertical changes it (`symtop.measure.phase` measures
+the same by a search for the nearest time). Steps are cut to 24 bits, so that step number times step is exact.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.base.numbers import EPSILON, GOLDEN
+from symtop.methods.calling import solve
+from symtop.methods.outcomes import OUTCOMES
+from symtop.methods.plan import Plan
+from symtop.methods.registry import Integrator
+from symtop.model import charts
+from symtop.model.charts import DIMENSIONS, Array
+from symtop.model.effective import effective_potential
+from symtop.model.scenes import scene
+from symtop.model.top import flat
+from symtop.model.view import axis_of, space_energy
+
+from ..population.ladder import bodies, loop_of, stored
+from ..population.tops import Body, Tops, numbers_of
+from . import laws
+
+QUANTITIES = ("axis", "energy", "shape")
+MOST = {"axis": 2.0, "energy": 1.0, "shape": 1.0}  # the largest power of the horizon (see `laws`)
+POPULATION = "population"
+PER_DECADE = 4  # stretches; every other end is a column of the picture
+FIRST, LAST = 1.0, 9.0  # decades of the horizon, in nutations
+SAMPLES = 12  # of a stretch
+COARSEST = 2.185  # steps a nutation; halved from setting to setting
+LOOSEST = 1e-2  # tolerance; divided by ten
+LEAST_STEPS = 4.0  # a nutation, of what energy and shape are asked: longer steps may keep them and miss the motion
+DONE = 3e-13  # an error at ten nutations that no finer setting is asked to improve
+BITS = 24  # of a step
+
+
+def drifts_of(row: Integrator) -> bool:
+    """Is it known that the energy of a row drifts: neither symplectic nor kept by construction?"""
+    return not row.symplectic and "energy" not in (row.conserves or ())
+
+
+class Shown(NamedTuple):
+    """What runs have shown, (n, samples), and their force evaluations (n,)."""
+
+    states: Array
+    momenta: Array
+    evaluations: Array
+    ended: Array  # (n,) well
+
+
+def horizons() -> Array:
+    """Ends of all stretches, in nutations."""
+    return np.logspace(FIRST, LAST, round((LAST - FIRST) * PER_DECADE) + 1)
+
+
+def tops_of(where: str, members: int, seed: int) -> Tops:
+    """The first members of the population with a nutation, or the one top of a scene."""
+    if where != POPULATION:
+        one = scene(where)
+        return Tops(np.array([flat(one.top, one.start)]), 10.0)
+    drawn = Tops(numbers_of(2 * members, seed), 10.0)
+    return Tops(drawn.numbers[drawn.known][:members], 10.0)
+
+
+def steps_of(tops: Tops, per_nutation: float) -> Array:
+    """Steps (n,), cut to `BITS` bits."""
+    size, power = np.frexp(tops.period / per_nutation)
+    return np.asarray(np.ldexp(np.rint(np.ldexp(size, BITS)), power - BITS))
+
+
+def places(ends: Array) -> Array:
+    """Where samples lie, (horizons, samples), in nutations: golden fractions of the last fifth before each end."""
+    fractions = np.sort(np.mod(GOLDEN * np.arange(1, SAMPLES), 1.0))
+    return np.asarray(ends[:, np.newaxis] * np.append(0.8 + 0.2 * fractions, 1.0))
+
+
+def setting_of(row: Integrator, level: int) -> float:
+    """Steps a nutation, or the tolerance; NaN below the least that the row has."""
+    if row.fixed_step:
+        return COARSEST * 2.0**level
+    tolerance = LOOSEST * 10.0**-level
+    return tolerance if tolerance >= row.least_tolerance else math.nan
+
+
+def run(row: Integrator, tops: Tops, setting: float, ends: Array, budget: float) -> tuple[Shown, Array]:
+    """Runs of all tops to the last of the ends, and the times (n, samples) of what they show."""
+    (chart,) = row.charts()
+    if row.fixed_step:
+        solver, h = loop_of(row), steps_of(tops, setting)
+        marks = np.maximum(np.rint(places(ends).ravel() * setting), 1).astype(np.int64)
+        marks = np.maximum.accumulate(marks)
+        unique, back = np.unique(marks, return_inverse=True)
+        many = solver.many(tops.numbers, h, np.tile(unique, (len(h), 1)))
+        work = np.asarray(solver.counts(many.steps, many.work)[0], dtype=float)
+        shown = Shown(many.states[:, back], many.momenta[:, back], work, many.outcome == 0)
+        return shown, marks * h[:, np.newaxis]
+    times = places(ends).ravel() * tops.period[:, np.newaxis]
+    n = len(times)
+    states, momenta = np.full((*times.shape, DIMENSIONS[chart]), np.nan), np.full((*times.shape, 2), np.nan)
+    work, ended = np.empty(n), np.zeros(n, bool)
+    for k, (top, start) in enumerate(bodies(tops, np.arange(n))):
+        one = solve(row, chart, top, start, Plan.until(times[k], setting, budget))
+        states[k], momenta[k, :, 0], momenta[k, :, 1] = one.states, one.p_phi, one.p_psi
+        work[k], ended[k] = one.force_evaluations, OUTCOMES.index(one.outcome) == 0
+    return Shown(states, momenta, work, ended), times
+
+
+def errors(chart: str, tops: Tops, shown: Shown, times: Array) -> dict[str, Array]:
+    """Each quantity at each sample, (n, samples); inf where a run has failed."""
+    states, body = shown.states, Body(*tops.body)
+    p_phi, p_psi = shown.momenta[..., 0], shown.momenta[..., 1]
+    with np.errstate(all="ignore"):
+        axis = axis_of(chart, states)
+        if chart == "angles":
+            place = effective_potential(states[..., 0], p_phi - p_psi, p_phi + p_psi, body.I1, body.mgl)
+            energy = states[..., 1] ** 2 / (2.0 * body.I1) + p_psi**2 / (2.0 * body.I3) + place
+            rate = -np.sin(states[..., 0]) * states[..., 1] / body.I1
+        else:
+            momentum = states[..., -3:]
+            energy = space_energy(body, axis, momentum, p_psi)  # type: ignore[arg-type]
+            rate = (momentum[..., 0] * axis[..., 1] - momentum[..., 1] * axis[..., 0]) / body.I1
+        each = {
+            "axis": charts.axis_distance(axis, tops.forms.axis(times)),
+            "energy": np.abs(energy - tops.energy[:, np.newaxis]) / tops.energy_scale[:, np.newaxis],
+            "shape": shape(tops, axis[..., 2], rate),
+        }
+    return {name: np.where(np.isfinite(values), values, np.inf) for name, values in each.items()}
+
+
+def shape(tops: Tops, u: Array, rate: Array) -> Array:
+    """Distance of heights and their rates (n, samples) from the true orbits, in units of the axis's length."""
+    I1, I3, mgl = tops.body
+    p_phi, p_psi = (part[:, np.newaxis] for part in tops.momenta[:2])
+    a, b, beta = p_psi / I1, p_phi / I1, 2.0 * mgl / I1
+    alpha = (2.0 * tops.energy[:, np.newaxis] - p_psi**2 / I3) / I1
+    omega = 2.0 * math.pi / tops.period[:, np.newaxis]
+    off = rate**2 - (1.0 - u * u) * (alpha - beta * u) + (b - a * u) ** 2
+    slope = 2.0 * a * (b - a * u) - 2.0 * u * (alpha - beta * u) - beta * (1.0 - u * u)
+    return np.asarray(np.abs(off) / np.hypot(slope, 2.0 * omega * rate))
+
+
+def measured(row: Integrator, tops: Tops, setting: float, ends: Array, budget: float) -> tuple[Array, Array]:
+    """Largest errors (quantities, horizons, n) of the stretches, inf after a failure, and evaluations a nutation."""
+    (chart,) = row.charts()
+    shown, times = run(row, tops, setting, ends, budget)
+    each = errors(chart, tops, shown, times)
+    largest = np.stack([each[name].reshape(len(times), len(ends), SAMPLES).max(axis=2).T for name in QUANTITIES])
+    if row.fixed_step and setting < LEAST_STEPS:
+        largest[1:] = np.inf
+    return largest, np.where(shown.ended, shown.evaluations / ends[-1], np.nan)
+
+
+def ladder(row: Integrator, tops: Tops, levels: int, steps: float, budget: float) -> xr.Dataset:
+    """All settings of a row, each as far as `steps` and `budget` (evaluations of a run) go, and foretold behind that.
+
+    Over `quantity`, `setting`, `horizon`, `member`: ``error``, the largest up to the horizon, and of its law the
+    leading ``power`` and the free exponent ``slope`` with its ``interval``. ``setting_value`` is the steps a nutation
+    or the tolerance; ``reach`` the last horizon that was measured; ``work`` the force evaluations a nutation; ``walk``
+    the w of `laws`.
+    """
+    far, n = horizons(), len(tops.period)
+    blank = np.full((len(QUANTITIES), levels, far.size, n), np.nan)
+    seen, work, reach, values = (
+        blank.copy(),
+        np.full((levels, n), np.nan),
+        np.full(levels, np.nan),
+        np.full(levels, np.nan),
+    )
+    for level in range(levels):
+        setting = setting_of(row, level)
+        if math.isnan(setting):
+            break
+        tried, first = measured(row, tops, setting, far[:1], math.inf if row.fixed_step else budget)
+        taken = float(np.nanmedian(first)) if np.isfinite(first).any() else math.nan
+        if math.isnan(taken):
+            values[level], reach[level], seen[:, level, 0] = setting, far[0], np.inf
+            continue
+        longest = min(budget / taken, steps / setting if row.fixed_step else math.inf, 1.0001e6)
+        if longest < far[laws.FEWEST]:
+            break
+        ends = far[far <= longest]
+        values[level], reach[level] = setting, ends[-1]
+        seen[:, level, : ends.size], work[level] = measured(row, tops, setting, ends, 10.0 * budget)
+        if np.median(tried[:, 0], axis=1).max() < DONE:
+            break
+    grain = EPSILON * np.maximum((np.abs(tops.energy) + np.abs(tops.numbers[:, 2])) / tops.energy_scale, 1.0)
+    return foretold(seen, work, far, grain, drifts=drifts_of(row)).assign(
+        setting_value=("setting", values), reach=("setting", reach), chart=((), row.charts()[0]),
+        conserves_energy=((), float("energy" in (row.conserves or ()))),
+    )  # fmt: skip
+
+
+def foretold(seen: Array, work: Array, far: Array, grain: Array, *, drifts: bool) -> xr.Dataset:
+    """Errors at all horizons from the largest in the measured stretches (quantities, settings, horizons, n).
+
+    `grain` (n,) is the rounding of the energy in one evaluation: no walk has longer steps.
+    """
+    w = np.minimum(laws.walk(seen[1], work[:, np.newaxis] * far[:, np.newaxis]), grain)
+    evaluations = np.swapaxes(work[:, np.newaxis] * far[:, np.newaxis], 1, 2)  # settings, n, horizons
+    error, columns = np.empty_like(seen), {name: np.full(seen.shape[:2] + seen.shape[3:], np.nan) for name in LAW}
+    for s in range(seen.shape[1]):
+        for q, name in enumerate(QUANTITIES):
+            runs = seen[q, s].T
+            found = laws.fit(far, runs, MOST[name], drifts=drifts)
+            noise = laws.rounding(name, w[:, np.newaxis], far, evaluations[s])
+            beyond = np.hypot(found.at(far), noise)
+            beyond = np.where(np.isinf(runs).any(axis=1, keepdims=True), np.inf, beyond)
+            error[q, s] = np.maximum.accumulate(np.where(np.isnan(runs), beyond, runs), axis=1).T
+            for key, value in zip(LAW, (found.leading, found.slope, found.interval), strict=True):
+                columns[key][q, s] = value
+    data: dict[str, Any] = {
+        "error": (("quantity", "setting", "horizon", "member"), stored(error[:, :, ::2])),
+        **{key: (("quantity", "setting", "member"), stored(value)) for key, value in columns.items()},
+        "work": (("setting", "member"), work),
+        "walk": ("member", w),
+    }
+    return xr.Dataset(data, coords={"quantity": list(QUANTITIES), "horizon": far[::2]})
+
+
+LAW = ("power", "slope", "interval")

@@ -1,0 +1,188 @@
+"""What the phase diagram says in sentences and tables, all of it from its datasets."""
+
+from collections import Counter
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.runner.study import Table
+
+from . import tables as diagrams
+from .runs import POPULATION, QUANTITIES
+from .tables import CHECKS, LADDERS, SCENE, TARGETS, TIE, diagram
+
+CLOSE = 0.2  # of the cost: a foretold cell within it is right
+PANELS = {
+    "axis": "phase: angle between the axes (rad)",
+    "energy": "energy: relative change",
+    "shape": "shape of the orbit: distance without time",
+}
+HOW_TO_READ = (
+    "A cell is an allowed error and a horizon; its colour is the row, a method in one chart, of the least cost. A cost "
+    "is measured: force evaluations a nutation of the coarsest step or tolerance whose error stays below the target up "
+    "to the horizon, interpolated between settings a factor of 2 in the step or 10 in the tolerance apart, times the "
+    "measured time of an evaluation in a run by itself; of the population the median. Errors are measured as far as "
+    "the budget of a run goes, to 10^6 nutations at most, and behind that foretold from the growth of the same run: "
+    "one power of the horizon or the sum of two, and a walk of rounding whose size is an order of magnitude. A cell is "
+    "hatched if its winner's error is foretold. Pale: another row costs less than "
+    f"{TIE:g} times as much. Energy and shape are asked from 4 steps a nutation on, and not of the Gauss methods, "
+    "which keep both at any step in the chart axis. Left out are exact and exact-discrete, closed forms whose cost "
+    "does not depend on the horizon or the error."
+)
+CELLS = ["tops", "quantity", "target", "nutations", "cheapest", "ns a nutation", "next", "ratio", "kind"]
+SPOTS = ["quantity", "target", "nutations", "cheapest, foretold", "ns a nutation, foretold", "measured",
+         "next, measured", "right"]  # fmt: skip
+LAWS = ["tops", "row", "setting", "measured to", *(f"{name}: power" for name in QUANTITIES),
+        *(f"{name}: exponent" for name in QUANTITIES)]  # fmt: skip
+
+
+class Spot(NamedTuple):
+    """A foretold cell and what its runs cost: ns a nutation of the winner, and of the next row."""
+
+    quantity: str
+    target: float
+    horizon: float
+    rows: list[str]
+    foretold: float
+    measured: list[float]
+
+    @property
+    def winner(self) -> bool:
+        """Is the winner cheaper than the next row in the runs as well?"""
+        return self.measured[0] < self.measured[1]
+
+    @property
+    def close(self) -> bool:
+        """Is its cost foretold to `CLOSE`?"""
+        return abs(self.foretold / self.measured[0] - 1.0) <= CLOSE
+
+
+def spots(data: xr.DataTree) -> list[Spot]:
+    """The checks."""
+    if CHECKS not in data.children:
+        return []
+    group, found = data[CHECKS].to_dataset().isel(scene=0), []
+    panels = {name: diagram(data, SCENE, name) for name in QUANTITIES}
+    for name in group["integrator"].values:
+        one = group.sel(integrator=name)
+        quantity, rows = str(one["quantity"].values), [str(row) for row in one["row"].values]
+        target, horizon = float(one["target"]), float(one["checked_horizon"])
+        panel = panels[quantity]
+        foretold = 1e9 * float(panel.costs[panel.names.index(rows[0]), *panel.place(target, horizon)])
+        costs = [
+            1e9 * float(n) * diagrams.price(data, row) for n, row in zip(one["evaluations"].values, rows, strict=True)
+        ]
+        found.append(Spot(quantity, target, horizon, rows, foretold, costs))
+    return found
+
+
+def spot_sentence(data: xr.DataTree) -> str:
+    """How many checks are right, and the worst."""
+    each = spots(data)
+    if not each:
+        return "No foretold cell was run: none is cheap enough."
+    off = [abs(one.foretold / one.measured[0] - 1.0) for one in each]
+    return (
+        f"Foretold cells run in full on {SCENE}: {len(each)}, to {max(one.horizon for one in each):.2g} nutations. The "
+        f"winner is right in {sum(one.winner for one in each)}; its cost is within {CLOSE:.0%} in "
+        f"{sum(one.close for one in each)}, off by {np.median(off):.1%} in the median and {max(off):.1%} at most; "
+        f"{sum(one.winner or one.close for one in each)} are right by one of the two."
+    )
+
+
+def named(name: str) -> str:
+    """The population or the scene in words."""
+    return "random tops" if name == POPULATION else name
+
+
+def winners_sentence(data: xr.DataTree, quantity: str) -> str:
+    """Which rows own how much of a panel, measured and foretold."""
+    said = []
+    for name in diagrams.where(data):
+        panel = diagram(data, name, quantity)
+        won = panel.winner >= 0
+        owners = Counter(panel.names[k] for k in panel.winner[won].tolist())
+        most = ", ".join(f"{row} {count / max(won.sum(), 1):.0%}" for row, count in owners.most_common(4))
+        level = (panel.ratio[won] < TIE).mean() if won.any() else 0.0
+        said.append(
+            f"{named(name)}: {most} of {won.sum()} cells that some row reaches ({panel.foretold.sum()} foretold, "
+            f"{level:.0%} level)"
+        )
+    return f"Cheapest, {PANELS[quantity]}: {'; '.join(said)}."
+
+
+def population_sentence(data: xr.DataTree) -> str:
+    """What was run."""
+    group = data[LADDERS].to_dataset()
+    members = int(
+        group["error"].sel(scene=POPULATION).notnull().any(["integrator", "quantity", "setting", "horizon"]).sum()
+    )
+    reach = float(group["reach"].max())
+    return (
+        f"{group.sizes['integrator']} rows on {members} random tops (seed 1) and on {SCENE}: measured to "
+        f"{reach:.2g} nutations, foretold to {float(group['horizon'].max()):.0e}."
+    )
+
+
+def sentences(data: xr.DataTree) -> list[str]:
+    """The panels, the checks, and what was run."""
+    return [*(winners_sentence(data, name) for name in QUANTITIES), spot_sentence(data), population_sentence(data)]
+
+
+def tables(data: xr.DataTree) -> list[Table]:
+    """Every cell, the checks, and the laws of growth."""
+    return [_cells(data), _spots(data), _laws(data)]
+
+
+def _cells(data: xr.DataTree) -> Table:
+    lines = []
+    for name in diagrams.where(data):
+        for quantity in QUANTITIES:
+            panel = diagram(data, name, quantity)
+            for t, h in np.ndindex(panel.winner.shape):
+                if panel.winner[t, h] < 0 or t % 2:
+                    continue
+                first, second = panel.winner[t, h], panel.second[t, h]
+                ratio = panel.ratio[t, h]
+                lines.append(
+                    [named(name), quantity, f"{TARGETS[t]:.0e}", f"{panel.horizons[h]:.2g}", panel.names[first],
+                     f"{1e9 * panel.costs[first, t, h]:.3g}", panel.names[second] if np.isfinite(ratio) else "none",
+                     f"{ratio:.2f}" if np.isfinite(ratio) else "", "foretold" if panel.foretold[t, h] else "measured"]
+                )  # fmt: skip
+    return Table("The cheapest row of each cell, whole decades of the error", CELLS, lines)
+
+
+def _spots(data: xr.DataTree) -> Table:
+    lines = []
+    for one in spots(data):
+        right = " and ".join(word for word, holds in (("winner", one.winner), ("cost", one.close)) if holds)
+        costs = [f"{cost:.4g}" if np.isfinite(cost) else "not reached" for cost in one.measured]
+        lines.append(
+            [one.quantity, f"{one.target:.1e}", f"{one.horizon:.2g}", one.rows[0], f"{one.foretold:.4g}", costs[0],
+             f"{one.rows[1]} {costs[1]}", right or "neither"]
+        )  # fmt: skip
+    return Table(
+        f"Foretold cells run in full on {SCENE}; right: the winner, or the cost within {CLOSE:.0%}", SPOTS, lines
+    )
+
+
+def _laws(data: xr.DataTree) -> Table:
+    lines = []
+    for name in diagrams.where(data):
+        for row in map(str, data[LADDERS].to_dataset()["integrator"].values):
+            one = diagrams.cell(data, name, row)
+            for k, value in enumerate(one["setting_value"].values):
+                part = one.isel(setting=k)
+                middle = {key: part[key].median("member").values for key in ("power", "slope", "interval")}
+                slopes = zip(middle["slope"], middle["interval"], strict=True)
+                if not np.isfinite(middle["power"]).any():
+                    continue
+                lines.append(
+                    [named(name), row, f"{value:.3g}", f"{float(part['reach']):.2g}",
+                     *(f"{power:g}" for power in middle["power"]),
+                     *(f"{slope:.2f} +- {wide:.2f}" for slope, wide in slopes)]
+                )  # fmt: skip
+    return Table(
+        "Growth of the error with the horizon, by setting (steps a nutation or tolerance), medians", LAWS, lines
+    )
