@@ -16,7 +16,7 @@ CLOSE = 0.2  # of the cost: a foretold cell within it is right
 PANELS = {
     "axis": "phase: angle between the axes (rad)",
     "energy": "energy: relative change",
-    "shape": "shape of the orbit: distance without time",
+    "shape": "shape: distance to the true orbit",
 }
 HOW_TO_READ = (
     "A cell is an allowed error and a horizon; its colour is the row, a method in one chart, of the least cost. A cost "
