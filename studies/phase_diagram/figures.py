@@ -39,7 +39,7 @@ def draw(data: xr.DataTree) -> Picture:
     for panel in each.values():
         area.update(panel.names[k] for k in panel.winner.ravel() if k >= 0)
     spoken = [name for name, _ in area.most_common(NAMED)]
-    figure, axes = panels(len(places), len(QUANTITIES), width=9.2, height=3.6, sharex=True, sharey=True)
+    figure, axes = panels(len(places), len(QUANTITIES), height=2.7, sharex=True, sharey=True)
     for row, name in enumerate(places):
         for axis, quantity in zip(axes[row], QUANTITIES, strict=True):
             _panel(axis, each[name, quantity], spoken)
@@ -54,7 +54,7 @@ def draw(data: xr.DataTree) -> Picture:
         Patch(facecolor="white", edgecolor="#555555", hatch="////", label="hatched: foretold"),
         Patch(facecolor="#F2F2F2", edgecolor="#CCCCCC", label="no row"),
     ]
-    figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False, fontsize=9.9)
+    figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False)
     return Picture(
         "map",
         figure,
@@ -115,6 +115,6 @@ def _name(axis: Any, mine: Any, name: str, centres: tuple[Any, Any]) -> None:
     x = min(max(centres[0][h], 3.0), 7.4)
     axis.text(
         x, centres[1][t], split_name(name)[0] if name.endswith("[axis]") else name, ha="center", va="center",
-        fontsize=9.9, color="#111111",
-        bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.82},
+        fontsize=7.5, color="#111111",
+        bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.82},
     )  # fmt: skip
