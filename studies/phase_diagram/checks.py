@@ -52,7 +52,7 @@ def _settings(data: xr.DataTree, name: str, quantity: str, at: tuple[int, int]) 
     fine = min(int(level[at][0]), one.sizes["setting"] - 1)
     pair = [max(fine - 1, 0), fine]
     values, reach = one["setting_value"].values[pair], one["reach"].values[pair].min()
-    return values.tolist(), float(one["work"].values[fine].max()), float(reach)
+    return values.tolist(), float(np.nanmax(one["work"].values[fine])), float(reach)
 
 
 def check(asked: Any) -> xr.Dataset:
@@ -70,7 +70,7 @@ def check(asked: Any) -> xr.Dataset:
         shown[rank] = [errors[place].max() for errors, _ in runs]
         work = np.array([each for _, each in runs])
         with_errors = shown[rank][:, np.newaxis]
-        taken[rank] = cost_to_reach(work, with_errors, (asked["target"],))[0, 0]
+        taken[rank] = cost_to_reach(tables.answered(work), with_errors, (asked["target"],))[0, 0]
     return xr.Dataset(
         {
             "errors": (("rank", "side"), shown),

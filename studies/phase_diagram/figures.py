@@ -39,22 +39,22 @@ def draw(data: xr.DataTree) -> Picture:
     for panel in each.values():
         area.update(panel.names[k] for k in panel.winner.ravel() if k >= 0)
     spoken = [name for name, _ in area.most_common(NAMED)]
-    figure, axes = panels(len(places), len(QUANTITIES), width=12.0, height=4.1, sharex=True, sharey=True)
+    figure, axes = panels(len(places), len(QUANTITIES), height=2.7, sharex=True, sharey=True)
     for row, name in enumerate(places):
         for axis, quantity in zip(axes[row], QUANTITIES, strict=True):
             _panel(axis, each[name, quantity], spoken)
-            axis.set_title(f"{words.named(name)}, {words.PANELS[quantity]}", fontsize=10)
-        axes[row][0].set_ylabel("allowed error")
+            axis.set_title(words.PANELS[quantity].replace(": ", "\n", 1) if row == 0 else "")
+        axes[row][0].set_ylabel(f"{words.named(name)}\nallowed error")
     for axis in axes[-1]:
         axis.set_xlabel("horizon (nutations)")
     families = {integrator(name).family: look(name).color for name in reversed(list(area))}
     keys = [Patch(facecolor=color, label=FAMILIES.get(family, family)) for family, color in families.items()]
     keys += [
-        Patch(facecolor="#BBBBBB", label=f"pale: another row within a factor of {TIE:g}"),
+        Patch(facecolor="#BBBBBB", label=f"pale: another within a factor {TIE:g}"),
         Patch(facecolor="white", edgecolor="#555555", hatch="////", label="hatched: foretold"),
         Patch(facecolor="#F2F2F2", edgecolor="#CCCCCC", label="no row"),
     ]
-    figure.legend(handles=keys, loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False)
     return Picture(
         "map",
         figure,
@@ -112,9 +112,9 @@ def _name(axis: Any, mine: Any, name: str, centres: tuple[Any, Any]) -> None:
     depth = ndimage.distance_transform_edt(np.pad(largest, 1))[1:-1, 1:-1]
     places = np.argwhere(depth > depth.max() - 0.6)
     t, h = places[np.argmin(((places - np.argwhere(largest).mean(axis=0)) ** 2).sum(axis=1))]
-    x = min(max(centres[0][h], 2.2), 7.8)
+    x = min(max(centres[0][h], 3.0), 7.4)
     axis.text(
         x, centres[1][t], split_name(name)[0] if name.endswith("[axis]") else name, ha="center", va="center",
-        fontsize=8.5, color="#111111",
-        bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.82},
+        fontsize=7.5, color="#111111",
+        bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.82},
     )  # fmt: skip

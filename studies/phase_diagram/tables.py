@@ -62,7 +62,8 @@ def cell(data: xr.DataTree, scene: str, name: str) -> xr.Dataset:
     one = one.isel(setting=np.flatnonzero(ran))
     there = one["error"].notnull().any(["quantity", "setting", "horizon"]).values
     one = one.isel(member=np.flatnonzero(there))
-    return one.assign(error=one["error"].fillna(np.inf))
+    dead = one["work"].isnull().all("member")  # it failed within ten nutations: there is nothing more to measure
+    return one.assign(error=one["error"].fillna(np.inf), reach=one["reach"].where(~dead, np.inf))
 
 
 def price(data: xr.DataTree, name: str) -> float:
@@ -70,12 +71,15 @@ def price(data: xr.DataTree, name: str) -> float:
     return float(data[PRICES]["alone"].isel(scene=0).sel(integrator=name))
 
 
+def answered(work: Array) -> Array:
+    """Evaluations a nutation with a number for runs that failed, whose infinite error keeps it out of every answer."""
+    return np.where(np.isfinite(work), work, 1.0)
+
+
 def work_to_reach(one: xr.Dataset, quantity: str, targets: tuple[float, ...] = TARGETS) -> tuple[Array, Array]:
     """Evaluations a nutation (targets, horizons, n) of a row, and the finer of the two settings that they come from."""
     errors = one["error"].sel(quantity=quantity).transpose("setting", "horizon", "member").values
-    work = one["work"].transpose("setting", "member").values
-    failed = ~np.isfinite(work)
-    work = np.where(failed, np.nanmax(work, initial=1.0) * 1e-6, work)  # its error is infinite, so that it is no answer
+    work = answered(one["work"].transpose("setting", "member").values)
     costs = np.stack([cost_to_reach(work, errors[:, k], targets) for k in range(errors.shape[1])], axis=1)
     levels = np.arange(len(work))[:, np.newaxis, np.newaxis]
     missed = np.stack([np.where(errors <= target, -1, levels).max(axis=0) for target in targets])

@@ -150,6 +150,14 @@ def test_checked_cells_are_foretold_and_their_runs_are_told(data):
     assert f"{checks.COUNT}, to" in words.spot_sentence(data)
 
 
+def test_a_check_whose_coarser_run_fails_takes_the_finer_one():
+    asked = {"integrators": ["series[axis]"] * 2, "settings": [[1.0, 35.0], [1.0, 1.1]], "quantity": "axis",
+             "target": 1e-6, "horizon": 17.8}  # fmt: skip
+    done = checks.check(asked)
+    assert done["evaluations"].values[0] == pytest.approx(35.0 * 16, rel=0.05)
+    assert np.isinf(done["evaluations"].values[1])
+
+
 def test_a_check_that_misses_counts_as_wrong():
     missed = words.Spot("axis", 1e-3, 1e6, ["a", "b"], 100.0, [np.inf, 130.0])
     right = words.Spot("axis", 1e-3, 1e6, ["a", "b"], 100.0, [110.0, 130.0])
