@@ -42,6 +42,7 @@ MOST_WORK = {"compiled": 5e6, "python": 5e5}  # evaluations of any probe: 20 nut
 LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nutation: a few of its steps, milliseconds
 LEAST_GROWTH = 0.05  # of the error of a piece: less growth from the first to the second is luck
 COMMITTED = 1e4, 1e7  # tolerances: an error that an adaptive method commits now and then, and one of variable order
+CLOSE, PASSING = 0.2, 100.0  # rad from a pole; tolerances that a step past it in the angles chart commits now and then
 UNSTABLE = 50.0  # times that a stable motion may amplify a change of its start in a nutation
 WORTH = 1e-2  # rad: a law that grows an error faster is looked into where it leads beyond this
 RESOLVED = 0.3  # rad that the axis may precess in one step at a pole: coarser probes say nothing about the passage
@@ -265,7 +266,10 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Foreca
         return Forecast(0.0, 0.0, steps, passage, "ok", plan.horizon)
     expected, probe = _expected(scene, method, chart, plan, marks)
     partly = method.adaptive and method.implementation == "python"
-    unstable = _unstable(scene, method, plan, marks) if partly and not probe.times[-1] >= plan.horizon else 0.0
+    partly = partly and not probe.times[-1] >= plan.horizon
+    if partly and chart == "angles" and marks.gap < CLOSE:
+        expected = max(expected, float(np.nan_to_num(departure(scene, PASSING * plan.tolerance, plan.horizon))))
+    unstable = _unstable(scene, method, plan, marks) if partly else 0.0
     turns = plan.horizon / marks.period
     rounding = marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0
     whole = bool(probe.times[-1] >= plan.horizon * (1.0 - 1e-9))

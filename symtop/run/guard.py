@@ -33,6 +33,7 @@ SMALL_TURN = 0.3  # h omega below which no method loses small nutations
 GROWS = 1e-3  # a step that multiplies small nutations by more than 1 + GROWS loses them
 NO_GROWTH = 3e-8  # rounding of the growth of a step
 NONLINEAR = 0.03  # of the nutation that a method adds of its own may pass for growth: 8e-6 at 4e-4 rad
+BESIDE = 1e-2  # rad
 MOST_FOLDS = 100.0  # e times that a nutation grows: any is too much
 NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a resonance
 COARSE = 1.0  # rad of precession in a step
@@ -63,7 +64,8 @@ def _unstable(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
     if method.adaptive or seen:
         return ""
     growth, steps = _growth(scene, method, chart, step, frequency), plan.horizon / step
-    size, folds = marks.width + growth.size, steps * math.log(max(growth.factor, 1.0))
+    beside = marks.gap if marks.gap < BESIDE else 0.0  # of a pole, what grows is the tilt
+    size, folds = marks.width + beside + growth.size, steps * math.log(max(growth.factor, 1.0))
     if (
         not growth.factor > 1.0 + max(NO_GROWTH, NONLINEAR * growth.size)
         or not size * math.expm1(min(folds, MOST_FOLDS)) > EXPECTED

@@ -24,6 +24,9 @@ SILENT = [
     (13968, 2),
     (6006, 4),
     (6460, 4),
+    (9501, 5),
+    (4513, 6),
+    (9380, 6),
 ]
 FALSE = [74, 511, 780, 990, 1929, 2413, 4178, 5013]  # right runs that were warned of growth that was none
 
