@@ -50,7 +50,7 @@ def opening(data: xr.DataTree) -> Opening:
     said = [
         f"Begin with {name}. Of all rows it needs the least time for a given error of the axis on the most tops, "
         f"{where} of the table.",
-        f"No row is the cheapest on every top. The closest line is {min(won_by)[1]}." if won_by else "",
+        f"No row is the cheapest on every top. The closest contest is at {min(won_by)[1]}." if won_by else "",
         words.silent_sentence(data),
         words.warning_sentence(data),
         f"Measured on {drawn}, drawn at random. A row is a method in one chart, at the coarsest step or tolerance that "
