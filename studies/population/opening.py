@@ -8,11 +8,10 @@ import xarray as xr
 from symtop.runner.study import Opening, Table
 
 from . import verdicts, words
-from .verdicts import Cell
 
 HEADER = [
-    "run length", "axis error (rad)", "cheapest most often", "on so many tops", "time over the cheapest, median (90 %)",
-    "meets it on", "next",
+    "run length", "axis error (rad)", "cheapest most often", "on so many tops", "median slowdown (90 %)", "meets it on",
+    "next",
 ]  # fmt: skip
 EXPLAINED = {
     "work_precision": "nine scenes, one motion each, explain it by the work of every row",
@@ -42,20 +41,23 @@ def opening(data: xr.DataTree) -> Opening:
              words.percent(first.solved), following]
         )  # fmt: skip
         second = f", and {others[0].name} on {words.percent(others[0].won)}" if others else ""
-        won_by.append((first.won.value, f"{start[1]} rad over {start[0]}: {first.name} wins on "
-                                        f"{words.percent(first.won)} of the tops{second}"))  # fmt: skip
+        where = f"{start[1]} rad over {start[0]}"
+        won_by.append(
+            (first.won.value, f"{where}: {first.name} wins on {words.percent(first.won)} of the tops{second}")
+        )
     (name, count), *_ = [*ahead.most_common(), ("none", 0)]
-    where = "in every line" if count == len(rows) else f"in {count} of the {len(rows)} lines"
+    lines = "in every line" if count == len(rows) else f"in {count} of the {len(rows)} lines"
     drawn = " and ".join(words.span(data, horizon) for horizon in verdicts.horizons(data))
-    said = [
+    first_choice = (
         f"Begin with {name}. Of all rows it needs the least time for a given error of the axis on the most tops, "
-        f"{where} of the table.",
-        f"No row is the cheapest on every top. The closest contest is at {min(won_by)[1]}." if won_by else "",
-        words.silent_sentence(data),
-        words.warning_sentence(data),
+        f"{lines} of the table."
+    )
+    closest = f"No row is the cheapest on every top. The closest contest is at {min(won_by)[1]}." if won_by else ""
+    measured = (
         f"Measured on {drawn}, drawn at random. A row is a method in one chart, at the coarsest step or tolerance that "
         "meets the error; times are those of the bare compiled loop. For your own scene and accuracy: symtop recommend "
-        "SCENE --accuracy 1e-6.",
-    ]
+        "SCENE --accuracy 1e-6."
+    )
+    said = [first_choice, closest, words.silent_sentence(data), words.warning_sentence(data), measured]
     table = Table("Wins on random tops", HEADER, rows)
     return Opening("Which integrator should I use, whatever my top?", list(filter(None, said)), table, EXPLAINED)

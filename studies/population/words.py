@@ -91,10 +91,10 @@ def winner_sentence(data: xr.DataTree, cell: Cell, unit: str = UNIT) -> str:
         return ""
     name, following = taken.names[won.row], taken.names[won.next_row]
     standing = next(one for one in verdicts.standings(taken) if one.name == name)
-    sure = "" if won.sure else ", which may be chance or noise of the times"
+    sure = "" if won.sure else ", a lead that may be chance or noise of the times"
     return (
-        f"{cell.target:.0e}: {name} on {percent(won.share)} ({interval(won.share)}), median slowdown "
-        f"{ratio(standing.slowdown[1])} on all, before {following} on {percent(won.next_share)}{sure}"
+        f"{cell.target:.0e}: {name} on {percent(won.share)} ({interval(won.share)}), with a median slowdown of "
+        f"{ratio(standing.slowdown[1])} over all tops, then {following} on {percent(won.next_share)}{sure}"
     )
 
 
@@ -103,7 +103,8 @@ def verdict_of(data: xr.DataTree, horizon: str, quantity: str) -> str:
     each = [winner_sentence(data, Cell(horizon, quantity, target)) for target in verdicts.targets(data)]
     said = "; ".join(filter(None, each))
     return (
-        f"{span(data, horizon)}, error of the {quantity}, in {UNITS[UNIT]}: cheapest beyond ties for {said}."
+        f"The cheapest row for an error of the {quantity}, ties left out, and the share of tops on which it is, among "
+        f"{span(data, horizon)} (cost in {UNITS[UNIT]}): {said}."
         if said
         else ""
     )

@@ -33,18 +33,18 @@ NAME = f"symtop-{__version__}-data"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every file in the bundle: zip has none before
 
 INTRODUCTION = """\
-Measurements of numerical integrators on the heavy symmetric (Lagrange) top, made by symtop {version}, code revision
-{revision}. Every method was run at many step sizes or tolerances and compared with the exact motion. The report in
-`results/report.html` says what was found and how it was measured: open it in a browser, no network is needed.
+Measurements of numerical integrators on the heavy symmetric (Lagrange) top. symtop {version}, code revision {revision},
+ran every method at many step sizes or tolerances and compared it with the exact motion. `results/report.html` says
+what was found and how it was measured: open it in a browser, no network is needed.
 
 **How it was made.** `symtop study --all` computed the datasets; `symtop archive` bundled them. To repeat it, install
 the packages of `versions.txt` and this revision of symtop, and run `make studies archive`. Times were taken on the
 machine of `machine.txt`, unless a dataset names another processor below.
 
 **The test set.** `scenes/scenes.csv` holds the tops and starts, each number to be read as the nearest double, and
-`scenes/states.csv` their states at {times} times with {digits} digits, from the closed form in {working} digits.
-`scenes/states.nc` holds the same as pairs of doubles, a value being `NAME + NAME_lo`. Angles are z-x-z (phi precession,
-theta inclination from the upward vertical, psi spin), phi and psi unwrapped, in radians; the axis is
+`scenes/states.csv` their states at {times} times with {digits} digits, from the closed form in {working}
+digits. `scenes/states.nc` holds the same as pairs of doubles, a value being `NAME + NAME_lo`. Angles are z-x-z: phi
+precession, theta inclination from the upward vertical, psi spin, in radians, phi and psi unwrapped. The axis is
 (sin theta sin phi, -sin theta cos phi, cos theta); quaternions are (w, x, y, z) from body to space.
 
 **Licence.** BSD-3-Clause, as symtop. **To cite it**, name symtop, its version and this revision; sources of the methods
@@ -102,7 +102,7 @@ def readme(results: Path, files: Mapping[str, bytes]) -> str:
     listed = table(["file", "bytes"], [[name, f"{len(content):,}"] for name, content in sorted(files.items())])
     described = [_described(f"results/{path.name}", datasets.read_any(path)) for path in sorted(results.glob("*.nc"))]
     described.append(_described("scenes/states.nc", scene_states.states(list(scenes().values()))))
-    return "\n\n".join([f"# {NAME}", words, "## Files", listed, "## Datasets", *described]) + "\n"
+    return "\n\n".join([f"# {NAME}", words.strip(), "## Files", listed, "## Datasets", *described]) + "\n"
 
 
 def _described(name: str, data: xr.Dataset | xr.DataTree) -> str:

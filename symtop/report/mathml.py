@@ -15,7 +15,8 @@ import re
 from symtop.base.validate import SymtopError
 
 GREEK = {
-    "alpha": "α", "beta": "β", "delta": "δ", "theta": "θ", "phi": "φ", "psi": "ψ", "tau": "τ", "omega": "ω", "Omega": "Ω",
+    "alpha": "α", "beta": "β", "delta": "δ", "theta": "θ", "phi": "φ", "psi": "ψ", "tau": "τ",
+    "omega": "ω", "Omega": "Ω",
 }  # fmt: skip
 UPRIGHT = {"sin", "cos", "sn", "asin", "atan2", "max", "min"}
 SIGNS = {"-": "−", "<=": "≤", "<": "&lt;", ">": "&gt;"}

@@ -45,6 +45,47 @@ class Part(NamedTuple):
     blocks: Sequence[Block]
 
 
+TOP = (
+    Block(
+        "A rigid body turns about a fixed point on its axis of symmetry. I1 and I3 are its moments of inertia about "
+        "that point, across and along the axis; mgl is its weight times the distance of its centre of gravity. Euler's "
+        "angles, z-x-z, are phi (precession), theta (the inclination of the axis from the upward vertical) and psi "
+        "(spin). The Lagrangian is"
+    ),
+    Block(formula="L = I1/2 (theta'^2 + phi'^2 sin^2 theta) + I3/2 (psi' + phi' cos theta)^2 - mgl cos theta"),
+    Block("It does not depend on phi and psi. Their momenta are therefore conserved:"),
+    Block(formula="p_psi = I3 (psi' + phi' cos theta),   p_phi = I1 phi' sin^2 theta + p_psi cos theta"),
+    Block("The inclination moves like a particle in an effective potential, and its oscillation is the nutation:"),
+    Block(formula="I1 theta'' = -dV/dtheta,   V = (p_phi - p_psi cos theta)^2/(2 I1 sin^2 theta) + mgl cos theta"),
+    Block(
+        "Methods [angles] integrate these angles. Methods [axis] integrate the direction e of the axis and the angular "
+        "momentum J in space, with k the upward vertical:"
+    ),
+    Block(formula="e' = (J x e)/I1,   J' = mgl k x e"),
+    Block("Methods [attitude] integrate J and the quaternion q that turns the body into space:"),
+    Block(formula="q' = 1/2 omega q,   omega = J/I1 + (1/I3 - 1/I1) p_psi e"),
+)
+ENERGY = (
+    "difference of the energies over E0 - min V, the energy of the nutation: that of the start above the steady "
+    "precession with the same momenta, without the spin"
+)
+ERRORS = {  # what is measured, and its unit
+    "axis": ("angle between the axis e and the true axis r: atan2(|e x r|, e.r)", "rad"),
+    "attitude": ("angle of the smallest rotation from the true quaternion r to q: 4 asin(|q - r|/2), r or -r", "rad"),
+    "theta": ("difference of the inclinations", "rad"),
+    "energy": (ENERGY, "1"),
+    "p_phi, p_psi": ("difference of the momenta over the larger of |p_phi| and |p_psi|", "1"),
+}
+SAMPLED = (
+    "The error of a run is the largest of its samples, which are not commensurate with the nutation, unless a table "
+    "says otherwise. A step is quoted in time or as steps a nutation; a tolerance is relative."
+)
+EXACT = (
+    "The truth is the exact motion in elliptic functions. With u = cos theta between its turning points u1 and u2, and "
+    "u3 the third root of the cubic that u' squared is,"
+)
+
+
 def glossary(text: str) -> list[tuple[str, str]]:
     """The terms and methods that a text names, each with a line on what it is, terms first."""
     terms = [(term, words) for term, words in TERMS.items() if re.search(rf"(?<!\w){re.escape(term)}", text)]
@@ -58,30 +99,11 @@ def parts() -> list[Part]:
     catalogue = list(scenes().values())
     bounds = {scene.name: _bound(scene) for scene in catalogue}
     return [
-        Part("top", "The top and its equations", _top()),
+        Part("top", "The top and its equations", TOP),
         Part("scenes", "The scenes", _scenes(catalogue, bounds)),
         Part("errors", "What an error is", _errors()),
         Part("reference", "What the truth is", _truth(max(bounds.values()))),
     ]
-
-
-def _top() -> list[Block]:
-    return [
-        Block("A rigid body turns about a fixed point on its axis of symmetry. I1 and I3 are its moments of inertia about "
-              "that point, across and along the axis; mgl is its weight times the distance of its centre of gravity. "
-              "Euler's angles, z-x-z, are phi (precession), theta (the inclination of the axis from the vertical) and "
-              "psi (spin). The Lagrangian is"),
-        Block(formula="L = I1/2 (theta'^2 + phi'^2 sin^2 theta) + I3/2 (psi' + phi' cos theta)^2 - mgl cos theta"),
-        Block("It does not depend on phi and psi. Their momenta are therefore conserved:"),
-        Block(formula="p_psi = I3 (psi' + phi' cos theta),   p_phi = I1 phi' sin^2 theta + p_psi cos theta"),
-        Block("The inclination moves like a particle in an effective potential, and its oscillation is the nutation:"),
-        Block(formula="I1 theta'' = -dV/dtheta,   V = (p_phi - p_psi cos theta)^2/(2 I1 sin^2 theta) + mgl cos theta"),
-        Block("Methods [angles] integrate these angles. Methods [axis] integrate the direction of the axis e and the "
-              "angular momentum J in space, with k the vertical:"),
-        Block(formula="e' = (J x e)/I1,   J' = mgl k x e"),
-        Block("Methods [attitude] integrate J and the quaternion q that turns the body into space:"),
-        Block(formula="q' = 1/2 omega q,   omega = J/I1 + (1/I3 - 1/I1) p_psi e"),
-    ]  # fmt: skip
 
 
 def _scenes(catalogue: Sequence[Scene], bounds: dict[str, float]) -> list[Block]:
@@ -106,38 +128,22 @@ def _scenes(catalogue: Sequence[Scene], bounds: dict[str, float]) -> list[Block]
 
 
 def _errors() -> list[Block]:
-    header = ["error", "what is measured", "unit"]
-    rows = [
-        ["axis", "angle between the axis e and the true axis r: atan2(|e x r|, e.r)", "rad"],
-        ["attitude", "angle of the smallest rotation between the quaternion q and the true one r, with the nearer sign "
-         "of r: 4 asin(|q - r|/2)", "rad"],
-        ["theta", "difference of the inclinations", "rad"],
-        ["energy", "difference of the energies over E0 - min V, the energy of the nutation: that of the start above the "
-         "steady precession with the same momenta. The spin is not in it", "1"],
-        ["p_phi, p_psi", "difference of the momenta over the larger of |p_phi| and |p_psi|", "1"],
-    ]  # fmt: skip
-    words = (
-        "The error of a run is the largest of its samples, which are not commensurate with the nutation, unless a table "
-        "says otherwise. A step is quoted in time or as steps a nutation; a tolerance is relative."
-    )
-    return [Block(words), Block(title="Errors", header=header, rows=rows)]
+    rows = [[name, words, unit] for name, (words, unit) in ERRORS.items()]
+    return [Block(SAMPLED), Block(title="Errors", header=["error", "what is measured", "unit"], rows=rows)]
 
 
 def _truth(largest: float) -> list[Block]:
-    return [
-        Block("The truth is the exact motion in elliptic functions. With u = cos theta between its turning points u1 "
-              "and u2, and u3 the third root of the cubic that u' squared is,"),
-        Block(formula="u = u1 + (u2 - u1) sn^2(tau),   tau = tau_0 + Omega t,   Omega^2 = mgl (u3 - u1)/(2 I1)"),
-        Block("phi and psi are integrals of the third kind. Nothing is integrated step by step, so that the error does "
-              "not grow with the number of steps. Each value has a bound: the rounding of the evaluation and the error "
-              "of the two rates times the time. At the ends of the horizons above the bound of the axis is at most "
-              f"{largest:.1e} rad, {largest / EPSILON:.0f} units of rounding. `symtop.reference` gives values and "
-              "bounds at any time."),
-    ]  # fmt: skip
+    words = (
+        "phi and psi are integrals of the third kind. Nothing is integrated step by step, so that the error does not "
+        "grow with the number of steps. Each value has a bound: the rounding of the evaluation and the error of the "
+        "two rates times the time. At the ends of the horizons above the bound of the axis is at most "
+        f"{largest:.1e} rad, {largest / EPSILON:.0f} units of rounding. `symtop.reference` gives values and bounds at "
+        "any time."
+    )
+    formula = "u = u1 + (u2 - u1) sn^2(tau),   tau = tau_0 + Omega t,   Omega^2 = mgl (u3 - u1)/(2 I1)"
+    return [Block(EXACT), Block(formula=formula), Block(words)]
 
 
 def _bound(scene: Scene) -> float:
     """The bound of the true axis at the end of a scene, in radians."""
     return float(reference(scene, np.array([scene.horizon]))["axis_error_bound"].values[0])
-
-

@@ -8,6 +8,7 @@ page asks for nothing but its figures; with `embed` they are in it, for sending 
 
 import base64
 import datetime
+import itertools
 import json
 import math
 import re
@@ -34,6 +35,7 @@ ROWS = (
 )
 KINDS = {".png": "image/png", ".gif": "image/gif"}
 LONGEST_ANCHOR = 60  # letters
+
 
 def prepared(chart: Mapping[str, Any]) -> str:
     """JSON of a chart of the findings, safe inside a script element, without points that a log axis cannot show."""
@@ -70,7 +72,8 @@ class Anchors:
     def __call__(self, *words: str) -> str:
         """A name made of words; it differs from all that were given before."""
         name = re.sub(r"[^a-z0-9_]+", "-", " ".join(words).lower()).strip("-")[:LONGEST_ANCHOR].rstrip("-")
-        free = next(one for k in range(len(self.given) + 1) if (one := f"{name}-{k + 1}" if k else name) not in self.given)
+        later = (f"{name}-{count}" for count in itertools.count(2))
+        free = next(one for one in itertools.chain([name], later) if one not in self.given)
         self.given.add(free)
         return free
 
@@ -91,7 +94,8 @@ def gather(results: Path, *, embed: bool = False) -> list[dict[str, Any]]:
             continue
         try:
             for picture in findings["pictures"]:
-                picture |= _shown(results / "figures" / picture["file"], embed=embed) | {"lead": picture.get("lead", "")}
+                picture.update(_shown(results / "figures" / picture["file"], embed=embed))
+                picture.setdefault("lead", "")
             for chart in findings["charts"]:
                 chart["prepared"] = prepared(chart)
         except (OSError, KeyError, TypeError) as error:
