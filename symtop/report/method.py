@@ -88,7 +88,8 @@ EXACT = (
 
 def glossary(text: str) -> list[tuple[str, str]]:
     """The terms and methods that a text names, each with a line on what it is, terms first."""
-    terms = [(term, words) for term, words in TERMS.items() if re.search(rf"(?<!\w){re.escape(term)}", text)]
+    terms = [(term, words) for term, words in TERMS.items() if re.search(rf"(?<![\w[]){re.escape(term)}", text)
+             or (term.startswith("[") and term in text)]  # fmt: skip
     known = integrators()
     named = re.compile(rf"(?<![\w-])({'|'.join(sorted(map(re.escape, known), key=len, reverse=True))})(?![\w-])")
     return terms + [(name, known[name].summary) for name in dict.fromkeys(named.findall(text))]

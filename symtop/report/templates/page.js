@@ -23,20 +23,27 @@
   narrow.addEventListener("change", folded);
   folded();
   contents.addEventListener("click", (event) => { if (event.target.closest("a") && narrow.matches) contents.open = false; });
-  const here = (id) => {
-    for (const [name, link] of links) {
-      if (name !== id) { link.removeAttribute("aria-current"); continue; }
-      link.setAttribute("aria-current", "location");
-      const list = contents.parentElement; // moved by hand: scrollIntoView would also move the page
-      const [top, bottom] = [link.offsetTop - list.offsetTop, link.offsetTop - list.offsetTop + link.offsetHeight];
-      if (top < list.scrollTop || bottom > list.scrollTop + list.clientHeight) list.scrollTop = top - 0.4 * list.clientHeight;
-    }
+  const sections = [...document.querySelectorAll("main > section")].filter((section) => links.has(section.id));
+  let current = "";
+  const follow = () => {
+    const read = sections.filter((section) => section.getBoundingClientRect().top < 0.25 * innerHeight);
+    const ended = innerHeight + scrollY >= root.scrollHeight - 2;
+    const id = (ended ? sections.at(-1) : read.at(-1) ?? sections[0]).id;
+    if (id === current) return;
+    links.get(current)?.removeAttribute("aria-current");
+    const link = links.get(current = id), list = contents.parentElement;
+    link.setAttribute("aria-current", "location");
+    const top = link.offsetTop - list.offsetTop; // scrollIntoView would also move the page
+    if (top < list.scrollTop || top + link.offsetHeight > list.scrollTop + list.clientHeight) list.scrollTop = top - 0.4 * list.clientHeight;
   };
-  const band = new IntersectionObserver(
-    (entries) => { for (const entry of entries) if (entry.isIntersecting) here(entry.target.id); },
-    { rootMargin: "-15% 0px -80% 0px" },
-  );
-  for (const section of document.querySelectorAll("main > section")) if (links.has(section.id)) band.observe(section);
+  let waiting = false;
+  const soon = () => {
+    if (!waiting) requestAnimationFrame(() => { waiting = false; follow(); });
+    waiting = true;
+  };
+  addEventListener("scroll", soon, { passive: true });
+  addEventListener("resize", soon);
+  follow();
 
   // A link into a fold opens it.
   const unfold = () => {
