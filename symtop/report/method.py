@@ -108,24 +108,26 @@ def parts() -> list[Part]:
 
 
 def _scenes(catalogue: Sequence[Scene], bounds: dict[str, float]) -> list[Block]:
-    header = [
-        "scene", "I1", "I3", "mgl", "theta", "phi", "psi", "theta'", "phi'", "psi'", "nutation period", "horizon",
-        "bound of the truth (rad)", "what it is for",
-    ]  # fmt: skip
-    rows = []
+    what = ["scene", "what it is for", "nutation period", "horizon", "bound of the truth (rad)"]
+    problem = ["scene", "I1", "I3", "mgl", "theta", "phi", "psi", "theta'", "phi'", "psi'"]
+    uses, starts = [], []
     for scene in catalogue:
-        top, start = scene.top, scene.start
-        numbers = (top.I1, top.I3, top.mgl, start.theta, start.phi, start.psi,
-                   start.theta_dot, start.phi_dot, start.psi_dot)  # fmt: skip
         period = f"{scene.nutation_period:.9g}" if math.isfinite(scene.nutation_period) else "infinite"
-        ends = [period, f"{scene.horizon:.6g}", f"{bounds[scene.name]:.1e}", scene.purpose]
-        rows.append([scene.name, *(f"{number!r}".removesuffix(".0") for number in numbers), *ends])
+        uses.append([scene.name, scene.purpose, period, f"{scene.horizon:.6g}", f"{bounds[scene.name]:.1e}"])
+        top, at = scene.top, scene.start
+        numbers = (top.I1, top.I3, top.mgl, at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot)
+        starts.append([scene.name, *(repr(number).removesuffix(".0") for number in numbers)])
     units = ", ".join(scene.name for scene in catalogue if scene.units == "SI")
     words = (
-        "A scene is a top, a start and a horizon. Numbers are to be read as the nearest double; angles are in radians. "
-        "Times are in any unit that fits I1, I3 and mgl" + (f", and in seconds on {units}." if units else ".")
+        "A scene is a top, a start and a horizon. Times are in any unit that fits I1, I3 and mgl"
+        + (f", and in seconds on {units}" if units else "")
+        + ". Angles are in radians, and every number below is to be read as the nearest double."
     )
-    return [Block(words), Block(title="Scenes", header=header, rows=rows)]
+    return [
+        Block(words),
+        Block(title="Scenes", header=what, rows=uses),
+        Block(title="Tops and starts", header=problem, rows=starts),
+    ]
 
 
 def _errors() -> list[Block]:
