@@ -7,6 +7,7 @@
 # make bench           time the kernels against C    make peers      run the same tops in other libraries
 # make engines         run physics engines against their maps
 # make clean           delete .venv, caches and what studies stored
+# make archive         bundle the results for a repository of data, into results/
 # make snapshot        copy the report and its figures to docs/snapshot, which the repository holds
 # Each target makes .venv first if it is missing or out of date.
 
@@ -19,10 +20,10 @@ ENGINES := benchmarks/engines/.venv
 OLDER := benchmarks/engines/.venv-mujoco-3
 
 .DEFAULT_GOAL := help
-.PHONY: help setup studies quick report check-results test test-all lint bench peers engines docs snapshot clean
+.PHONY: help setup studies quick report check-results test test-all lint bench peers engines docs snapshot archive clean
 
 help:
-	@sed -n '1,11s/^# //p' Makefile
+	@sed -n '1,12s/^# //p' Makefile
 
 setup: $(READY)
 
@@ -65,6 +66,9 @@ lint: $(READY)
 
 snapshot: $(READY)
 	@$(BIN)/python docs/generator/snapshot.py
+
+archive: $(READY)
+	@$(BIN)/symtop archive
 
 docs: $(DOCS)
 	@echo "symtop: building the site (half a minute); a warning is an error"

@@ -183,6 +183,23 @@ class Browser:
         """Click on an element."""
         self.evaluate(f"document.querySelector({selector!r}).click()")
 
+    def prefer(self, scheme: str) -> None:
+        """Have the system ask for colours that are "light" or "dark", or take the request back with ""."""
+        self._send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+
+    def press(self, key: str) -> None:
+        """Press a key that writes nothing, such as "Tab" or "ArrowRight", as a reader's hand would."""
+        code = {"Tab": 9, "Enter": 13, "Escape": 27, "ArrowLeft": 37, "ArrowRight": 39}[key]
+        text = {"text": "\r"} if key == "Enter" else {}
+        for kind in ("keyDown", "keyUp"):
+            self._send("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code, **text)
+
+    def pdf(self, path: Path) -> Path:
+        """Print the page."""
+        found = self._send("Page.printToPDF", printBackground=False, preferCSSPageSize=True)
+        path.write_bytes(base64.b64decode(found["data"]))
+        return path
+
     def drag(self, selector: str, right: float, down: float) -> None:
         """Press the mouse in the middle of an element, move it, and let go."""
         box = self.evaluate(f"document.querySelector({selector!r}).getBoundingClientRect().toJSON()")

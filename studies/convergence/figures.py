@@ -101,7 +101,7 @@ def _named(data: xr.Dataset) -> Picture:
         f"below {TARGET:g} the cheapest run of each takes: {listed}. Grey band: below the error bound of the reference."
     )
     alt = "Four log-log plots of the five named methods: error against step, tolerance and work, energy over time."
-    return Picture("named-methods", figure, caption, alt)
+    return Picture("named-methods", figure, caption, alt, lead="Five well-known methods")
 
 
 def _history(axis: Any, name: str, label: str, cell: xr.Dataset) -> None:

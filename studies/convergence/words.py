@@ -63,8 +63,8 @@ def verdict(data: xr.Dataset) -> list[str]:
         by_word.setdefault(word, []).append(f"{name} on {scene}{why}")
     confirmed = len(by_word.get("confirmed", []))
     share = (
-        f"{confirmed} of {len(results)} pairs of method[chart] and scene show the order that the method declares, by "
-        f"the rule of the claims table: the 95 % interval of the slope at h = 0, widened by {BESIDE:g}, holds it."
+        f"{confirmed} of {len(results)} pairs of method[chart] and scene show the order that the method declares: the "
+        f"95 % interval of the slope at h = 0, widened by {BESIDE:g} on either side, contains it."
     )
     sentences = [share]
     if "refuted" in by_word:

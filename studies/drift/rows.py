@@ -31,7 +31,7 @@ def setting(histories: xr.Dataset) -> str:
     own, common = _tolerances(histories)
     tolerance = f"tolerance {' or '.join(map('{:.0e}'.format, sorted(set(common.values()))))} ({', '.join(common)})"
     parts = " or ".join(filter(None, [step, tolerance if common else ""]))
-    text = f"Held fixed: the start and the horizon, {most:.0f} nutations of {scenes}; {parts}."
+    text = f"All runs have the same start and length, {most:.0f} nutations of {scenes}, and {parts}."
     if own:
         listed = ", ".join(f"{name} {value:.1e}" for name, value in own.items())
         text += f" At the default tolerance, which is the rounding of the arithmetic: {listed}."

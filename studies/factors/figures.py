@@ -91,6 +91,7 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
         "hides the method. Below, it becomes bare at once: the ratios differ, the product does not. "
         f" Noise (median over least sample) is at most {noise:.0%}.",
         "Horizontal bars on a logarithmic axis of time, each beginning where the one above ends.",
+        lead="Where the speed comes from",
     )
 
 

@@ -167,7 +167,7 @@ def noise_sentence(data: xr.Dataset) -> str:
     spread = data[Column.SPREAD].values[np.isfinite(data[Column.SPREAD].values)]
     loud = int(np.sum(spread > NOISY))
     warning = f" {loud} of {spread.size} are above {NOISY:.0%}: measure again on a quiet machine." if loud else ""
-    return f"Noise of a time, the median over the least sample: {np.median(spread):.0%} in the middle.{warning}"
+    return f"The median sample of a time is {np.median(spread):.0%} above its least, for the median time.{warning}"
 
 
 def verdict(data: xr.Dataset) -> list[str]:

@@ -93,6 +93,6 @@ def _later(data: xr.Dataset, scene: str, names: list[str]) -> str:
         f"Up to t = {last:g} their largest error grows by {max(grown, default=0.0):.0%}, and that of "
         f"{split_name(SOLVER)[0]} to {_at(data, scene, SOLVER, last):.0e}"
     )
-    parts = [f"the hope comes true from t = {', '.join(true)} on"] if true else []
-    parts += [f"it does not come true with {', '.join(never)}"] if never else []
-    return f"{level}: {'; '.join(parts)}." if parts else ""
+    parts = [f"their error is the smaller one from t = {', '.join(true)} on"] if true else []
+    parts += [f"with {', '.join(never)} it never is"] if never else []
+    return f"{level}; {'; '.join(parts)}." if parts else ""

@@ -269,11 +269,13 @@ def draw_silent(data: xr.DataTree) -> Picture:
         "silent",
         figure,
         f"Left: the share of runs whose axis is off by more than {WRONG:g} rad, against the steps a nutation. "
-        "Right: of these, the share that nothing warns of: they end ok and keep the energy of the nutation and both "
-        f"momenta to {KEPT:.0%}, drawn where at least 1 % of runs are wrong. Rows, method[chart], with a fixed step; "
-        f"grey: all others. {words.span(data, 'short')}, no named scene. {words.silent_sentence(data)} A conserved "
+        "Right: of these, the share that nothing warns of: they end without an error and keep the energy of the "
+        f"nutation and both momenta to {KEPT:.0%}, drawn where at least 1 % of runs are wrong. Rows, method[chart], "
+        f"with a fixed step; grey: all others. {words.span(data, 'short')}, no named scene. "
+        f"{words.silent_sentence(data)} A conserved "
         "energy is no sign of a right answer.",
         "Two panels of shares against steps a nutation: wrong runs, and wrong runs without any sign.",
+        lead="How often a run is wrong without a sign",
     )
 
 

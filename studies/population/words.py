@@ -43,6 +43,10 @@ HOW_TO_READ = (
     + "."
 )
 
+ANOTHER_SHARE = (
+    "(The maps of the study stability count another share: of all inaccurate runs, those that end without an error, "
+    "whether or not they keep the energy.)"
+)
 STANDINGS = [
     "nutations", "quantity", "target", "row", "solved", "slowdown, median", "10 %", "90 %", "wins", "95 % interval",
     "level with the cheapest",
@@ -87,10 +91,10 @@ def winner_sentence(data: xr.DataTree, cell: Cell, unit: str = UNIT) -> str:
         return ""
     name, following = taken.names[won.row], taken.names[won.next_row]
     standing = next(one for one in verdicts.standings(taken) if one.name == name)
-    sure = "" if won.sure else ", which may be chance or noise of the times"
+    sure = "" if won.sure else ", a lead that may be chance or noise of the times"
     return (
-        f"{cell.target:.0e}: {name} on {percent(won.share)} ({interval(won.share)}), median slowdown "
-        f"{ratio(standing.slowdown[1])} on all, before {following} on {percent(won.next_share)}{sure}"
+        f"{cell.target:.0e}: {name} on {percent(won.share)} ({interval(won.share)}), with a median slowdown of "
+        f"{ratio(standing.slowdown[1])} over all tops, then {following} on {percent(won.next_share)}{sure}"
     )
 
 
@@ -99,7 +103,8 @@ def verdict_of(data: xr.DataTree, horizon: str, quantity: str) -> str:
     each = [winner_sentence(data, Cell(horizon, quantity, target)) for target in verdicts.targets(data)]
     said = "; ".join(filter(None, each))
     return (
-        f"{span(data, horizon)}, error of the {quantity}, in {UNITS[UNIT]}: cheapest beyond ties for {said}."
+        f"The cheapest row for an error of the {quantity}, ties left out, and the share of tops on which it is, among "
+        f"{span(data, horizon)} (cost in {UNITS[UNIT]}): {said}."
         if said
         else ""
     )
@@ -123,11 +128,13 @@ def strata_sentence(data: xr.DataTree, horizon: str = "short") -> str:
     total = sum(owners.values())
     most = ", ".join(f"{name} ({count})" for name, count in owners.most_common(4))
     differ = (
-        f" Surely another than on all tops: {'; '.join(others)}." if others else " No stratum surely wants another."
+        f" Kinds of tops whose winner differs from that of all tops, beyond doubt: {'; '.join(others)}."
+        if others
+        else " No kind of tops has, beyond doubt, another winner than all tops together."
     )
     return (
-        f"By stratum and target, {len(owners)} rows win the {total} cells of the axis over "
-        f"{verdicts.nutations(data, horizon):g} nutations, most often {most}.{differ}"
+        f"The tops are of {len(verdicts.strata(data))} kinds (strata). Over {verdicts.nutations(data, horizon):g} "
+        f"nutations, {len(owners)} rows win the {total} pairs of a kind and an axis error, most often {most}.{differ}"
     )
 
 
@@ -156,7 +163,7 @@ def silent_message(data: xr.DataTree) -> str:
 
 
 def silent_sentence(data: xr.DataTree) -> str:
-    """How many wrong runs nothing warns of, over all rows and for the median row."""
+    """How many wrong runs nothing warns of, over all rows and among small steps."""
     each = [verdicts.health(data, name) for name in verdicts.judged_rows(data)]
     wrong, silent = sum(one.wrong.sum() for one in each), sum(one.silent.sum() for one in each)
     fine = [
@@ -164,11 +171,20 @@ def silent_sentence(data: xr.DataTree) -> str:
     ]
     hidden = sum(part for _, part in fine) / max(sum(part for part, _ in fine), 1)
     return (
-        f"Silent failures: of all {wrong:,.0f} wrong runs (axis off by more than {WRONG:g} rad after "
-        f"{verdicts.nutations(data, 'short'):g} nutations), {silent / max(wrong, 1):.0%} end ok and keep energy and "
-        f"momenta to {KEPT:.0%}; of those with at least {FINE:g} steps a nutation, {hidden:.0%}. (The maps of the "
-        "study stability count another share: of all inaccurate runs, those that end without an error, whether or not "
-        "they keep the energy.)"
+        f"Of {wrong:,.0f} wrong runs, with the axis off by more than {WRONG:g} rad after "
+        f"{verdicts.nutations(data, 'short'):g} nutations, {silent / max(wrong, 1):.0%} give no sign of it: they end "
+        f"without an error and keep energy and momenta to {KEPT:.0%}. Among those with at least {FINE:g} steps a "
+        f"nutation it is {hidden:.0%}."
+    )
+
+
+def warning_sentence(data: xr.DataTree) -> str:
+    """How often the guard warns over the short horizon, of wrong runs and of right ones."""
+    hits, alarms = verdicts.caught(data, "short")
+    return (
+        f"Before a run, the guard tries the method on two nutations. It warned of {percent(hits)} of {hits.total:,} "
+        f"runs that would be wrong, and of {percent(alarms)} of {alarms.total:,} that would be right "
+        f"({verdicts.nutations(data, 'short'):g} nutations)."
     )
 
 
@@ -205,7 +221,7 @@ def sentences(data: xr.DataTree) -> list[str]:
     return [
         *filter(None, each),
         strata_sentence(data),
-        silent_sentence(data),
+        f"{silent_sentence(data)} {ANOTHER_SHARE}",
         guard_sentence(data),
         effort_sentence(data),
     ]

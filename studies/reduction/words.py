@@ -63,8 +63,8 @@ def commuting_message(data: xr.Dataset) -> str:
     same = [method for method, gap in largest.items() if gap < COMMUTES]
     rest = [method for method in largest if method not in same]
     return (
-        f"Reducing first or last is the same for {', '.join(same) or 'no rule'}, and another method for "
-        f"{', '.join(rest) or 'none'}"
+        f"Eliminating phi and psi before or after discretising makes the same method for {', '.join(same) or 'no rule'}"
+        f", and different ones for {', '.join(rest) or 'none'}"
     )
 
 

@@ -53,8 +53,8 @@ def _separatrix(part: xr.Dataset) -> str:
     good = np.isfinite(time) & np.isfinite(predicted) & (early > EARLY[0]) & (early < EARLY[1])
     gap = float(np.median(np.abs(time - predicted)[good])) if good.any() else np.nan
     return (
-        f"Next to the separatrix the error at {SEEN:g}/g foretells when it reaches {LOST:g} rad, to {gap:.2f}/g in the "
-        "median"
+        f"Next to the separatrix the error at time {SEEN:g}/g predicts when it reaches {LOST:g} rad; the median miss "
+        f"is {gap:.2f}/g"
     )
 
 

@@ -171,9 +171,10 @@ def horizons(part: xr.Dataset) -> str:
     if not gap.size:
         return ""
     text = (
-        "Next to the separatrix (the motion that rises towards the upright for ever, on a scale of 1/g = sqrt(I1/mgl)) "
-        f"{gap.size} runs reach an axis error of {LOST:g} rad within {np.max(gap):.1f}/g of the time that their error "
-        f"at {SEEN:g}/g predicts (median {np.median(gap):.2f}/g); the longest takes {np.max(horizon[good]):.0f}/g."
+        "The separatrix is the motion that rises towards the upright for ever; its time scale is 1/g = sqrt(I1/mgl). "
+        f"Next to it errors grow as exp(g t/2). From the error at time {SEEN:g}/g this predicts when {gap.size} runs "
+        f"reach an axis error of {LOST:g} rad; the median miss is {np.median(gap):.2f}/g, the largest "
+        f"{np.max(gap):.1f}/g, and the longest run takes {np.max(horizon[good]):.0f}/g."
     )
     if np.isfinite(horizon[conserving]).any():
         least = np.nanmin(horizon[conserving])

@@ -18,7 +18,8 @@ from symtop.methods.registry import split_name
 
 CHARTS = {"axis": "the axis and the angular momentum (e, L)", "angles": "Euler angles"}
 CLASSIC = ("rk4", "rk45-compiled", "taylor")  # compared in each chart that they have
-KINDS = ("at all common run times", "at short ones only", "at long ones only", "back and forth", "at none")
+KINDS = ("at every run time", "at short run times only", "at long run times only", "in turns", "at none")
+MOST_NAMES = 4  # of a list of rows in a sentence; the others are counted
 STEPS = 118.0  # a nutation, of the comparison at equal steps
 
 
@@ -128,26 +129,34 @@ def sentence(data: xr.Dataset, chart: str) -> str:
         always = [name for name, listed in compared.items() if listed and all(one.share == 1.0 for one in listed)]
         never = [name for name, listed in compared.items() if listed and all(one.share == 0.0 for one in listed)]
         counts = Counter(
-            "at all common run times" if one.share == 1.0
+            "at every run time" if one.share == 1.0
             else "at none" if one.share == 0.0
-            else "at short ones only" if one.at_least and not one.at_most
-            else "at long ones only" if one.at_most and not one.at_least
-            else "back and forth"
+            else "at short run times only" if one.at_least and not one.at_most
+            else "at long run times only" if one.at_most and not one.at_least
+            else "in turns"
             for one in pairs
         )  # fmt: skip
         text = (
-            f"Of {len(pairs)} pairs of a structure-preserving method and a scene, its energy error is smaller than "
-            f"that of {classic} " + ", ".join(f"{kind} in {counts[kind]}" for kind in KINDS) + "."
+            f"Structure-preserving rows have less energy error than {classic} "
+            + ", ".join(f"{kind} in {counts[kind]}" for kind in KINDS)
+            + f" of {len(pairs)} pairs of a row and a scene."
         )
-        text += f" On every scene and at all run times: {', '.join(always)}." if always else ""
-        text += f" On no scene: {', '.join(never)}." if never else ""
+        text += f" Always less: {_listed(always)}." if always else ""
+        text += f" Never less: {_listed(never)}." if never else ""
         said.append(text)
     horizon = f"{float(data['horizon'].values[-1]):g}"
     if not said:
         return ""
-    return f"Energy over {horizon} nutation periods in the chart of {CHARTS[chart]}, compared at equal run time. " + (
-        " ".join(said)
+    return (
+        f"Energy over {horizon} nutation periods in {CHARTS[chart]}, at equal run times that both rows have: "
+        f"{' '.join(said)}"
     )
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names in a sentence; of a long list the first, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
 
 
 def message(data: xr.Dataset, chart: str) -> str:

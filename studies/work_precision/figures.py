@@ -92,10 +92,10 @@ def _fronts(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     _name_lines(axes[0], data.isel(scene=0, horizon=far), shown, "axis", cost)
     timed = (
         " A run is shown if it was timed, as its row's cheapest for some target or for the comparison of energies; all "
-        "times are measured. Held fixed: the scene, the horizon, and the call, of the compiled loop alone. Dotted: the "
+        "times are measured. All rows have the scene, the horizon and the call, of the bare compiled loop. Dotted: the "
         "closed form, `exact`, which is not ranked. A call takes some ten microseconds by itself, where curves bend."
         if cost == "seconds"
-        else " Held fixed: the scene and the horizon. A high derivative, a kick and a stage take different times."
+        else " All rows have the same scene and horizon. A high derivative, a kick and a stage take different times."
     )
     return Picture(
         name,

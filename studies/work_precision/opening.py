@@ -40,10 +40,10 @@ def opening(data: xr.Dataset) -> Opening:
         (first, times), *others = ahead.most_common()
         listed = "; " + ", ".join(f"{name} for {count}" for name, count in others) if others else ""
         sentences.append(
-            f"For the direction of the axis, begin with {first}: of the rows, a method in a chart, that meet the error "
-            f"on the most scenes it is closest to the fastest for {times} of {len(rows)} pairs of horizon and "
-            f"accuracy{listed}. Held fixed: the call of the compiled loop; chosen: each row's step or tolerance."
-            f"{not_asked(data)}"
+            f"For the direction of the axis, begin with {first}. It is the first choice in {times} of the {len(rows)} "
+            f"lines of the table{listed}. The first choice meets the error on the most scenes and takes, of the rows "
+            "that do, the least time over the fastest. A row is a method in one chart, timed as the bare compiled "
+            f"loop, at the coarsest step or tolerance that meets the error.{not_asked(data)}"
         )
     steps = energy.at_equal_steps(data, COMPARED[:2], str(data["scene"].values[0]))
     sentences += [

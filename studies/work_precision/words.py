@@ -20,8 +20,8 @@ HOW_TO_READ = (
     "Choose the error that you accept on the vertical axis: the first curve to the right of it is the fastest row. A "
     "row is a method in one chart: angles (Euler angles), axis (the axis e and the angular momentum L) or attitude (a "
     "quaternion and L). Every method is here in each chart that shows the axis, but not in that of the attitude where "
-    "it has the axis chart, because the attitude costs more for the same axis (see the reduction study). Held fixed "
-    "are the scene, the horizon, the machine and the call: the compiled loop from the start to the horizon, without "
+    "it has the axis chart, because the attitude costs more for the same axis (see the reduction study). All rows of "
+    "a panel have the same scene, horizon, machine and call: the compiled loop from the start to the horizon, without "
     "`simulate` around it. The settings of a row, steps or tolerances, were searched for, so that they just meet 1e-3, "
     "1e-6, 1e-9 and 1e-12 rad. A target is asked only where it is less than the width of the nutation: a motion "
     "without any nutation meets the others. A step may be as long as the method is accurate, up to 6 steps a run. No "
@@ -162,13 +162,13 @@ def times(data: xr.Dataset) -> str:
     return (
         f"{int(taken.notnull().sum())} of the {int((data['outcome'] == 'ok').sum())} runs that ended well were timed, "
         f"every one in at least {int(rounds.min())} rounds with the other rows of its scene; what is shown against "
-        f"seconds is these, {measured(data):.0%} of them measured. The median distance of a time from what the row's "
-        f"other times foretell is {float(miss.median()):.1%}; a time that misses that by {MISSED:.0%} was taken again, "
-        f"and {int((miss > MISSED).sum())} still do, whose leads must hold for the forecast too. "
-        f"{alone} of the times are noisy: no other sample comes to within {AGAIN:.0%} of the smallest, and no lead of "
-        "theirs, or over them, is called more than noise. Any other lead is, from a ratio of times of "
-        f"{min(margins):.2f} to {max(margins):.2f} on, by scene and horizon: 1 and twice the distance from the "
-        f"forecast within which nine of ten times lie, and at least {ranking.MARGIN:g}."
+        f"seconds is these, {measured(data):.0%} of them measured. As a check, each time was compared with the one "
+        f"predicted from the row's other times: the median difference is {float(miss.median()):.1%}. A time that "
+        f"differs by more than {MISSED:.0%} was taken again; {int((miss > MISSED).sum())} still differ, and a lead of "
+        f"theirs counts only if the predicted time has it too. {alone} times are noisy, without a second sample within "
+        f"{AGAIN:.0%} of the smallest, and no lead of theirs, or over them, counts. Any other lead counts if the ratio "
+        f"of the times is at least {min(margins):.2f} to {max(margins):.2f}, by scene and horizon: 1 plus twice the "
+        f"difference that nine of ten times stay within, and at least {ranking.MARGIN:g}."
     )
 
 

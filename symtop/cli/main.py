@@ -94,10 +94,11 @@ def study(
 
 
 @main.command(short_help="Gather the findings of all studies into one page.")
+@click.option("--embed", is_flag=True, help="Put the figures into the page, for sending it alone.")
 @results_option
 @plugin_option
-def report(results: str) -> None:
-    """Gather the findings of all studies into one self-contained page.
+def report(results: str, embed: bool) -> None:
+    """Gather the findings of all studies into one page beside its figures.
 
     If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``.
     """
@@ -107,4 +108,19 @@ def report(results: str) -> None:
     if not any(folder.glob("*.json")) and any((folder / "quick").glob("*.json")):
         warn(f"{folder} holds no findings; the report is made of those in {folder / 'quick'}")
         folder /= "quick"
-    click.echo(f"report: {page.write(folder)}")
+    click.echo(f"report: {page.write(folder, embed=embed)}")
+
+
+@main.command(short_help="Bundle all results for a repository of data.")
+@click.option("--output", type=click.Path(dir_okay=False), help="The zip to write; in the results folder by default.")
+@results_option
+@plugin_option
+def archive(results: str, output: str | None) -> None:
+    """Bundle datasets, findings and report with versions, machine, a description of every variable, and a test set.
+
+    The test set holds the states of all scenes at ten times to 30 digits, for checking other programs.
+    """
+    from symtop.report.archive import bundle
+
+    made = bundle(Path(results), None if output is None else Path(output))
+    click.echo(f"archive: {made} ({made.stat().st_size / 1e6:.1f} MB)")

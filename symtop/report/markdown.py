@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from symtop.report.method import Block, Part, glossary
+
 FEW = 14  # rows of a table that is shown at once; longer ones are folded
 
 
@@ -48,9 +50,29 @@ def opening(study: Mapping[str, Any], titles: Mapping[str, str]) -> str:
     if not first:
         return ""
     answer = "\n".join(f"- {sentence}" for sentence in first["sentences"])
-    parts = [f"## {first['question']}", answer, table(first["table"]["header"], first["table"]["rows"])]
+    words = "\n".join(f"- {name}: {meaning}" for name, meaning in glossary(spoken(study)))
+    parts = [f"## {first['question']}", answer, table(first["table"]["header"], first["table"]["rows"]), words]
     links = [f"[{words}](#{_anchor(titles[name])})" for name, words in explanations(study, titles)]
-    return "\n\n".join([*parts, f"More: {'; '.join(links)}."] if links else parts)
+    return "\n\n".join(filter(None, [*parts, f"More: {'; '.join(links)}."] if links else parts))
+
+
+def spoken(study: Mapping[str, Any]) -> str:
+    """All words of a study's answer, with those of its table."""
+    first = study["opening"]
+    cells = [*first["table"]["header"], *(cell for row in first["table"]["rows"] for cell in row)]
+    return " ".join([first["question"], *first["sentences"], *cells])
+
+
+def measured(parts: Sequence[Part]) -> str:
+    """How it was measured: the same words as on the page, formulas in plain text."""
+    said = [f"### {part.title}\n\n" + "\n\n".join(map(_block, part.blocks)) for part in parts]
+    return "\n\n".join(["## How it was measured", *said])
+
+
+def _block(block: Block) -> str:
+    if block.rows:
+        return table(block.header, block.rows)
+    return block.words or f"    {block.formula}"
 
 
 def explanations(study: Mapping[str, Any], titles: Mapping[str, str]) -> list[tuple[str, str]]:

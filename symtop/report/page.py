@@ -1,31 +1,40 @@
-"""The report: one self-contained page from the findings that the studies left in the results folder.
+"""The report: one page from the findings that the studies left in the results folder, beside its figures.
 
-A chart to point at is data for the page's script: each series with the look its integrator has in every figure.
+It opens with an answer: the first that a study declares (`Study.opening`), with a line on every method and term in it,
+and the pictures that studies want seen first (`Picture.lead`). How it was measured follows, then a section a question.
+A chart to point at is data for the page's script: each series with the look its integrator has in every figure. The
+page asks for nothing but its figures; with `embed` they are in it, for sending it alone.
 """
 
 import base64
 import datetime
+import itertools
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from symtop.base.validate import SymtopError
 from symtop.methods.registry import integrators, split_name
-from symtop.model.scenes import scenes
-from symtop.report import markdown
+from symtop.report import markdown, method
+from symtop.report.mathml import mathml
 from symtop.report.style import look
 from symtop.runner import run as runner, store
 
 TITLE = "Integrators on the heavy symmetric top"
 INTRODUCTION = (
-    "One rigid body, one exact solution, and every method measured against it: accuracy, conservation, cost and "
-    "failure. All numbers and sentences below are generated from the datasets beside this page. A row of a comparison "
-    "is a method in one chart: rk4[angles] integrates the Euler angles, rk4[axis] the axis and the angular momentum in "
-    "space, and an [attitude] row the rotation and the angular momentum. Markers of rows in angles are open, those of "
-    "rows in the axis chart full, those of the attitude chart half full."
+    "Every method is run on rigid bodies whose exact motion is known, and measured against it: accuracy, conservation, "
+    "cost and failure. All numbers and sentences are generated from the stored datasets."
 )
+ROWS = (
+    "rk4[angles] is the method rk4 integrating Euler's angles, rk4[axis] the same method integrating the axis and the "
+    "angular momentum, [attitude] the whole orientation and the angular momentum. In figures the markers of [angles] "
+    "are open, those of [axis] full, those of [attitude] half full."
+)
+KINDS = {".png": "image/png", ".gif": "image/gif"}
+LONGEST_ANCHOR = 60  # letters
 
 
 def prepared(chart: Mapping[str, Any]) -> str:
@@ -47,11 +56,34 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
     }
 
 
-def gather(results: Path) -> list[dict[str, Any]]:
+def _size(image: bytes) -> tuple[int, int]:
+    """Width and height of a PNG or a GIF in pixels, so that the page does not move while its figures load."""
+    if image.startswith(b"\x89PNG"):
+        return int.from_bytes(image[16:20]), int.from_bytes(image[20:24])
+    return int.from_bytes(image[6:8], "little"), int.from_bytes(image[8:10], "little")
+
+
+class Anchors:
+    """Names for the things on a page that a link may lead to, each given once."""
+
+    def __init__(self) -> None:
+        self.given: set[str] = set()
+
+    def __call__(self, *words: str) -> str:
+        """A name made of words; it differs from all that were given before."""
+        name = re.sub(r"[^a-z0-9_]+", "-", " ".join(words).lower()).strip("-")[:LONGEST_ANCHOR].rstrip("-")
+        later = (f"{name}-{count}" for count in itertools.count(2))
+        free = next(one for one in itertools.chain([name], later) if one not in self.given)
+        self.given.add(free)
+        return free
+
+
+def gather(results: Path, *, embed: bool = False) -> list[dict[str, Any]]:
     """The findings that are in the folder, with their pictures: of all studies, in order, then of `make` targets.
 
     A target of the Makefile (`make peers`, `make bench`) may leave findings in the form of a study's, as NAME.json.
     They stay as they are when the studies run again, so that their ``measured`` says when, where and with what.
+    Pictures are addresses beside the page, or the files themselves with `embed`.
     Raises SymtopError if findings are incomplete, or there are none.
     """
     studies, gathered = list(runner.names()), []
@@ -62,9 +94,8 @@ def gather(results: Path) -> list[dict[str, Any]]:
             continue
         try:
             for picture in findings["pictures"]:
-                file = results / "figures" / picture["file"]
-                code = base64.b64encode(file.read_bytes()).decode()
-                picture["data"] = f"data:image/{file.suffix[1:]};base64,{code}"
+                picture.update(_shown(results / "figures" / picture["file"], embed=embed))
+                picture.setdefault("lead", "")
             for chart in findings["charts"]:
                 chart["prepared"] = prepared(chart)
         except (OSError, KeyError, TypeError) as error:
@@ -81,34 +112,64 @@ def gather(results: Path) -> list[dict[str, Any]]:
     return gathered
 
 
-def write(results: Path) -> Path:
+def _shown(file: Path, *, embed: bool) -> dict[str, Any]:
+    """Address, width and height of a picture."""
+    image = file.read_bytes()
+    width, height = _size(image)
+    inside = f"data:{KINDS.get(file.suffix, 'image/png')};base64,{base64.b64encode(image).decode()}" if embed else ""
+    return {"source": inside or f"figures/{file.name}", "width": width, "height": height}
+
+
+def _named(studies: Sequence[dict[str, Any]]) -> None:
+    """Give every study, picture, chart and table an anchor."""
+    anchor = Anchors()
+    for name in ("answer", "measured", "integrators", "provenance", *(study["study"] for study in studies)):
+        anchor(name)
+    for study in studies:
+        for picture in study["pictures"]:
+            picture["id"] = anchor(Path(picture["file"]).stem)
+        for item in [*study["charts"], *study["tables"]]:
+            item["id"] = anchor(study["study"], item["title"])
+
+
+def write(results: Path, *, embed: bool = False) -> Path:
     """Write ``report.html``, and ``report.md`` with the same words, into the results folder; returns the page."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined
-    )
-    studies = gather(results)
+        loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    studies = gather(results, embed=embed)
+    _named(studies)
     titles = {study["study"]: study["title"] for study in studies}
     provenance = next((study for study in reversed(studies) if not study["measured"]), studies[-1])["provenance"]
     versions = json.loads(provenance["dependencies"])
     facts = {**provenance, "dependencies": ", ".join(f"{name} {version}" for name, version in versions.items())}
+    first = next((study for study in studies if study["opening"]), None)
     templates = Path(__file__).parent / "templates"
+    measured = method.parts()
     text = environment.get_template("report.html").render(
         title=TITLE,
         introduction=INTRODUCTION,
-        css=(templates / "style.css").read_text(encoding="utf-8"),
-        script=(templates / "chart.js").read_text(encoding="utf-8"),
+        rows=ROWS,
+        css="".join((templates / name).read_text(encoding="utf-8") for name in ("style.css", "report.css")),
+        scripts=[(templates / name).read_text(encoding="utf-8") for name in ("page.js", "chart.js")],
         studies=studies,
+        answer=first,
+        glossary=method.glossary(markdown.spoken(first)) if first else [],
+        leads=[(study, picture) for study in studies for picture in study["pictures"] if picture["lead"]],
+        measured=measured,
+        mathml=mathml,
         explanations=lambda study: markdown.explanations(study, titles),
         integrators=markdown.columns([method.record() for method in integrators().values()]),
-        scenes=markdown.columns([scene.record() for scene in scenes().values()]),
         provenance=facts,
         quick=any(study["quick"] for study in studies),
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
     target = results / "report.html"
     store.write_text(target, text)
-    opening = ["# " + TITLE, INTRODUCTION, *(markdown.opening(study, titles) for study in studies)]
+    opening = ["# " + TITLE, INTRODUCTION, *(markdown.opening(study, titles) for study in studies), ROWS]
+    opening.append(markdown.measured(measured))
     store.write_text(results / "report.md", markdown.page(studies, opening, facts))
     return target

@@ -214,4 +214,4 @@ def _save(results: Path, study: Study, picture: Picture, save: Save) -> dict[str
     suffix = getattr(picture.figure, "suffix", "png")  # a film is a GIF
     file = f"{study.name}-{label('name of a picture', picture.name)}.{suffix}"
     save(picture.figure, results / "figures" / file)
-    return {"name": picture.name, "file": file, "caption": picture.caption, "alt": picture.alt}
+    return {"file": file} | {key: getattr(picture, key) for key in ("name", "caption", "alt", "lead")}

@@ -22,12 +22,17 @@ Combined = xr.Dataset | xr.DataTree  # what a study measured: a tree if its case
 
 
 class Picture(NamedTuple):
-    """A figure of the report: its file name, caption and text for those who cannot see it."""
+    """A figure of the report: its file name, caption and text for those who cannot see it.
+
+    One with a `lead` opens the report: it is shown small on the first screen, in the order of the studies, under these
+    few words on what it answers.
+    """
 
     name: str
     figure: "Figure"
     caption: str
     alt: str
+    lead: str = ""
 
 
 class Series(NamedTuple):

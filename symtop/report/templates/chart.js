@@ -68,7 +68,8 @@
       const series = chart.panels[panel].filter((one) => shown.has(one.family) && one.points.length);
       const width = Math.max(280, frame.clientWidth), height = Math.max(320, Math.min(560, 0.62 * width));
       const [left, right, top, bottom] = [58, 12, 12, 46];
-      const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `${chart.title}: ${panel}` }, frame);
+      const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, tabindex: 0, role: "group",
+        "aria-roledescription": "chart", "aria-label": `${chart.title}: ${panel}; arrow keys go from point to point` }, frame);
       places = [];
       const all = series.flatMap((one) => one.points);
       if (!all.length) {
@@ -105,6 +106,18 @@
         }
       }
       const ring = make("circle", { r: 8, fill: "none", stroke: "#1b1f24", "stroke-width": 1.5, visibility: "hidden" }, svg);
+      const show = (best) => {
+        tip.hidden = !best;
+        ring.setAttribute("visibility", best ? "visible" : "hidden");
+        if (!best) return;
+        ring.setAttribute("cx", best[0]);
+        ring.setAttribute("cy", best[1]);
+        tip.textContent = `${best[2].name} (${best[2].family}): ${best[3]}`;
+        const box = svg.getBoundingClientRect(), side = best[0] * box.width / width;
+        tip.style.left = side > box.width / 2 ? "auto" : `${side + 12}px`;
+        tip.style.right = side > box.width / 2 ? `${box.width - side + 12}px` : "auto";
+        tip.style.top = `${best[1] * box.height / height + 8}px`;
+      };
       const point = (event) => {
         const box = svg.getBoundingClientRect();
         const [mx, my] = [(event.clientX - box.left) * width / box.width, (event.clientY - box.top) * height / box.height];
@@ -113,20 +126,21 @@
           const away = (place[0] - mx) ** 2 + (place[1] - my) ** 2;
           if (away < least) [best, least] = [place, away];
         }
-        tip.hidden = best === null;
-        ring.setAttribute("visibility", best === null ? "hidden" : "visible");
-        if (best === null) return;
-        ring.setAttribute("cx", best[0]);
-        ring.setAttribute("cy", best[1]);
-        tip.textContent = `${best[2].name} (${best[2].family}): ${best[3]}`;
-        const side = best[0] * box.width / width;
-        tip.style.left = side > box.width / 2 ? "auto" : `${side + 12}px`;
-        tip.style.right = side > box.width / 2 ? `${box.width - side + 12}px` : "auto";
-        tip.style.top = `${best[1] * box.height / height + 8}px`;
+        show(best);
       };
+      let at = -1;
+      svg.addEventListener("keydown", (event) => {
+        const next = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: places.length - 1 }[event.key];
+        if (event.key === "Escape") show(null);
+        if (next === undefined) return;
+        at = (next + places.length) % places.length;
+        show(places[at]);
+        event.preventDefault();
+      });
+      svg.addEventListener("blur", () => show(null));
       svg.addEventListener("pointermove", point);
       svg.addEventListener("pointerdown", point);
-      svg.addEventListener("pointerleave", () => { tip.hidden = true; ring.setAttribute("visibility", "hidden"); });
+      svg.addEventListener("pointerleave", () => show(null));
     }
     draw();
     let last = frame.clientWidth;

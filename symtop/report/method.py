@@ -1,0 +1,152 @@
+"""How it was measured, as the report says it: the top, its equations, the scenes, the errors, and the truth.
+
+Formulas are in the plain notation of `symtop.report.mathml`: the page shows them as MathML, the Markdown as they stand.
+The scenes and the bounds of the truth on them are read from the package when the report is written.
+"""
+
+import math
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from symtop.base.numbers import EPSILON
+from symtop.methods.registry import integrators
+from symtop.model.scenes import Scene, scenes
+from symtop.run.reference import reference
+
+TERMS = {  # of the answers, with what they mean
+    "nutation": "one nod of the axis between its two inclinations; its period T is the unit of steps and run lengths",
+    "axis": "the direction of the top; its error is the angle between where it is and where it should be, in radians",
+    "row": "a method in one chart: a method integrates other variables in each, and differs in error and cost",
+    "[angles]": "the method integrates Euler's angles, which are singular where the axis is vertical",
+    "[axis]": "the method integrates the direction of the axis and the angular momentum, which are singular nowhere",
+    "[attitude]": "the method integrates a quaternion, the whole orientation, and the angular momentum",
+    "guard": "the forecast before a run: it tries the method on two nutations",
+}
+
+
+class Block(NamedTuple):
+    """A paragraph, a formula, or a table with its title: the others are empty."""
+
+    words: str = ""
+    formula: str = ""
+    title: str = ""
+    header: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+
+
+class Part(NamedTuple):
+    """A part of the section under a heading of its own."""
+
+    name: str  # of its anchor
+    title: str
+    blocks: Sequence[Block]
+
+
+TOP = (
+    Block(
+        "A rigid body turns about a fixed point on its axis of symmetry. I1 and I3 are its moments of inertia about "
+        "that point, across and along the axis; mgl is its weight times the distance of its centre of gravity. Euler's "
+        "angles, z-x-z, are phi (precession), theta (the inclination of the axis from the upward vertical) and psi "
+        "(spin). The Lagrangian is"
+    ),
+    Block(formula="L = I1/2 (theta'^2 + phi'^2 sin^2 theta) + I3/2 (psi' + phi' cos theta)^2 - mgl cos theta"),
+    Block("It does not depend on phi and psi. Their momenta are therefore conserved:"),
+    Block(formula="p_psi = I3 (psi' + phi' cos theta),   p_phi = I1 phi' sin^2 theta + p_psi cos theta"),
+    Block("The inclination moves like a particle in an effective potential, and its oscillation is the nutation:"),
+    Block(formula="I1 theta'' = -dV/dtheta,   V = (p_phi - p_psi cos theta)^2/(2 I1 sin^2 theta) + mgl cos theta"),
+    Block(
+        "Methods [angles] integrate these angles. Methods [axis] integrate the direction e of the axis and the angular "
+        "momentum J in space, with k the upward vertical:"
+    ),
+    Block(formula="e' = (J x e)/I1,   J' = mgl k x e"),
+    Block("Methods [attitude] integrate J and the quaternion q that turns the body into space:"),
+    Block(formula="q' = 1/2 omega q,   omega = J/I1 + (1/I3 - 1/I1) p_psi e"),
+)
+ENERGY = (
+    "difference of the energies over E0 - min V, the energy of the nutation: that of the start above the steady "
+    "precession with the same momenta, without the spin"
+)
+ERRORS = {  # what is measured, and its unit
+    "axis": ("angle between the axis e and the true axis r: atan2(|e x r|, e.r)", "rad"),
+    "attitude": ("angle of the smallest rotation from the true quaternion r to q: 4 asin(|q - r|/2), r or -r", "rad"),
+    "theta": ("difference of the inclinations", "rad"),
+    "energy": (ENERGY, "1"),
+    "p_phi, p_psi": ("difference of the momenta over the larger of |p_phi| and |p_psi|", "1"),
+}
+SAMPLED = (
+    "The error of a run is the largest of its samples, which are not commensurate with the nutation, unless a table "
+    "says otherwise. A step is quoted in time or as steps a nutation; a tolerance is relative."
+)
+EXACT = (
+    "The truth is the exact motion in elliptic functions. With u = cos theta between its turning points u1 and u2, and "
+    "u3 the third root of the cubic that u' squared is,"
+)
+
+
+def glossary(text: str) -> list[tuple[str, str]]:
+    """The terms and methods that a text names, each with a line on what it is, terms first."""
+    terms = [(term, words) for term, words in TERMS.items() if re.search(rf"(?<![\w[]){re.escape(term)}", text)
+             or (term.startswith("[") and term in text)]  # fmt: skip
+    known = integrators()
+    named = re.compile(rf"(?<![\w-])({'|'.join(sorted(map(re.escape, known), key=len, reverse=True))})(?![\w-])")
+    return terms + [(name, known[name].summary) for name in dict.fromkeys(named.findall(text))]
+
+
+def parts() -> list[Part]:
+    """The section, part by part."""
+    catalogue = list(scenes().values())
+    bounds = {scene.name: _bound(scene) for scene in catalogue}
+    return [
+        Part("top", "The top and its equations", TOP),
+        Part("scenes", "The scenes", _scenes(catalogue, bounds)),
+        Part("errors", "What an error is", _errors()),
+        Part("reference", "What the truth is", _truth(max(bounds.values()))),
+    ]
+
+
+def _scenes(catalogue: Sequence[Scene], bounds: dict[str, float]) -> list[Block]:
+    what = ["scene", "what it is for", "nutation period", "horizon", "bound of the truth (rad)"]
+    problem = ["scene", "I1", "I3", "mgl", "theta", "phi", "psi", "theta'", "phi'", "psi'"]
+    uses, starts = [], []
+    for scene in catalogue:
+        period = f"{scene.nutation_period:.9g}" if math.isfinite(scene.nutation_period) else "infinite"
+        uses.append([scene.name, scene.purpose, period, f"{scene.horizon:.6g}", f"{bounds[scene.name]:.1e}"])
+        top, at = scene.top, scene.start
+        numbers = (top.I1, top.I3, top.mgl, at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot)
+        starts.append([scene.name, *(repr(number).removesuffix(".0") for number in numbers)])
+    units = ", ".join(scene.name for scene in catalogue if scene.units == "SI")
+    words = (
+        "A scene is a top, a start and a horizon. Times are in any unit that fits I1, I3 and mgl"
+        + (f", and in seconds on {units}" if units else "")
+        + ". Angles are in radians, and every number below is to be read as the nearest double."
+    )
+    return [
+        Block(words),
+        Block(title="Scenes", header=what, rows=uses),
+        Block(title="Tops and starts", header=problem, rows=starts),
+    ]
+
+
+def _errors() -> list[Block]:
+    rows = [[name, words, unit] for name, (words, unit) in ERRORS.items()]
+    return [Block(SAMPLED), Block(title="Errors", header=["error", "what is measured", "unit"], rows=rows)]
+
+
+def _truth(largest: float) -> list[Block]:
+    words = (
+        "phi and psi are integrals of the third kind. Nothing is integrated step by step, so that the error does not "
+        "grow with the number of steps. Each value has a bound: the rounding of the evaluation and the error of the "
+        "two rates times the time. At the ends of the horizons above the bound of the axis is at most "
+        f"{largest:.1e} rad, {largest / EPSILON:.0f} units of rounding. `symtop.reference` gives values and bounds at "
+        "any time."
+    )
+    formula = "u = u1 + (u2 - u1) sn^2(tau),   tau = tau_0 + Omega t,   Omega^2 = mgl (u3 - u1)/(2 I1)"
+    return [Block(EXACT), Block(formula=formula), Block(words)]
+
+
+def _bound(scene: Scene) -> float:
+    """The bound of the true axis at the end of a scene, in radians."""
+    return float(reference(scene, np.array([scene.horizon]))["axis_error_bound"].values[0])

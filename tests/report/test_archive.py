@@ -1,0 +1,111 @@
+"""The bundle: whole, described to the last variable, checkable, and only of what is in the report."""
+
+import hashlib
+import re
+import zipfile
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import symtop
+from symtop.base import datasets
+from symtop.base.validate import SymtopError
+from symtop.report import archive, style
+from symtop.runner import run as runner, store
+from symtop.runner.study import Case, Picture, Study, Table
+
+
+def draw(data):
+    """One figure."""
+    figure, axes = style.panels(1, 1)
+    axes[0, 0].plot(data["x"].values.ravel())
+    return [Picture("line", figure, "A line.", "A line.", lead="What opens")]
+
+
+STUDY = Study(
+    name="small",
+    title="Small",
+    question="Is it bundled?",
+    how_to_read="As it stands.",
+    cases=lambda _: [Case("spheroid", "strang", {})],
+    measure=lambda case: xr.Dataset({"x": ("step_size", [1.0, 2.0], {"long_name": "a number", "units": "rad"})},
+                                    {"step_size": [0.1, 0.2]}),
+    pictures=draw,
+    verdict=lambda data: ["It is."],
+    tables=lambda data: [Table("One table", ["a", "b"], [["1", "2"]])],
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """A results folder with one small study, a case, a figure that nothing shows and a file of somebody else's."""
+    folder = tmp_path_factory.mktemp("bundled") / "results"
+    (case,) = STUDY.cases(True)
+    data = datasets.describe(store.combine([(case, STUDY.measure(case))]), "Small", question=STUDY.question)
+    datasets.write(data, folder / "small.nc")
+    found = runner.findings_of(STUDY, data, folder, style.save, failures=[], cases=1)
+    store.write_json(folder / "peers.json", found | {"study": "peers", "measured": "once"})
+    (folder / "cases" / "small").mkdir(parents=True)
+    (folder / "cases" / "small" / "one.nc").write_bytes(b"a case")
+    (folder / "figures" / "old.png").write_bytes(b"not shown")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bundled(results):
+    """Its bundle: contents by name, without the folder that they are in."""
+    path = archive.bundle(results)
+    assert path == results / f"{archive.NAME}.zip"
+    with zipfile.ZipFile(path) as held:
+        assert held.testzip() is None
+        return {name.removeprefix(f"{archive.NAME}/"): held.read(name) for name in held.namelist()}
+
+
+def test_it_holds_what_the_report_is_made_of_and_no_more(bundled):
+    assert bundled.keys() == {
+        "README.md", "SHA256SUMS", "citations.bib", "machine.txt", "versions.txt", "results/small.nc",
+        "results/peers.json", "results/report.html", "results/report.md", "results/figures/small-line.png",
+        "scenes/scenes.csv", "scenes/states.csv", "scenes/states.nc",
+    }  # fmt: skip
+
+
+def test_every_file_has_its_sum(bundled):
+    sums = dict(reversed(line.split("  ")) for line in bundled["SHA256SUMS"].decode().splitlines())
+    assert sums.keys() == bundled.keys() - {"SHA256SUMS"}
+    assert all(hashlib.sha256(bundled[name]).hexdigest() == told for name, told in sums.items())
+
+
+def test_the_readme_names_every_file_and_describes_every_variable(bundled):
+    readme = bundled["README.md"].decode()
+    assert all(f"| {name} |" in readme for name in bundled.keys() - {"README.md", "SHA256SUMS"})
+    assert "| x | scene (1) x integrator (1) x step_size (2) | rad | a number |" in readme
+    states = readme.partition("### scenes/states.nc")[2]
+    assert re.findall(r"\| theta_lo \| scene \(\d+\) x sample \(10\) \| rad \| \S", states)
+    assert datasets.provenance()["symtop_revision"] in readme
+    assert max(map(len, archive.INTRODUCTION.splitlines())) <= 120
+
+
+def test_versions_and_machine_are_told(bundled):
+    assert f"numpy=={np.__version__}\n" in bundled["versions.txt"].decode()
+    assert re.search(r"^processor: .", bundled["machine.txt"].decode(), re.MULTILINE)
+
+
+def test_the_states_can_be_read_from_the_bundle(bundled, tmp_path):
+    (tmp_path / "states.nc").write_bytes(bundled["scenes/states.nc"])
+    states = datasets.read(tmp_path / "states.nc")
+    assert list(states["scene"].values) == list(symtop.scenes())
+    assert states["quaternion_lo"].dims == ("scene", "sample", "part")
+
+
+def test_the_same_results_make_the_same_bundle(results, bundled, tmp_path):
+    with zipfile.ZipFile(archive.bundle(results, tmp_path / "again.zip")) as held:
+        again = {name.removeprefix(f"{archive.NAME}/"): held.read(name) for name in held.namelist()}
+    dated = {"results/report.html", "SHA256SUMS"}  # the page says the day
+    assert {name for name in bundled if again[name] != bundled[name]} <= dated
+
+
+def test_without_findings_there_is_no_bundle(tmp_path):
+    with pytest.raises(SymtopError, match="no study has left findings"):
+        archive.bundle(tmp_path)
+    assert list(tmp_path.iterdir()) == []
