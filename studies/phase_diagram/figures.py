@@ -10,7 +10,7 @@ from matplotlib.patches import Patch, Rectangle
 from scipy import ndimage
 
 from symtop.methods.registry import integrator, split_name
-from symtop.report.style import look, panels
+from symtop.report.style import headline, look, panels
 from symtop.runner.study import Picture
 
 from . import words
@@ -55,6 +55,7 @@ def draw(data: xr.DataTree) -> Picture:
         Patch(facecolor="#F2F2F2", edgecolor="#CCCCCC", label="no row"),
     ]
     figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False)
+    headline(figure, words.message(data))
     return Picture(
         "map",
         figure,

@@ -112,6 +112,18 @@ def winners_sentence(data: xr.DataTree, quantity: str) -> str:
     return f"Cheapest, {PANELS[quantity]}: {'; '.join(said)}."
 
 
+def message(data: xr.DataTree) -> str:
+    """The figure's one message: the row that is cheapest most often, for each of the three errors."""
+    name, said = diagrams.where(data)[0], []
+    for quantity in QUANTITIES:
+        panel = diagram(data, name, quantity)
+        won = panel.winner[panel.winner >= 0]
+        (k, count), *_ = Counter(won.tolist()).most_common(1) or [(0, 0)]
+        asked = quantity.replace("axis", "phase")
+        said.append(f"{panel.names[k]} for {asked} ({count / max(won.size, 1):.0%} of cells)")
+    return f"Most often cheapest on {named(name)}: {', '.join(said[:-1])} and {said[-1]}"
+
+
 def population_sentence(data: xr.DataTree) -> str:
     """What was run."""
     group = data[LADDERS].to_dataset()

@@ -22,7 +22,8 @@ def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path):
     path, figure = tmp_path / "runs.nc", tmp_path / "spread.png"
     done = call("--members", 50, "--seed", 3, "strang", *STEPS, "--samples", 21, "-o", path, "--figure", figure)
     assert done.exit_code == 0, done.output
-    assert "strang on 50 tops (lanes): 50 ok" in done.output
+    assert "strang on 50 tops: 50 reached the horizon" in done.output
+    assert "in vector registers (lanes)" in done.output
     assert f"written to {figure}" in done.output
     wanted = symtop.ensemble(
         symtop.population(50, seed=3), "strang", per_nutation=30, nutations=2, samples=21, quiet=True

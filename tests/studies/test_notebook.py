@@ -4,7 +4,6 @@ import itertools
 import json
 import math
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -235,10 +234,10 @@ def test_the_films_body_axes_are_those_of_the_charts(tmp_path):
     assert {(0xD5, 0x5E, 0x00), (0x00, 0x9E, 0x73), (0x00, 0x72, 0xB2)} <= colors  # the triad's own
 
 
-def test_the_film_fits_a_page_and_is_embedded_as_what_it_is(tmp_path):
+def test_the_film_fits_a_page_and_is_embedded_as_what_it_is(tmp_path, quick_results):
     from symtop.report import page
 
-    film = Path(__file__).resolve().parents[2] / "results" / "figures" / "notebook-triad.gif"
+    film = quick_results / "figures" / "notebook-triad.gif"
     assert film.stat().st_size < 500_000
     (tmp_path / "figures").mkdir()
     shutil.copy(film, tmp_path / "figures")
