@@ -12,7 +12,7 @@ import click
 from symtop.base.validate import SymtopError
 from symtop.cli.common import facts, json_option, plugin_option, table, terminal_width
 from symtop.cli.completion import completing
-from symtop.report import markdown as tables
+from symtop.report import tables
 
 if TYPE_CHECKING:
     from symtop.methods.registry import Integrator

@@ -26,7 +26,7 @@ from symtop import __version__
 from symtop.base import datasets
 from symtop.model.scenes import scenes
 from symtop.report import page
-from symtop.report.markdown import table
+from symtop.report.tables import table
 from symtop.run import scene_states
 
 NAME = f"symtop-{__version__}-data"

@@ -18,7 +18,7 @@ from typing import Any
 
 from symtop.base.validate import SymtopError
 from symtop.methods.registry import integrators, split_name
-from symtop.report import markdown, method
+from symtop.report import markdown, method, tables
 from symtop.report.mathml import mathml
 from symtop.report.style import look
 from symtop.runner import run as runner, store
@@ -162,7 +162,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
         measured=measured,
         mathml=mathml,
         explanations=lambda study: markdown.explanations(study, titles),
-        integrators=markdown.columns([method.record() for method in integrators().values()]),
+        integrators=tables.columns([method.record() for method in integrators().values()]),
         provenance=facts,
         quick=any(study["quick"] for study in studies),
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),

@@ -11,6 +11,7 @@ import symtop
 from symtop.cli.main import main
 
 GOOD = {
+    "archive": [],
     "cite": [],
     "claims": ["strang", "--quick"],
     "doctor": [],

@@ -242,5 +242,5 @@ def test_the_film_fits_a_page_and_is_embedded_as_what_it_is(tmp_path, quick_resu
     (tmp_path / "figures").mkdir()
     shutil.copy(film, tmp_path / "figures")
     (tmp_path / "notebook.json").write_text(json.dumps({"pictures": [{"file": film.name}], "charts": []}))
-    (findings,) = page.gather(tmp_path)
-    assert findings["pictures"][0]["data"].startswith("data:image/gif;base64,")
+    (findings,) = page.gather(tmp_path, embed=True)
+    assert findings["pictures"][0]["source"].startswith("data:image/gif;base64,")

@@ -72,7 +72,7 @@ def test_what_a_chart_does_is_not_said_of_the_method():
 
 def test_every_tolerance_is_stated_and_a_default_says_that_it_is_one():
     said = rows.setting(histories())
-    assert "100 nutations of spheroid; 118 steps a nutation or tolerance 1e-08 (rk45[angles])" in said
+    assert "100 nutations of spheroid, and 118 steps a nutation or tolerance 1e-08 (rk45[angles])" in said
     assert "default tolerance, which is the rounding of the arithmetic: taylor[axis] 2.2e-18" in said
     cells = [
         histories().sel(scene="spheroid", integrator=name) for name in ("rk4[axis]", "rk45[angles]", "taylor[axis]")
