@@ -1,16 +1,20 @@
 """Copies the report in words and its figures to docs/snapshot, which this repository holds: make snapshot.
 
 What the studies write into results/ is not tracked, so that a run of them leaves a checkout as it was. The snapshot is
-taken when its messages change; a figure that the report no longer shows is removed from it.
+taken when its messages change; a figure that the report no longer shows is removed from it. The report's first answer
+is also put at the top of docs/choosing.md.
 """
 
 import re
 import shutil
 import sys
+import textwrap
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SHOWN = re.compile(r"\]\(figures/([^)]+)\)")
+BEGIN, END = "<!-- from the report -->\n", "<!-- to here -->\n"
+WIDTH = 118
 
 
 def take(results: Path, snapshot: Path) -> list[str]:
@@ -30,5 +34,26 @@ def take(results: Path, snapshot: Path) -> list[str]:
     return names
 
 
+def answer(report: str) -> str:
+    """The sentences and the table of the report's first section."""
+    first = re.split(r"^## .*$", report, flags=re.MULTILINE)[1]
+    sentences, table = (part.strip().splitlines() for part in first.strip().split("\n\n")[:2])
+    wrap = textwrap.TextWrapper(WIDTH, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False)
+    return "\n".join([*(wrap.fill(sentence) for sentence in sentences), "", *table]) + "\n"
+
+
+def quote(report: str, page: str) -> str:
+    """A page with the report's answer between its two marks. SystemExit if the page has none."""
+    parts = re.split(f"({re.escape(BEGIN)}|{re.escape(END)})", page)
+    if len(parts) != 5 or (parts[1], parts[3]) != (BEGIN, END):
+        sys.exit(f"snapshot: a page must have the lines {BEGIN.strip()} and {END.strip()} once each, in this order")
+    return "".join([*parts[:2], answer(report), *parts[3:]])
+
+
 if __name__ == "__main__":
-    print(f"snapshot: {len(take(ROOT / 'results', ROOT / 'docs' / 'snapshot'))} figures in docs/snapshot")  # noqa: T201
+    docs = ROOT / "docs"
+    names = take(ROOT / "results", docs / "snapshot")
+    choosing = docs / "choosing.md"
+    report = (docs / "snapshot" / "report.md").read_text(encoding="utf-8")
+    choosing.write_text(quote(report, choosing.read_text(encoding="utf-8")), encoding="utf-8")
+    print(f"snapshot: {len(names)} figures in docs/snapshot")  # noqa: T201

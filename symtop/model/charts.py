@@ -86,17 +86,29 @@ def _components(vectors: Array) -> tuple[Array, Array, Array]:
     return vectors[..., 0], vectors[..., 1], vectors[..., 2]
 
 
+def _parts(quaternions: Array) -> tuple[Array, Array, Array, Array]:
+    """w, x, y and z of quaternions (..., 4)."""
+    return quaternions[..., 0], quaternions[..., 1], quaternions[..., 2], quaternions[..., 3]
+
+
+def _vectors(x: Array, y: Array, z: Array) -> Array:
+    """Vectors (..., 3) of their components; `np.stack` takes 4 us more."""
+    vectors: Array = np.empty((*np.shape(x), 3), np.result_type(x))
+    vectors[..., 0], vectors[..., 1], vectors[..., 2] = x, y, z
+    return vectors
+
+
 def axis_from_quaternion(quaternion: Array) -> Array:
     """The third column of the rotation matrix, shape (..., 3)."""
-    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    w, x, y, z = _parts(quaternion)
     right, back = x * z + w * y, y * z - w * x  # doubled by addition: quadruple precision has no 2.0
-    return np.stack([right + right, back + back, w * w - x * x - y * y + z * z], axis=-1)
+    return _vectors(right + right, back + back, w * w - x * x - y * y + z * z)
 
 
 def transverse_from_quaternion(quaternion: Array) -> Array:
     """The first column of the rotation matrix, a body-fixed axis across the top's, shape (..., 3)."""
-    w, x, y, z = np.moveaxis(quaternion, -1, 0)
-    return np.stack([w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)], axis=-1)
+    w, x, y, z = _parts(quaternion)
+    return _vectors(w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
 
 
 def theta_from_axis(axis: Array) -> Array:
@@ -111,7 +123,7 @@ def phi_from_axis(axis: Array) -> Array:
 
 def angles_from_quaternion(quaternion: Array) -> tuple[Array, Array, Array]:
     """theta in [0, pi], phi and psi modulo 2 pi. At a pole only phi + psi (or phi - psi) has meaning."""
-    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    w, x, y, z = _parts(quaternion)
     half = np.arctan2(np.sqrt(x * x + y * y), np.sqrt(w * w + z * z))
     total, difference = np.arctan2(z, w), np.arctan2(y, x)
     return half + half, total + difference, total - difference

@@ -49,6 +49,46 @@ def test_the_stored_snapshot_is_whole():
     assert shown == {path.name for path in (folder / "figures").iterdir()}
 
 
+REPORT = """# T
+
+Words.
+
+## Which?
+
+- Begin with a; it is the cheapest on most of the tops that were drawn at random, and its error is the least of all.
+- Then b.
+
+| x | y |
+|---|---|
+| 1 | 2 |
+
+More.
+
+## Next
+
+- Not this.
+"""
+
+
+def test_the_first_answer_is_put_between_the_marks_of_a_page():
+    taker = _taker()
+    page = f"# P\n\n{taker.BEGIN}old\n{taker.END}\nrest\n"
+    made = taker.quote(REPORT, page)
+    assert made == f"# P\n\n{taker.BEGIN}{taker.answer(REPORT)}{taker.END}\nrest\n"
+    assert " ".join(taker.answer(REPORT).split()).startswith(" ".join(REPORT.split("\n\n")[3].split()))
+    assert taker.answer(REPORT).endswith("- Then b.\n\n| x | y |\n|---|---|\n| 1 | 2 |\n")
+    assert taker.quote(REPORT, made) == made
+    for bad in ("no marks\n", f"{taker.END}{taker.BEGIN}"):
+        with pytest.raises(SystemExit, match="once each, in this order"):
+            taker.quote(REPORT, bad)
+
+
+def test_what_is_said_of_choosing_is_the_answer_of_the_stored_report():
+    page = (ROOT / "docs" / "choosing.md").read_text(encoding="utf-8")
+    report = (ROOT / "docs" / "snapshot" / "report.md").read_text(encoding="utf-8")
+    assert _taker().quote(report, page) == page
+
+
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is no checkout")
 def test_what_a_run_of_the_studies_writes_is_not_tracked():
     written = ["convergence.nc", "convergence.json", "report.md", "report.html", "figures/x.png", "cases/x/y.nc"]
