@@ -7,6 +7,7 @@ quaternions are (w, x, y, z) from body to space, and their sign is continued fro
 """
 
 import csv
+import functools
 import io
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -32,6 +33,11 @@ def times_of(scene: Scene, count: int = TIMES) -> list[float]:
 
 def precise(scene: Scene, times: Sequence[float]) -> list[list[Any]]:
     """The columns of `COLUMNS` at each time, as `mpmath.mpf` of 40 digits."""
+    return _precise(scene, tuple(times))
+
+
+@functools.lru_cache(maxsize=256)  # 0.2 s a scene, and a bundle asks three times
+def _precise(scene: Scene, times: tuple[float, ...]) -> list[list[Any]]:
     form = PreciseForm(scene.top, scene.start, WORKING)
     return [[*form(time), *form.axis(time), *form.quaternion(time)] for time in times]
 
