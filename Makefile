@@ -18,6 +18,7 @@ DOCS := .venv/.docs
 PEERS := benchmarks/peers/.venv
 ENGINES := benchmarks/engines/.venv
 OLDER := benchmarks/engines/.venv-mujoco-3
+APART := --numprocesses auto --dist loadfile --no-loadscope-reorder # a file to a process, in the order of tests/conftest.py
 
 .DEFAULT_GOAL := help
 .PHONY: help setup studies quick report check-results test test-all lint bench peers engines docs snapshot archive clean
@@ -53,11 +54,11 @@ check-results: $(READY)
 
 test: $(READY)
 	@echo "symtop: running the fast tests (make test-all runs all)"
-	@$(BIN)/python -m pytest -m "not slow" --numprocesses auto --dist loadfile
+	@$(BIN)/python -m pytest -m "not slow" $(APART)
 
 test-all: $(READY)
 	@echo "symtop: running all tests"
-	@$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	@$(BIN)/python -m pytest $(APART)
 
 lint: $(READY)
 	@$(BIN)/ruff check .

@@ -24,7 +24,17 @@ from symtop.runner import plugins, scripts, store
 scripts.install()  # tests import `symtop_studies`
 
 
+LONGEST = (  # files whose tests take longest, begun first: one that begins last keeps a process busy alone
+    "test_compiled_cache", "test_plugin_in_studies", "test_study", "test_archive", "test_report", "test_reference",
+    "test_command_lines", "test_cold", "test_figures", "test_blind", "test_long_runs", "test_typing",
+)  # fmt: skip
 STORED = Path(__file__).resolve().parent.parent / "results" / "quick"
+
+
+def pytest_collection_modifyitems(items):
+    """Files in the order of `LONGEST`, then as they were."""
+    place = {name: k for k, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path.stem, len(place)))
 
 
 @contextlib.contextmanager

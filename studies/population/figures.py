@@ -1,5 +1,6 @@
 """The figures of the population study: run lengths, slowdowns and wins, strata, silent failures, the guard."""
 
+import math
 import textwrap
 from typing import Any
 
@@ -25,6 +26,7 @@ SHOWN = 12  # rows of a panel of slowdowns
 FAR = 1e3  # slowdown at which an axis ends
 LATEST = 0.995  # of a named row's costs lie within the axis of a panel
 RARE = 1e-3  # share of false alarms at which an axis begins
+LINE, WORD = 0.075, 0.4  # of a panel's height and width: what a name takes at most
 LEAST = 0.05  # a row that solves less has no label on its line
 
 
@@ -64,16 +66,30 @@ def drawn(name: str) -> dict[str, Any]:
 
 
 def label_lines(axis: Any, lines: dict[str, tuple[Array, Array]], top: float) -> None:
-    """Write each name on its own line: those that rise first at the height `top`, the others lower and lower."""
+    """Write each name on its own line: those that rise first at the height `top`, the others lower and lower.
+
+    A name that would cover another one goes up or down its line until it does not.
+    """
     order = sorted(
         lines, key=lambda name: float(lines[name][0][np.searchsorted(lines[name][1], 0.4 * max(lines[name][1]))])
     )
     height = top
+    span = max(math.log(x[-1] / x[0]) for x, _ in lines.values()) if lines else 0.0
+    written: list[tuple[float, float]] = []
     for name in order:
         x, y = lines[name]
         at = max(min(height, 0.75 * float(max(y))), 0.03)
         height = at if at > 0.8 * height else height  # a line that ends low does not press down those behind it
+        for shift in sorted(np.arange(-20, 21) * 0.02, key=abs):
+            place = at + float(shift)
+            k = min(int(np.searchsorted(y, place)), len(x) - 1)
+            if 0.03 <= place <= max(y) and not any(
+                abs(place - other) < LINE and abs(math.log(x[k] / beside)) < WORD * span for beside, other in written
+            ):
+                at = place
+                break
         k = min(int(np.searchsorted(y, at)), len(x) - 1)
+        written.append((float(x[k]), at))
         axis.annotate(
             name, (x[k], at), ha="right" if k > 0.8 * len(x) else "center", va="center",
             fontsize=LEAST_TEXT, color=style.ink(look(name).color), zorder=5,

@@ -6,7 +6,7 @@ import time
 
 import pytest
 from click.testing import CliRunner
-from terminal import recorded
+from terminal import commands, recorded
 
 import symtop
 from symtop.cli import completion
@@ -204,6 +204,24 @@ def test_nothing_wraps_on_a_terminal(words):
     assert recording.code == 0, recording.text
     assert recording.text
     assert recording.widest <= 80
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", commands(), ids=" ".join)
+def test_a_command_of_the_readme_is_never_silent_for_long(words, tmp_path, monkeypatch):
+    """With nothing compiled, and then with everything: two seconds at most without a character."""
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        recording = recorded(words, SYMTOP_CACHE=str(tmp_path / "cache"))
+        assert recording.code == 0, recording.text
+        assert recording.widest <= 80, recording.text
+        assert recording.silence <= 2.0, recording.text
+
+
+def test_a_recording_hears_a_silence(tmp_path):
+    """Negative control: a plug-in that sleeps while it is loaded."""
+    (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(3.0)\n")
+    assert recorded(["scenes", "--plugin", str(tmp_path / "sleeps.py")]).silence > 2.9
 
 
 def test_a_recording_sees_what_wraps():

@@ -1,5 +1,6 @@
 """A plug-in of four lines, which adds a method and a scene, takes part in the studies beside a method of symtop's."""
 
+import pytest
 from click.testing import CliRunner
 
 from symtop.base import datasets
@@ -15,16 +16,22 @@ symtop.register_scene(symtop.Scene("mine", top, start, horizon=6.0))
 """
 
 
-STUDIES = ("convergence", "work_precision", "drift", "stability")
+@pytest.fixture(scope="module")
+def plugin(tmp_path_factory):
+    """Its file, which is loaded once."""
+    file = tmp_path_factory.mktemp("plugin") / "plugin.py"
+    file.write_text(PLUGIN)
+    return file
 
 
-def test_a_plugins_method_and_scene_are_in_every_study(tmp_path):
-    plugin = tmp_path / "plugin.py"
-    plugin.write_text(PLUGIN)
+@pytest.mark.parametrize(
+    "studies", [("convergence", "work_precision"), pytest.param(("drift", "stability"), marks=pytest.mark.slow)]
+)
+def test_a_plugins_method_and_scene_are_in_every_study(studies, plugin, tmp_path):
     words = ["--quick", "--only", "simpson-of-a-user,strang", "--results", str(tmp_path), "--plugin", str(plugin)]
-    done = CliRunner().invoke(main, ["study", *STUDIES, *words])
+    done = CliRunner().invoke(main, ["study", *studies, *words])
     assert done.exit_code == 0, done.output
-    for study in STUDIES:
+    for study in studies:
         data = datasets.groups(datasets.read_any(tmp_path / "quick" / "only" / f"{study}.nc")).values()
         groups = [group for group in data if group.variables]
         methods = {split_name(str(row))[0] for group in groups for row in group["integrator"].values}
