@@ -42,6 +42,30 @@ def executable() -> str:
     pytest.skip(f"no browser on this machine ({', '.join(NAMES)}); on Debian: apt-get install chromium")
 
 
+FAINT = """(() => {  // texts whose contrast with what is behind them is below that of WCAG 2 AA
+    const parts = (color) => color.match(/[\\d.]+/g).map(Number);
+    const light = ([r, g, b]) => [r, g, b].map((one) => one / 255).map((one) => one <= 0.04045 ? one / 12.92
+        : ((one + 0.055) / 1.055) ** 2.4).reduce((sum, one, k) => sum + one * [0.2126, 0.7152, 0.0722][k], 0);
+    const behind = (node) => {
+        for (; node; node = node.parentElement) {
+            const color = parts(getComputedStyle(node).backgroundColor);
+            if (color.length < 4 || color[3] > 0) return color;
+        }
+        return [255, 255, 255];
+    };
+    const found = new Set();
+    for (const node of document.querySelectorAll('body *')) {
+        const own = [...node.childNodes].some((one) => one.nodeType === 3 && one.textContent.trim());
+        if (!own || !node.checkVisibility() || node.closest('script, style')) continue;
+        const style = getComputedStyle(node), drawn = node.namespaceURI.endsWith('svg') ? style.fill : style.color;
+        const [a, b] = [light(parts(drawn)), light(behind(node))].sort((x, y) => y - x);
+        const ratio = (a + 0.05) / (b + 0.05);
+        if (ratio < 4.5) found.add(`${node.localName}.${node.className.baseVal ?? node.className} ${ratio.toFixed(2)}`);
+    }
+    return [...found];
+})()"""
+
+
 class BrowserError(AssertionError):
     """The browser refused a command, or what was waited for did not happen."""
 
@@ -199,6 +223,13 @@ class Browser:
         found = self._send("Page.printToPDF", printBackground=False, preferCSSPageSize=True)
         path.write_bytes(base64.b64decode(found["data"]))
         return path
+
+    def point(self, selector: str, across: float, down: float) -> None:
+        """Click with the mouse at two shares of an element's width and height."""
+        box = self.evaluate(f"document.querySelector({selector!r}).getBoundingClientRect().toJSON()")
+        place = {"x": box["x"] + across * box["width"], "y": box["y"] + down * box["height"]}
+        for kind, buttons in (("mousePressed", 1), ("mouseReleased", 0)):
+            self._send("Input.dispatchMouseEvent", type=kind, button="left", buttons=buttons, clickCount=1, **place)
 
     def drag(self, selector: str, right: float, down: float) -> None:
         """Press the mouse in the middle of an element, move it, and let go."""

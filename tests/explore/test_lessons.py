@@ -3,6 +3,7 @@
 import base64
 import http.client
 import json
+import re
 import socket
 import struct
 import threading
@@ -12,12 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import symtop
 from symtop.base.validate import SymtopError
 from symtop.explore import answers, maps
-from symtop.explore.server import address, serve
-from tests.browser import Browser
+from symtop.explore.server import STATIC, address, serve
+from tests.browser import FAINT, Browser
 from tests.explore.test_explore import fields
 
+TOLD = (STATIC / "stories.js").read_text(encoding="utf-8")
 RANGE = {"step_least": 0.01, "step_most": 0.6, "spin_least": -4.0, "spin_most": 4.0}
 
 
@@ -99,6 +102,100 @@ def test_a_story_a_cell_and_a_link(server):
                 assert browser.too_wide == 0
         assert browser.problems == []
         assert browser.outside() == []
+
+
+def test_a_hand_reaches_everything_and_every_text_can_be_read(server):
+    with Browser(1280, 1400) as browser:
+        browser.open(address(server))
+        browser.wait_for("+document.body.dataset.maps > 0")
+        answered(browser, "#second", "strang")
+        for scheme in ("light", "dark"):
+            browser.prefer(scheme)
+            assert browser.evaluate(FAINT) == []
+        browser.evaluate("document.querySelector('#purpose').style.color = '#555'")
+        assert browser.evaluate(FAINT)  # the control: grey on dark
+        browser.prefer("light")
+        shown = (
+            "[...document.querySelectorAll('select, input, button, canvas[tabindex]')].filter((c) => !c.disabled && "
+        )
+        expected = browser.evaluate(f"{shown} c.checkVisibility()).length")
+        browser.evaluate("document.activeElement.blur(); window.reached = new Set()")
+        for _ in range(expected):
+            browser.press("Tab")
+            browser.evaluate("reached.add(document.activeElement) && true")
+        assert browser.evaluate("reached.size") == expected > 20
+        assert not browser.evaluate("reached.has(document.body)")
+        before = browser.evaluate("document.querySelector('#step_size').value")
+        count = browser.evaluate("+document.body.dataset.answers")
+        browser.evaluate("document.querySelector('#map').scrollIntoView()")
+        browser.point("#map", 0.3, 0.4)
+        browser.wait_for(f"+document.body.dataset.answers > {count}")
+        assert browser.evaluate("document.querySelector('#step_size').value") != before
+        assert browser.problems == []
+
+
+SHOWN = r'\s+scene: "(.*?)", integrator: "(.*?)", second: "(.*?)", step_size: (.*?),'
+STORIES = {  # the scene, the methods and the step of each in stories.js
+    name: found for name, *found in re.findall(rf'^  "?([a-z ]+)"?: {{{SHOWN}', TOLD, re.MULTILINE)
+}
+
+
+def test_every_story_is_looked_into():
+    assert {*STORIES} == {"cusp", "loop", "sleeping", "pole jump", "resonance"}
+    looked = [name for name in globals() if name.startswith("test_what_the_story_of_")]
+    assert len(looked) == len(STORIES)
+
+
+def told(story, second=False, **changes):
+    """The answer to what a story shows, of its first method or of its second."""
+    scene, *methods, step = STORIES[story]
+    return answers.answer(answers.setup(fields(scene, methods[second], **{"step_size": float(step)} | changes)))
+
+
+def steps_a_nutation(story):
+    scene, *_, step = STORIES[story]
+    return symtop.scene(scene).nutation_period / float(step)
+
+
+def theta(answer):
+    return np.frombuffer(base64.b64decode(answer["arrays"]["theta"]), "<f4")
+
+
+def test_what_the_story_of_the_cusp_says():
+    assert round(steps_a_nutation("cusp")) == 4
+    assert [told("cusp", second)["outcome"] for second in (False, True)] == ["ok", "ok"]
+    assert told("cusp", step_size=0.45)["outcome"] != "ok"
+    assert told("cusp", True, step_size=0.45)["outcome"] == "ok"
+
+
+def test_what_the_story_of_the_loop_says():
+    assert round(steps_a_nutation("loop")) == 5
+    assert 0.05 < told("loop")["largest"]["energy"] < 0.2
+    kept = told("loop", True)["largest"]
+    assert kept["energy"] < 1e-11
+    assert kept["axis_error"] == pytest.approx(0.02, abs=0.005)
+
+
+def test_what_the_story_of_the_sleeping_top_says():
+    assert np.nanmax(theta(told("sleeping"))) > 0.5
+    assert told("sleeping")["largest"]["axis_error"] > 0.5
+    for second in (False, True):
+        assert np.nanmax(theta(told("sleeping", second, psi_dot=2.5))) < 0.05
+
+
+def test_what_the_story_of_the_pole_jump_says():
+    scene = symtop.scene(STORIES["pole jump"][0])
+    assert np.degrees(symtop.ClosedForm(scene.top, scene.start).theta_range[0]) == pytest.approx(0.06, abs=0.005)
+    assert told("pole jump")["outcome"] != "ok"
+    assert told("pole jump", True)["outcome"] == "ok"
+
+
+def test_what_the_story_of_the_resonance_says():
+    period = symtop.scene(STORIES["resonance"][0]).nutation_period
+    assert period / np.pi == pytest.approx(0.202, abs=5e-4)
+    assert told("resonance")["largest"]["axis_error"] < 1e-6
+    assert told("resonance", step_size=0.21)["outcome"] != "ok"
+    assert told("resonance", True, step_size=0.21)["outcome"] == "ok"
 
 
 @pytest.mark.slow

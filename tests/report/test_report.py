@@ -16,7 +16,7 @@ from symtop.methods.registry import split_name
 from symtop.report import markdown, page, style
 from symtop.runner import run as runner
 from symtop.runner.study import Case, Table
-from tests.browser import Browser
+from tests.browser import FAINT, Browser
 
 FEW = (
     "midpoint[angles]", "trapezoidal[angles]", "galerkin-simpson[angles]", "stormer-verlet[angles]",
@@ -73,30 +73,6 @@ def test_nothing_overflows_and_every_figure_is_there(browser, scheme, width):
     least = "Math.min(...[...document.querySelectorAll('.chart svg text')].map(t => t.getBoundingClientRect().height))"
     assert browser.evaluate(least) >= 10.0  # pixels: legible
     assert browser.problems == []
-
-
-FAINT = """(() => {  // texts whose contrast with what is behind them is below that of WCAG 2 AA
-    const parts = (color) => color.match(/[\\d.]+/g).map(Number);
-    const light = ([r, g, b]) => [r, g, b].map((one) => one / 255).map((one) => one <= 0.04045 ? one / 12.92
-        : ((one + 0.055) / 1.055) ** 2.4).reduce((sum, one, k) => sum + one * [0.2126, 0.7152, 0.0722][k], 0);
-    const behind = (node) => {
-        for (; node; node = node.parentElement) {
-            const color = parts(getComputedStyle(node).backgroundColor);
-            if (color.length < 4 || color[3] > 0) return color;
-        }
-        return [255, 255, 255];
-    };
-    const found = new Set();
-    for (const node of document.querySelectorAll('body *')) {
-        const own = [...node.childNodes].some((one) => one.nodeType === 3 && one.textContent.trim());
-        if (!own || !node.checkVisibility() || node.closest('script, style')) continue;
-        const style = getComputedStyle(node), drawn = node.namespaceURI.endsWith('svg') ? style.fill : style.color;
-        const [a, b] = [light(parts(drawn)), light(behind(node))].sort((x, y) => y - x);
-        const ratio = (a + 0.05) / (b + 0.05);
-        if (ratio < 4.5) found.add(`${node.localName}.${node.className.baseVal ?? node.className} ${ratio.toFixed(2)}`);
-    }
-    return [...found];
-})()"""
 
 
 def test_every_text_has_the_contrast_of_wcag_aa(browser, scheme):
