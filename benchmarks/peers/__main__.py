@@ -25,13 +25,14 @@ def main() -> None:
     parser.add_argument("--redraw", action="store_true", help="use the stored dataset")
     options = parser.parse_args()
     file, told = options.results / "peers.nc", options.results / "peers.json"
-    peers, missing = load(tuple(options.only))
-    for sentence in missing:
-        print(sentence)
     if options.redraw:
-        data = datasets.read(file)
-        many = [together.Row(**row) for row in (store.read_json(told) or {}).get("together", [])]
+        data, stored = datasets.read(file), store.read_json(told) or {}
+        many = [together.Row(**row) for row in stored.get("together", [])]
+        missing = stored.get("failures", [])
     else:
+        peers, missing = load(tuple(options.only))
+        for sentence in missing:
+            print(sentence)
         data = datasets.describe(measure(peers, options.scenes), STUDY.title, question=STUDY.question)
         datasets.write(data, file)
         many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())

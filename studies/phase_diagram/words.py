@@ -114,14 +114,18 @@ def winners_sentence(data: xr.DataTree, quantity: str) -> str:
 
 def message(data: xr.DataTree) -> str:
     """The figure's one message: the row that is cheapest most often, for each of the three errors."""
-    name, said = diagrams.where(data)[0], []
+    name = diagrams.where(data)[0]
+    shares: dict[str, list[str]] = {}
     for quantity in QUANTITIES:
         panel = diagram(data, name, quantity)
         won = panel.winner[panel.winner >= 0]
-        (k, count), *_ = Counter(won.tolist()).most_common(1) or [(0, 0)]
-        asked = quantity.replace("axis", "phase")
-        said.append(f"{panel.names[k]} for {asked} ({count / max(won.size, 1):.0%} of cells)")
-    return f"Most often cheapest on {named(name)}: {', '.join(said[:-1])} and {said[-1]}"
+        if won.size:
+            k, count = Counter(won.tolist()).most_common(1)[0]
+            shares.setdefault(panel.names[k], []).append(
+                f"{quantity.replace('axis', 'phase')} ({count / won.size:.0%})"
+            )
+    said = [f"{row} for {', '.join(listed)}" for row, listed in shares.items()]
+    return f"Most often cheapest on {named(name)}, of the cells: {'; '.join(said)}"
 
 
 def population_sentence(data: xr.DataTree) -> str:

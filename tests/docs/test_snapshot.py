@@ -1,6 +1,7 @@
 """The snapshot holds the report and its figures, and what the studies write is not tracked."""
 
 import importlib.util
+import json
 import subprocess
 from pathlib import Path
 
@@ -96,6 +97,12 @@ def test_what_a_run_of_the_studies_writes_is_not_tracked():
     done = subprocess.run(["git", "check-ignore", *paths], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.stdout.split() == paths
     kept = subprocess.run(["git", "ls-files", "results"], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert set(kept.stdout.split()) <= {
-        f"results/{n}" for n in ("bench.json", "live-engines.json", "peers.json", "peers.nc")
-    }
+    benchmarks = ("bench.json", "live-engines.json", "peers.json", "peers.nc", "figures/peers-fronts.png")
+    assert set(kept.stdout.split()) == {f"results/{name}" for name in benchmarks}
+    shown = [
+        f"results/figures/{picture['file']}"
+        for name in benchmarks[:3]
+        for picture in json.loads((ROOT / "results" / name).read_text(encoding="utf-8")).get("pictures", [])
+    ]
+    assert shown  # without them `make studies` on a fresh checkout would end without its report
+    assert {*shown} <= set(kept.stdout.split())
