@@ -158,9 +158,11 @@ class FixedStep:
         return _Whole(loop.whole(*parts), many, blocks, arguments, rule, fit, prepare.check, size)
 
     def _run(self, h: float, states: Array, momenta: Array, steps: int, work: int, outcome: int) -> Run:
-        evaluations, iterations = self.counts(steps, work)
+        # `counts`, and the class's constructor, which passes its arguments on: 0.4 us less of a run of 2.6
+        evaluations, iterations = work * self.evaluations + steps * self.each_step, work if self.implicit else 0
         p_phi, p_psi = momenta[:, 0], momenta[:, 1]
-        return Run(states, p_phi, p_psi, steps, evaluations, iterations, OUTCOMES[outcome], steps * h)
+        seen = states, p_phi, p_psi, steps, evaluations, iterations, OUTCOMES[outcome], steps * h
+        return tuple.__new__(Run, seen)
 
 
 def _fields(rule: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:

@@ -23,6 +23,7 @@ Units are any consistent set. Source: Goldstein, Classical Mechanics, section 5.
 is the partial-fraction split of ``(b - a u)/(1 - u^2)`` that Klein and Sommerfeld use.
 """
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -221,18 +222,7 @@ class SymmetricTop:
 
     def steady_theta(self, momenta: Momenta) -> float:
         """The inclination at which these momenta precess steadily: the minimum of V."""
-        from scipy.optimize import brentq  # scipy.optimize costs 0.2 s to import
-
-        if momenta.north == 0.0 and self._sleeps(momenta.south, self.mgl):
-            return 0.0
-        if momenta.south == 0.0 and self._sleeps(momenta.north, -self.mgl):
-            return math.pi
-        below, above = 1e-9, math.pi - 1e-9
-        if self.potential_slope(below, momenta) >= 0.0:  # the minimum is closer to the pole than anyone can tell
-            return 0.0
-        if self.potential_slope(above, momenta) <= 0.0:
-            return math.pi
-        return float(brentq(self.potential_slope, below, above, args=(momenta,), xtol=4e-16, rtol=1e-15))
+        return _steady_theta(self, momenta)
 
     def _sleeps(self, through: float, mgl: float) -> bool:
         """Is the pole that these momenta allow a minimum of V? `through` is 2 I3 w3 there."""
@@ -277,6 +267,23 @@ def nutation_cubic(top: Any, at: Any) -> tuple[float, float, float, float]:
     momenta, swing = conserved(top, at), at.phi_dot * math.sin(at.theta)
     excess = at.theta_dot * at.theta_dot + swing * swing
     return excess, 2.0 * top.mgl / top.I1, momenta.p_psi / top.I1, momenta.p_phi / top.I1
+
+
+@functools.lru_cache(maxsize=1024)
+def _steady_theta(top: SymmetricTop, momenta: Momenta) -> float:
+    """The minimum of V, kept: the guard, the scale of the energy and the landmarks of a new start ask for one."""
+    from scipy.optimize import brentq  # scipy.optimize costs 0.2 s to import
+
+    if momenta.north == 0.0 and top._sleeps(momenta.south, top.mgl):
+        return 0.0
+    if momenta.south == 0.0 and top._sleeps(momenta.north, -top.mgl):
+        return math.pi
+    below, above = 1e-9, math.pi - 1e-9
+    if top.potential_slope(below, momenta) >= 0.0:  # the minimum is closer to the pole than anyone can tell
+        return 0.0
+    if top.potential_slope(above, momenta) <= 0.0:
+        return math.pi
+    return float(brentq(top.potential_slope, below, above, args=(momenta,), xtol=4e-16, rtol=1e-15))
 
 
 @shared

@@ -20,12 +20,12 @@ import numpy as np
 
 from symtop.base.numbers import GOLDEN
 from symtop.methods.calling import solve
-from symtop.methods.plan import Plan
+from symtop.methods.plan import Plan, Run
 from symtop.methods.registry import Integrator, integrator
 from symtop.model import charts
+from symtop.model.readings import axes
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import axis_of
 from symtop.run.departure import SMALL, departure
 
 STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these, 0.05 to 3 ms
@@ -70,9 +70,10 @@ def _landmarks(top: SymmetricTop, at: Angles) -> Landmarks:
     near, far = (momenta.north, momenta.south) if upper else (momenta.south, momenta.north)
     sine = math.sin(0.5 * gap) ** 2
     rate = abs(far / math.cos(0.5 * gap) ** 2 + (near / sine if sine > 0.0 else 0.0)) / (4.0 * top.I1)
-    moved = [
+    moved = [Scene("landmarks", top, at, 1.0).nutation_period]  # kept: the plan has asked for it
+    moved += [
         top.nutation_period(Angles(at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot * (1.0 + turn), at.psi_dot))
-        for turn in (-4e-16, 0.0, 4e-16)
+        for turn in (-4e-16, 4e-16)
     ]
     spread = max(moved) - min(moved)
     shear = spread / max(moved) if math.isfinite(spread) else 1.0
@@ -122,10 +123,31 @@ def _marks(steps: int) -> Any:
     return np.unique(np.maximum(np.rint(_places() * (steps / POINTS)).astype(np.int64), 1))
 
 
+def repeats(method: Integrator, plan: Plan) -> bool:
+    """Would the probe of a run repeat the whole of it, every step of which is shown?
+
+    Only compiled methods are said to: a run of theirs that is thrown away costs 30 us.
+    """
+    if not method.fixed_step or method.implementation != "compiled":
+        return False
+    steps = plan.marks.size - 1
+    return 0 < steps == plan.marks.item(-1) <= AT_LEAST * STEPS["compiled"]
+
+
+def _read_off(done: Run, plan: Plan, piece: Plan) -> Run | None:
+    """The run of a probe from the run itself, the same bits; None if it is another, or something went wrong in it."""
+    every = piece.step_size == plan.step_size and piece.marks.item(-1) == plan.marks.item(-1) == plan.marks.size - 1
+    return done._replace(states=done.states[piece.marks]) if every and done.outcome == "ok" else None
+
+
 def _probe(
-    scene: Scene, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
-) -> Probe:
-    """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance."""
+    scene: Scene, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0,
+    done: Run | None = None,
+) -> Probe:  # fmt: skip
+    """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance.
+
+    A probe from the start that repeats the run, which may be `done`, is read off it.
+    """
     form, start = closed_form(scene), scene.start
     if since:
         start = Angles(*(float(value) for value in form(since)))
@@ -135,9 +157,11 @@ def _probe(
         piece = Plan.until(
             duration * (_places() / POINTS), plan.tolerance, min(plan.most(math.inf), MOST_WORK[method.implementation])
         )
-    run = solve(method, chart, scene.top, start, piece)
+    run = _read_off(done, plan, piece) if done is not None and not since else None
+    if run is None:
+        run = solve(method, chart, scene.top, start, piece)
     with np.errstate(all="ignore"):
-        error = form.axis_distance(since + piece.times, axis_of(chart, np.asarray(run.states)))
+        error = form.axis_distance(since + piece.times, axes(chart, np.asarray(run.states)))
     outcome = run.outcome
     if not (finite := np.isfinite(error)).all():
         error[~finite] = math.inf
@@ -173,8 +197,11 @@ def _fixed(scene: Scene, method: Integrator, probe: Probe, horizon: float, marks
     upright was wrong by 0.02 rad after 47 nutations and by 1 rad after 300).
     """
     straight = bool(method.symplectic or method.symmetric)
-    expected, bent = (grown(probe, horizon, straight=law) for law in (straight, False))
-    if expected < WORTH < bent and _amplifies(scene, SMALL, horizon, marks):
+    expected = grown(probe, horizon, straight=straight)
+    if not straight or not expected < WORTH:
+        return expected
+    bent = grown(probe, horizon, straight=False)
+    if bent > WORTH and _amplifies(scene, SMALL, horizon, marks):
         return bent
     return expected
 
@@ -228,7 +255,9 @@ def _adaptive(
     return expected if probe.times[-1] >= plan.horizon else max(expected, plan.tolerance), probe
 
 
-def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks) -> tuple[float, Probe]:
+def _expected(
+    scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks, done: Run | None
+) -> tuple[float, Probe]:
     """The largest axis error to expect, and the probe that says so."""
     straight = bool(method.symplectic or method.symmetric)
     period = marks.period if math.isfinite(marks.period) else plan.horizon
@@ -240,7 +269,7 @@ def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
     allowed = max(STEPS[method.implementation] * step, share)
     if twice <= allowed:
         piece = max(twice, share, AT_LEAST * STEPS[method.implementation] * step)
-        probe = _probe(scene, method, chart, plan, min(plan.horizon, piece), step)
+        probe = _probe(scene, method, chart, plan, min(plan.horizon, piece), step, done=done)
         return _fixed(scene, method, probe, plan.horizon, marks), probe
     coarse = twice / round(allowed / step)
     probe = _probe(scene, method, chart, plan, twice, coarse)
@@ -255,16 +284,16 @@ def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
     return expected, probe
 
 
-def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Forecast:
+def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, done: Run | None = None) -> Forecast:
     """Forecast the error of a run from a short run (a probe) of the same method; the run itself is not changed.
 
-    A method without a step or a tolerance, such as the closed form, is not probed.
+    A method without a step or a tolerance, such as the closed form, is not probed. `done` is the run, if it was made.
     """
     marks = landmarks(scene)
     steps, passage = marks.period / plan.step_size, marks.rate * plan.step_size
     if method.control is None:
         return Forecast(0.0, 0.0, steps, passage, "ok", plan.horizon)
-    expected, probe = _expected(scene, method, chart, plan, marks)
+    expected, probe = _expected(scene, method, chart, plan, marks, done)
     partly = method.adaptive and method.implementation == "python"
     partly = partly and not probe.times[-1] >= plan.horizon
     if partly and chart == "angles" and marks.gap < CLOSE:

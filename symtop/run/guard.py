@@ -21,7 +21,7 @@ import math
 
 from symtop.base.numbers import EPSILON
 from symtop.methods.outcomes import sentence
-from symtop.methods.plan import Plan
+from symtop.methods.plan import Plan, Run
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.forecast import Forecast, Landmarks, forecast, landmarks
@@ -39,11 +39,14 @@ NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a res
 COARSE = 1.0  # rad of precession in a step
 
 
-def warning(scene: Scene, method: Integrator, chart: str, plan: Plan) -> str:
-    """Warn before the run if a large error is expected: one sentence with a remedy, else an empty one."""
+def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, done: Run | None = None) -> str:
+    """Warn before the run if a large error is expected: one sentence with a remedy, else an empty one.
+
+    `done` is the run itself, where it has been made already because the probe would repeat it (`forecast.repeats`).
+    """
     if method.control is None:
         return ""
-    expected, marks = forecast(scene, method, chart, plan), landmarks(scene)
+    expected, marks = forecast(scene, method, chart, plan, done), landmarks(scene)
     reason = _unstable(scene, method, chart, plan, marks, expected) or _cause(
         scene, method, chart, plan, marks, expected
     )
