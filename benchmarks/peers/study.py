@@ -68,7 +68,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 
 def _gains(data: xr.Dataset, known: dict[str, list[str]]) -> list[str]:
-    """By how many times SciPy's solve_ivp takes longer on the same equations, in both calls; empty if one is missing."""
+    """How many times as long SciPy's solve_ivp takes on the same equations, in both calls; empty if one is missing."""
     theirs = known.get("scipy[axis], numba", [])
     spans = [summary.span(data, call, known.get(OURS, []), theirs) for call in NAMES]
     if not theirs or None in spans:
