@@ -84,7 +84,7 @@ def accumulate(state: Any, low: Any, dstate: Any) -> Any:
 
 @register_jitable
 def accumulate_plainly(state: Any, low: Any, dstate: Any) -> Any:
-    """What everybody else's loop does: every step rounds, and what it rounds off is lost. For comparison only."""
+    """What everybody else's loop does: what a step rounds off is lost, if the kernel does not keep it. To compare."""
     for i in range(len(state)):
         state = set_item(state, i, state[i] + dstate[i])
     return state, low

@@ -32,13 +32,19 @@ def _reading(count: int) -> Callable[..., Any]:
     return registered
 
 
-def one_loop(advance: Callable[..., Any], rule: Any, *, top: Any, dimension: int, carry: int) -> Lanes:
-    """``advance(par, rule, state, carry)`` is the increment, the next carry and an outcome; `rule` its NamedTuple."""
+def one_loop(
+    advance: Callable[..., Any], rule: Any, *, top: Any, dimension: int, carry: int,
+    add: Callable[..., Any] = accumulate,
+) -> Lanes:  # fmt: skip
+    """``advance(par, rule, state, carry)`` is the increment, the next carry and an outcome; `rule` its NamedTuple.
+
+    `add` is how increments are summed, as in `loop.driver`.
+    """
     tops, fields = len(top._fields), len(rule._fields)
-    zeros, given, none = (0.0,) * dimension, (0.0,) * fields, (0.0,) * carry
+    zeros, given = (0.0,) * dimension, (0.0,) * fields
     step_at, flag, carry_at = 2 * dimension, 3 * dimension, 3 * dimension + 2
     register_jitable(advance)
-    top_of, rule_of = _reading(tops), _reading(fields)
+    top_of, rule_of, carried = _reading(tops), _reading(fields), _reading(carry)
 
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
         for i in range(fields):
@@ -55,9 +61,9 @@ def one_loop(advance: Callable[..., Any], rule: Any, *, top: Any, dimension: int
         for j in range(W):
             par, scaled = top(*top_of(table, 0, j)), rule(*rule_of(table, tops, j))
             state, lost = column(block, 0, j, zeros), block[flag * W + j]
-            dstate, after, outcome = advance(par, scaled, state, column(block, carry_at, j, none))
+            dstate, after, outcome = advance(par, scaled, state, carried(block, carry_at, j))
             block[flag * W + j] = lost if outcome == OK else 1.0
-            moved, low = accumulate(state, column(block, dimension, j, zeros), dstate)
+            moved, low = add(state, column(block, dimension, j, zeros), dstate)
             put(block, 0, j, moved)
             put(block, dimension, j, low)
             put(block, step_at, j, dstate)

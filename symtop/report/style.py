@@ -73,6 +73,7 @@ _LOOKS = {
     "takahashi-imada": Look(GREEN, "P"), "chin-4a": Look(GREENS[1], "X"), "yoshida-4": Look(GREENS[2], "p"),
     "suzuki-4": Look(GREEN, "h"),
     "srkn-6-4": Look(GREENS[1], "8"), "srkn-11-6": Look(GREENS[2], "d"), "srkn-14-6": Look(GREEN, "H"),
+    "srkn-19-8": Look(GREENS[1], "*"),
     "kahan-li-6": Look(GREENS[1], "o"), "suzuki-umeno-8": Look(GREENS[2], "s"), "kahan-li-8": Look(GREEN, "v"),
     "sofroniou-spaletta-10": Look(GREENS[1], "<"),
     "aba-8-6-4": Look(GREENS[2], ">"), "aba-10-6-4": Look(GREEN, "D"), "aba-10-4": Look(GREENS[1], "P"),

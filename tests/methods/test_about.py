@@ -13,7 +13,7 @@ from symtop.methods.fixed_step import inside
 NAMES = tuple(symtop.integrators())
 COUNTED = """zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen
 seventeen"""
-NUMBERS = {word: value for value, word in enumerate(COUNTED.split())} | {"thirty-five": 35}
+NUMBERS = {word: value for value, word in enumerate(COUNTED.split())} | {"nineteen": 19, "thirty-five": 35}
 COST = re.compile(r"(\S+) force evaluations? (a step|an iteration|a sweep)")
 
 
