@@ -18,6 +18,9 @@ from typing import Any
 LOADING, IMPORTING = 0.05, 0.3  # seconds: a kernel from the cache, numba
 
 
+LAZY: "list[LazyKernel]" = []  # of the modules that have been imported
+
+
 class LazyKernel:
     """A plain function and the types of its arguments as a kernel, in numba's words: ``"(float64, float64[::1])"``."""
 
@@ -27,6 +30,7 @@ class LazyKernel:
         self._kernel: Any = None
         self._spent = 0.0
         self._lock = threading.Lock()  # a kernel half made is not for a second thread
+        LAZY.append(self)
 
     def ready(self, seconds: float) -> bool:
         """Is the compiled function the one to call, for work that takes `seconds` interpreted?"""

@@ -21,10 +21,13 @@ PERIODS = 0.02  # of a nutation: the length of a run
 
 
 def _truth(_: str) -> None:
+    from symtop.base.lazy import LAZY
     from symtop.model.scenes import scene
     from symtop.run.reference import reference
     from symtop.run.simulation import simulate
 
+    for kernel in LAZY:
+        kernel.compile()
     period = scene(SCENE).nutation_period
     run = simulate(SCENE, "strang", step_size=period / 100.0, horizon=period, samples=3)
     reference(SCENE, run["time"].values)
