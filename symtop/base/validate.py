@@ -48,6 +48,14 @@ def finite(name: str, value: object) -> float:
     return number
 
 
+def not_negative(name: str, value: object) -> float:
+    """A finite number that is at least zero."""
+    number = finite(name, value)
+    if number < 0.0:
+        raise SymtopError(f"{name} must be at least 0, not {number!r}")
+    return number
+
+
 def positive(name: str, value: object) -> float:
     """Return `value` as a float; refuse anything that is not finite and above zero."""
     number = finite(name, value)

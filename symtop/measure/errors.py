@@ -55,7 +55,8 @@ def errors(
     stay NaN. `precision` is that of `reference`; the closed form costs a microsecond a sample, and its rounding does
     not grow with time.
 
-    Warns (`SymtopWarning`) where a foreign trajectory starts elsewhere than the scene or holds NaN.
+    Warns (`SymtopWarning`) where a foreign trajectory starts elsewhere than the scene, goes on for a hundred of its
+    horizons, or holds NaN.
     Raises SymtopError for data that are no such trajectory, an unknown scene, and no scene where the data name none.
     """
     one_of("precision", precision, PRECISIONS)
@@ -67,7 +68,7 @@ def errors(
         refuse_other_order(data, truth)
     data = completed(data) if foreign else data
     columns = _columns(chosen, data, truth)
-    for sentence in doubts(data, columns) if foreign else ():
+    for sentence in doubts(data, columns, chosen.horizon) if foreign else ():
         warnings.warn(f"on {chosen.name}: {sentence}", SymtopWarning, stacklevel=2)
     bounds = {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns}
     shown = _beside(data, columns | bounds)

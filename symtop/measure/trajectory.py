@@ -19,6 +19,7 @@ from symtop.model.top import Angles, SymmetricTop
 
 LENGTH = 1e-3  # how far from one the length of an axis or a quaternion may be: more than single precision leaves
 FAR, NEAR = 0.1, 0.01  # rad from the true attitude: another order of a quaternion, and the right one
+BEYOND = 100.0  # horizons: milliseconds for seconds are a thousand
 CONSTANTS = ("energy", "p_phi", "p_psi")
 SHAPES: dict[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
     "axis": (("time", "component"), (3,)),
@@ -143,14 +144,22 @@ def refuse_other_order(data: xr.Dataset, truth: xr.Dataset) -> None:
             )
 
 
-def doubts(data: xr.Dataset, errors: Mapping[str, charts.Array]) -> list[str]:
-    """What is wrong with a foreign trajectory as a whole: a start that is another one, samples that are not numbers."""
+def doubts(data: xr.Dataset, errors: Mapping[str, charts.Array], horizon: float) -> list[str]:
+    """What is wrong with a foreign trajectory as a whole: another start, another clock, samples that are not numbers.
+
+    `horizon` is that of the scene: times far beyond it may be in another unit.
+    """
     said, time = [], data["time"].values
     name = "attitude" if "attitude" in errors else "axis" if "axis" in errors else "theta"
     if errors[name][0] > FAR:
         said.append(
             f"the first sample, at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}: is this the "
             "start of the scene, and is its time counted from there?"
+        )
+    if time[-1] > BEYOND * horizon:
+        said.append(
+            f"times reach to {time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}: are they in the "
+            "scene's unit of time?"
         )
     for name, values in errors.items():
         if np.isnan(values).any():

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from symtop.base.parts import inlined, shared
-from symtop.base.validate import SymtopError, finite, positive
+from symtop.base.validate import SymtopError, finite, not_negative, positive
 from symtop.model import starts
 from symtop.model.effective import effective_force, effective_potential, effective_stiffness
 
@@ -160,7 +160,7 @@ class SymmetricTop:
         mass = positive("mass", mass)
         polar = positive("polar_radius", polar_radius)
         equatorial = positive("equatorial_radius", equatorial_radius)
-        gravity = finite("gravity", gravity)
+        gravity = not_negative("gravity", gravity)
         across = mass * (polar * polar + equatorial * equatorial) / 5.0
         along = 2.0 * mass * equatorial * equatorial / 5.0
         if pivot_distance is None:
@@ -181,7 +181,7 @@ class SymmetricTop:
         across, axial = positive("at_centre", at_centre), positive("axial", axial)
         if axial > 2.0 * across:
             raise SymtopError(f"axial must be at most 2 at_centre (no rigid body exceeds it), not {axial!r}")
-        return cls(across + mass * arm * arm, axial, mass * finite("gravity", gravity) * arm)
+        return cls(across + mass * arm * arm, axial, mass * not_negative("gravity", gravity) * arm)
 
     def spheroid_radii(self, mass: float) -> tuple[float, float]:
         """Polar and equatorial radius of the solid spheroid that has this inertia about its centre.

@@ -94,7 +94,8 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
             if not good.any():
                 continue
             order = np.argsort(across[good])
-            label = str(name) if data.sizes["scene"] == 1 else f"{name} on {scene}"
+            row = str(name) if "chart" not in cell or str(name).endswith("]") else f"{name}[{cell['chart'].item()}]"
+            label = row if data.sizes["scene"] == 1 else f"{row} on {scene}"
             ax.plot(
                 across[good][order], np.maximum(cell[quantity].values[good][order], LEAST), LINES[number % len(LINES)],
                 color=look(str(name)).color, marker=look(str(name)).marker, ms=4.5, lw=1.2, label=label,

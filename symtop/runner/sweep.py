@@ -25,7 +25,7 @@ from symtop.measure.errors import QUANTITIES
 from symtop.measure.settings import ANGLES
 from symtop.methods.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, scene as find_scene
-from symtop.run.simulation import make_plan
+from symtop.run.simulation import chart_of, make_plan
 from symtop.runner import depends
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
@@ -62,6 +62,7 @@ def sweep(
         axis_bound ...                                 the least error that the reference can judge
         steps, force_evaluations, newton_iterations    work
         step_size, tolerance                           what was set; NaN where the method has no such setting
+        chart                                          of the run, over scene and integrator
         outcome, message                               "ok", or how the run ended; "not_run" where a method has fewer
                                                        settings; "raised", with the message, if it raised an exception
 
@@ -91,6 +92,10 @@ def sweep(
         tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in _rows(asked, len(methods))]
         data = xr.concat([xr.concat(row, "integrator") for row in tables], "scene")
         data = data.assign_coords(scene=[one.name for one in chosen], integrator=[one.name for one in methods])
+        data["chart"] = (
+            ("scene", "integrator"),
+            [[chart_of(method, one.observes, observe) for method in methods] for one in chosen],
+        )
         units = chosen[0].units if len({one.units for one in chosen}) == 1 else ""
         return _described(datasets.describe(data, "errors and work of a sweep", units=units))
 
@@ -225,7 +230,8 @@ def _stored(file: Path) -> dict[str, xr.Dataset]:
             digest = str(cell["made_of"].values)
             run = cell["outcome"].values != "not_run"
             if digest and run.any():
-                cells[digest] = cell.drop_vars(["scene", "integrator", "made_of"]).isel(setting=np.flatnonzero(run))
+                own = cell.drop_vars(["scene", "integrator", "made_of", "chart"], errors="ignore")
+                cells[digest] = own.isel(setting=np.flatnonzero(run))
     return cells
 
 

@@ -1,5 +1,7 @@
 """`symtop.errors`: the errors of a run and of anybody's trajectory, with controls that must and must not show one."""
 
+import warnings
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -176,3 +178,15 @@ def test_bad_data_are_refused_in_one_sentence(data, scene, words):
     with pytest.raises(symtop.SymtopError, match=words) as caught:
         symtop.errors(data, scene)
     assert "\n" not in str(caught.value)
+
+
+def test_another_unit_of_time_is_asked_about():
+    """Milliseconds for seconds; the control: a trajectory that goes on for fifty horizons is nobody's mistake."""
+    horizon = symtop.scene("spheroid").horizon
+    for times, doubtful in ((np.linspace(0.0, 1e3 * horizon, 41), True), (np.linspace(0.0, 50 * horizon, 41), False)):
+        data = {"time": times, "quaternion": reference("spheroid", times)["quaternion"].values}
+        with warnings.catch_warnings(record=True) as heard:
+            warnings.simplefilter("always")
+            symtop.errors(data, "spheroid")
+        said = [str(one.message) for one in heard]
+        assert [("are they in the scene's unit of time" in one) for one in said] == [True] * doubtful

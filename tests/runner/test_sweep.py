@@ -150,3 +150,11 @@ def test_everything_can_be_drawn_on_given_axes(data):
     ):  # fmt: skip
         with pytest.raises(symtop.SymtopError, match=says):
             symtop.plot(**words)
+
+
+def test_the_chart_of_each_run_is_said(data):
+    assert data["chart"].sel(scene="spheroid", integrator="rk4[axis]").item() == "axis"
+    charts = symtop.sweep(["spheroid", "grazing"], ["rk4", "strang"], step_size=0.01, horizon=0.5, quiet=True)["chart"]
+    for (scene, name), chart in zip([(s, n) for s in ("spheroid", "grazing") for n in ("rk4", "strang")],
+                                    charts.values.ravel(), strict=True):  # fmt: skip
+        assert symtop.simulate(scene, name, step_size=0.01, horizon=0.5, guard=False).attrs["chart"] == chart
