@@ -67,6 +67,7 @@ def draw(data: xr.DataTree) -> Picture:
         f"{words.spot_sentence(data)} Gauss methods take no part in energy and shape, which they keep at any step. "
         "Closed forms (exact, exact-discrete) take no part: they cost the same at every horizon.",
         "Maps of the cheapest method over horizon and allowed error, three panels for random tops, three for a scene.",
+        lead="Cheapest by error and run length",
     )
 
 
