@@ -18,6 +18,8 @@ static inline void add(double *high, double *low, double increment) { /* Knuth's
     *high = total;
 }
 
+#define ADD(high, low, increment) add(high, low, increment) /* a family whose steps keep what they round off has another */
+
 static inline int finite_outcome(double value) { return isfinite(value) ? 0 : 3; }
 
 static inline int chart_outcome(double theta) {
@@ -41,7 +43,7 @@ static inline int chart_outcome(double theta) {
             long effort = 0;                                                                                         \
             if (increment(&par, &rule, now, &carry, h, step, &effort)) break;                                        \
             total += effort;                                                                                         \
-            for (int i = 0; i < DIM; i++) add(&now[i], &low[i], step[i]);                                            \
+            for (int i = 0; i < DIM; i++) ADD(&now[i], &low[i], step[i]);                                            \
         }                                                                                                            \
         memcpy(state, now, sizeof now);                                                                              \
         *work = total;                                                                                               \
