@@ -72,7 +72,7 @@ def recorded(words: list[str], limit: float = 300.0, **environment: str) -> Reco
 
 def commands() -> list[list[str]]:
     """The commands of the README that end by themselves."""
-    lines = [line for block in re.findall(r"```sh\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    lines = [line for block in re.findall(r"```sh(?: slow)?\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
              for line in block.splitlines()]  # fmt: skip
     every = [shlex.split(line, comments=True) for line in lines if line.startswith("symtop ")]
     return [words[1:] for words in every if words[1] not in ENDLESS]

@@ -153,7 +153,7 @@ def _tools() -> list[Finding]:
     from symtop.runner import scripts
 
     return [
-        Finding("studies", f"{', '.join(scripts.names())} in {scripts.folder()}"),
+        Finding("studies", f"{len(scripts.names())} in {scripts.folder()}"),
         Finding("cores", f"{os.cpu_count()}"),
         Finding("gcc", shutil.which("gcc") or "absent; only the benchmarks of a checkout (make bench) need it"),
     ]
