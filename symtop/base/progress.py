@@ -11,16 +11,16 @@ BEAT = 1.0  # seconds from one look of the clock to the next
 
 
 @contextlib.contextmanager
-def ticking(words: str) -> Iterator[Any]:
-    """Some words and the time since, on the standard error if that is a terminal, drawn each second until the end."""
-    with tqdm(desc=words, bar_format="{desc}: {elapsed}", disable=None, leave=False) as bar:
-        ended = threading.Event()
+def beating(bar: Any) -> Iterator[Any]:
+    """A progress bar, drawn again each second although nothing is finished; it is closed at the end."""
+    ended = threading.Event()
 
-        def beat() -> None:
-            while not ended.wait(BEAT):
-                bar.refresh()
+    def beat() -> None:
+        while not ended.wait(BEAT):
+            bar.refresh()
 
-        thread = threading.Thread(target=beat, daemon=True)
+    thread = threading.Thread(target=beat, daemon=True)
+    with bar:
         if not bar.disable:
             thread.start()
         try:
@@ -29,3 +29,10 @@ def ticking(words: str) -> Iterator[Any]:
             ended.set()
             if thread.is_alive():
                 thread.join()
+
+
+@contextlib.contextmanager
+def ticking(words: str) -> Iterator[Any]:
+    """Some words and the time since, on the standard error if that is a terminal, drawn each second until the end."""
+    with beating(tqdm(desc=words, bar_format="{desc}: {elapsed}", disable=None, leave=False)) as bar:
+        yield bar

@@ -24,7 +24,8 @@ def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]
         from symtop.runner import plugins
 
         for file in files:
-            plugins.load(file)
+            if not plugins.load(file):
+                warn(f"{Path(file).name} registers no integrator and no scene (symtop.register, symtop.register_scene)")
 
 
 plugin_option = click.option(
@@ -68,8 +69,24 @@ class Group(click.Group):
         sentence = re.sub(r"(?<![\w'-])(step_size|per_nutation)(?![\w'])", lambda m: options[m[1]], sentence)
         argued = rf"(?<![\w'-])((?:give|or|not|see) |^)({'|'.join(options)})(?= must|\)|,| = |$)"
         sentence = re.sub(argued, lambda match: match[1] + options[match[2]], sentence)
-        kind = re.match(r"(scene|integrator) .* is unknown; did you mean ", sentence)
-        return f"{sentence} (symtop {kind[1]}s lists all)" if kind else sentence
+        unknown = re.match(r"(scene|integrator) '(.*)' is unknown; (did you mean )?", sentence)
+        if unknown is None:
+            return sentence
+        kind, name, near = unknown.groups()
+        if _is_of_the_other_kind(kind, name):
+            return f"{kind} {name!r} is unknown; it is the name of {OTHER[kind]}, and the scene comes first"
+        return f"{sentence} (symtop {kind}s lists all)" if near else sentence
+
+
+OTHER = {"scene": "an integrator", "integrator": "a scene"}
+
+
+def _is_of_the_other_kind(kind: str, name: str) -> bool:
+    """Has somebody typed an integrator where a scene should stand, or a scene in place of an integrator?"""
+    from symtop.methods.registry import integrators, split_name
+    from symtop.model.scenes import scenes
+
+    return name in scenes() if kind == "integrator" else split_name(name)[0] in integrators()
 
 
 def tell_of_compiling() -> None:

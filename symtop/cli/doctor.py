@@ -20,6 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
+from symtop.base.progress import beating
+
 LEAST_SPACE = 500_000_000  # free bytes below which a full run of the studies may not fit on the disk
 LARGE_CACHE = 5_000_000_000  # bytes of a cache that the doctor advises to delete
 TAYLOR_GAP = 1e-12  # rad, allowed between the closed form and Taylor over one horizon
@@ -42,12 +44,14 @@ def examine(results: Path) -> list[Finding]:
         _python, _packages, _heyoka, _caches, lambda: _results(results), _tools, _self_check,
     ]  # fmt: skip
     findings = []
-    for check in tqdm(checks, desc="checking", unit="check", disable=None, leave=False):
-        try:
-            findings += check()
-        except Exception as error:  # noqa: BLE001  (one check that fails must not hide the others)
-            topic = check.__name__.strip("_").replace("_", " ")
-            findings.append(Finding(topic, _sentence(error), False, "report this with all of this page"))
+    with beating(tqdm(total=len(checks), desc="checking", unit="check", disable=None, leave=False)) as bar:
+        for check in checks:
+            try:
+                findings += check()
+            except Exception as error:  # noqa: BLE001  (one check that fails must not hide the others)
+                topic = check.__name__.strip("_").replace("_", " ")
+                findings.append(Finding(topic, _sentence(error), False, "report this with all of this page"))
+            bar.update()
     return findings
 
 

@@ -50,13 +50,16 @@ def ensemble(
     symtop ensemble --members 10000 --seed 1 strang --step-size 0.01 --horizon 20 -o runs.nc
     symtop ensemble --kind grazing "gauss-4[axis]" --per-nutation 50 --nutations 10 --figure spread.png
     """
-    from symtop.measure.spread import LEVELS, QUANTITIES, largest, member_errors, spread
-    from symtop.run import ensemble as runs
-    from symtop.run.population import population
+    from symtop.base.progress import ticking
 
     figure_file("--figure", figure)
     standing("--output", output)
-    tops = population(members, seed=seed, kind=kind)
+    with ticking("drawing tops"):
+        from symtop.measure.spread import LEVELS, QUANTITIES, largest, member_errors, spread
+        from symtop.run import ensemble as runs
+        from symtop.run.population import population
+
+        tops = population(members, seed=seed, kind=kind)
     try:
         data = runs.ensemble(
             tops, integrator, step_size=step_size, per_nutation=per_nutation, tolerance=tolerance, horizon=horizon,
@@ -66,12 +69,13 @@ def ensemble(
         warn("interrupted" + ("" if output is None else "; the tops that were run are kept: the same command resumes"))
         sys.exit(130)
     few, shown = (part.isel(member=slice(0, COMPARED)) for part in (tops, data))
-    if figure is not None:
-        from symtop.report import ensemble as picture
-
-        picture.draw(few, shown, figure)
     outcomes, steps = Counter(data["outcome"].values.tolist()), int(data["steps"].sum())
-    worst = {name: spread(largest(member_errors(few, shown, name))[:, None])[:, 0].tolist() for name in QUANTITIES}
+    with ticking("comparing with the exact motion"):
+        if figure is not None:
+            from symtop.report import ensemble as picture
+
+            picture.draw(few, shown, figure)
+        worst = {name: spread(largest(member_errors(few, shown, name))[:, None])[:, 0].tolist() for name in QUANTITIES}
     data.close()
     if as_json:
         errors = {

@@ -37,31 +37,32 @@ def run(
     symtop run spheroid "rk4[axis]" --step-size 0.01
     symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
     """
-    from symtop.base import datasets
     from symtop.base.progress import ticking
-    from symtop.measure.errors import QUANTITIES, errors_against
-    from symtop.measure.verdicts import judgement
-    from symtop.model import scenes
-    from symtop.run.reference import reference
-    from symtop.run.simulation import simulate
 
     figure_file("--figure", figure)
     standing("--output", output)
-    with ticking("running"):
+    with ticking("running"):  # the packages are loaded under the clock, too
+        from symtop.base import datasets
+        from symtop.measure.errors import QUANTITIES, errors_against
+        from symtop.measure.verdicts import judgement
+        from symtop.model import scenes
+        from symtop.run.reference import reference
+        from symtop.run.simulation import simulate
+
         data = simulate(
             scene, integrator, step_size=step_size, tolerance=tolerance, horizon=horizon, samples=samples,
             observe=observe, guard=warn if guard else False, budget=budget,
         )  # fmt: skip
-    if output is not None:
-        datasets.write(data, output)
-    chosen = scenes.scene(scene)
-    truth = reference(chosen, data["time"].values, precision="closed-form")
-    error = errors_against(chosen, data, truth)
-    verdict = judgement(chosen, data, error["axis"].values)
-    if figure is not None:
-        from symtop.report import single
+        if output is not None:
+            datasets.write(data, output)
+        chosen = scenes.scene(scene)
+        truth = reference(chosen, data["time"].values, precision="closed-form")
+        error = errors_against(chosen, data, truth)
+        verdict = judgement(chosen, data, error["axis"].values)
+        if figure is not None:
+            from symtop.report import single
 
-        single.draw(chosen, data, truth, error, figure)
+            single.draw(chosen, data, truth, error, figure)
     series = {name: error[name].dropna("time").values for name in QUANTITIES if name in error}
     largest = {
         name: {"largest": float(values.max()), "last": float(values[-1])}
@@ -106,13 +107,16 @@ def long(
     \b
     symtop long spheroid stormer-verlet --steps 1e9 --output long.nc
     """
-    from symtop.base import datasets
-    from symtop.base.validate import whole
-    from symtop.model import scenes
-    from symtop.run.long_run import PER_NUTATION, long_run
+    from symtop.base.progress import ticking
 
     standing("--output", output)
     standing("--checkpoint", checkpoint)
+    with ticking("loading"):
+        from symtop.base import datasets
+        from symtop.base.validate import whole
+        from symtop.model import scenes
+        from symtop.run.long_run import PER_NUTATION, long_run
+
     h = scenes.scene(scene).nutation_period / PER_NUTATION if step_size is None else step_size
     count = whole("steps", steps, 1)
     try:
@@ -154,17 +158,19 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     symtop claims midpoint rk4
     symtop claims --plugin my_methods.py
     """
-    from symtop.judging.claims import judge
-    from symtop.methods import registry
-    from symtop.model import scenes
+    from symtop.base.progress import ticking
 
-    chosen = scenes.scene(scene)
-    added = [name for name in registry.integrators() if not registry.is_built_in(name)]
-    ledgers = (
-        judge(registry.integrator(name), chosen, quick=quick) for name in names or added or registry.integrators()
-    )
+    with ticking("loading"):
+        from symtop.judging.claims import judge
+        from symtop.methods import registry
+        from symtop.model import scenes
+
+        chosen = scenes.scene(scene)
+        added = [name for name in registry.integrators() if not registry.is_built_in(name)]
     refuted, entries = False, []
-    for ledger in ledgers:
+    for name in names or added or registry.integrators():
+        with ticking(f"measuring {name}"):
+            ledger = judge(registry.integrator(name), chosen, quick=quick)
         refuted |= any(finding.verdict == "refuted" for finding in ledger.findings)
         if as_json:
             about = {"integrator": ledger.integrator, "scene": chosen.name}

@@ -36,9 +36,10 @@ def recommend(
     """
     import dataclasses
 
-    from symtop import advise
     from symtop.base.progress import ticking
 
+    with ticking("loading"):
+        from symtop import advise
     if (accuracy is None) is (engine is None):
         raise click.UsageError("say either --accuracy or --i-use")
     if engine is not None:
@@ -67,8 +68,10 @@ def doctor(results: str, warm: bool, as_json: bool) -> None:
 
     The exit code is 1 if there is a fault. It takes some seconds; with --warm, some minutes the first time.
     """
-    from symtop.cli import doctor as checks
+    from symtop.base.progress import ticking
 
+    with ticking("loading"):
+        from symtop.cli import doctor as checks
     if warm:
         from symtop.cli.warm import warm as compile_all
 

@@ -13,6 +13,7 @@ from typing import Any
 from tqdm import tqdm
 
 from symtop.base.cache import cache_root
+from symtop.base.progress import beating
 from symtop.base.strangers import words_of
 from symtop.base.threads import cores
 
@@ -90,5 +91,9 @@ def warm(jobs: int | None = None) -> tuple[int, list[str]]:
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context) as pool:
         done = pool.map(_run, todo)
-        failed = [why for why in tqdm(done, "compiling", len(todo), unit="run", disable=None, leave=False) if why]
+        with beating(tqdm(desc="compiling", total=len(todo), unit="run", disable=None, leave=False)) as bar:
+            failed = []
+            for why in done:
+                failed += [why] if why else []
+                bar.update()
     return kernels() - before, failed

@@ -121,8 +121,8 @@ def momentum_unit(par: Any, state: Any) -> float:
 def working_space(field: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
     """One array for all that a step reads and writes, because numba counts references to each: 10 ns an array.
 
-    Of its rows 0 .. s-1 hold L_i and then h b_i; s .. 2s-1 are room for the prediction; 2s .. 3s-1 hold mu and then
-    mu diag(h b) mu, which Newton needs; 3s .. 4s-1 hold the predictor; row 4s begins with 1/|L|, the unit in which
+    Of its rows 0 .. s-1 hold L_i and then h b_i; s .. 2s-1 are room for the prediction; 2s .. 3s-1 hold mu, and then
+    have room for what Newton makes of it; 3s .. 4s-1 hold the predictor; row 4s begins with 1/|L|, the unit in which
     corrections of L are judged; the last 3s are room for Newton's equations. L_i starts as h b_i f(y).
     """
     stages, dimension = len(rule.b), len(state)
@@ -137,8 +137,6 @@ def working_space(field: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
         for j in range(stages):
             work[2 * stages + i, j] = rule.mu[i, j]
             work[3 * stages + i, j] = rule.predict[i, j]
-            for k in range(stages):
-                work[2 * stages + i, stages + j] += rule.mu[i, k] * weights[k] * rule.mu[k, j]
     return work
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from symtop.base import cluster, datasets
+from symtop.base.progress import beating
 from symtop.base.threads import MOST_THREADS, cores, in_order, in_threads
 from symtop.base.validate import SymtopError, place, positive, truth, whole
 from symtop.methods.outcomes import OUTCOMES
@@ -90,7 +91,9 @@ def ensemble(
     columns = dict[str, Any]()
     done = sum(piece.stop - piece.start for piece in pieces) - sum(piece.stop - piece.start for piece in rest)
     with (
-        tqdm(total=n, initial=done, desc=words["title"], unit="top", disable=silent or None, leave=False) as bar,
+        beating(
+            tqdm(total=n, initial=done, desc=words["title"], unit="top", disable=silent or None, leave=False)
+        ) as bar,
         contextlib.closing(_computed(job, rest, workers, scheduler)) as parts,
     ):
         for piece, part in zip(rest, parts, strict=True):

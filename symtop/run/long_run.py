@@ -27,6 +27,7 @@ from symtop.base.cache import cache_root
 from symtop.base.compiled import code_of
 from symtop.base.fingerprint import digest, file_reasons, hashed
 from symtop.base.numbers import GOLDEN
+from symtop.base.progress import beating
 from symtop.base.signals import ending_on_sigterm
 from symtop.base.validate import SymtopError, SymtopWarning, place, positive, whole
 from symtop.methods.fixed_step import FixedStep, inside
@@ -140,8 +141,8 @@ def long_run(
     gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
     with (
         book.kept(),
-        tqdm(total=count, initial=at.k, desc=f"{method.name} on {chosen.name}", unit="step", unit_scale=True,
-             disable=quiet or None, leave=False) as bar,
+        beating(tqdm(total=count, initial=at.k, desc=f"{method.name} on {chosen.name}", unit="step", unit_scale=True,
+                     disable=quiet or None, leave=False)) as bar,
     ):  # fmt: skip
         while gauge is not None and len(rows) < len(ends) and outcome == OK:
             done, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))

@@ -14,18 +14,25 @@ _loaded: dict[Path, str] = {}  # files of plug-ins in use, and their hashes
 _owners: dict[str, tuple[str, str]] = {}  # of an integrator or a scene: the label and hash of its plug-in
 
 
-def load(path: str | Path) -> None:
-    """Run a plug-in file once; what it registers is then known to every study and command."""
+def load(path: str | Path) -> list[str]:
+    """Run a plug-in file once; what it registers, whose names are returned, is then known to studies and commands."""
     file = python_file(path, "plugin must be a Python file")
     if file in _loaded:
-        return
-    before = {*integrators(), *scenes()}
+        return _registered_by(file)
+    before = [*integrators().values(), *scenes().values()]
     with door(f"plugin {file.name}"):
         execute(f"symtop_plugin_{file.stem}", file)
     beside = [file, *sorted(file.parent.glob("*.py"))[:MOST_NEIGHBOURS]]
     _loaded[file] = fingerprint.hashed(*(fingerprint.file_hash(path) for path in beside))
     made_of = f"plug-in {file.name}", _loaded[file]
-    _owners.update(dict.fromkeys({*integrators(), *scenes()} - before, made_of))
+    for entry in (*integrators().values(), *scenes().values()):
+        if not any(entry is known for known in before):
+            _owners[entry.name] = made_of
+    return _registered_by(file)
+
+
+def _registered_by(file: Path) -> list[str]:
+    return [name for name, made_of in _owners.items() if made_of == (f"plug-in {file.name}", _loaded[file])]
 
 
 def loaded() -> list[str]:

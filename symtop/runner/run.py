@@ -18,6 +18,7 @@ import xarray as xr
 from tqdm import tqdm
 
 from symtop.base import datasets, fingerprint
+from symtop.base.progress import beating
 from symtop.base.validate import SymtopError, label, positive
 from symtop.runner import depends, plugins, seen, store
 from symtop.runner.execute import execute
@@ -89,7 +90,7 @@ class Round:
         """Have cases computed, with a progress bar where somebody is watching."""
         script = str(file_of(self.study.name))
         tasks = [Task(script, case, str(path), tuple(plugins.loaded()), limit, fresh) for path, case in missing.items()]
-        with _bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case") as bar:
+        with beating(_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case")) as bar:
 
             def on_result(_: Task, result: Result) -> None:
                 if result.state == "failed":
@@ -162,7 +163,7 @@ def run(study: Study, results: Path, *, quick: bool = False, full: bool = False,
             raise
     with (
         store.locked(results / f"{study.name}.nc", wait=True),
-        _bar(f"{study.name}: combining and drawing", quiet=quiet),
+        beating(_bar(f"{study.name}: combining and drawing", quiet=quiet)),
     ):
         findings = _conclude(cases, stamp, save, quick=quick)
     return {**findings, "computed": cases.computed, "seconds": time.monotonic() - began}

@@ -17,6 +17,7 @@ import xarray as xr
 from tqdm import tqdm
 
 from symtop.base import datasets, fingerprint
+from symtop.base.progress import beating
 from symtop.base.threads import MOST_THREADS, cores, in_threads
 from symtop.base.validate import SymtopError, place, positive, row, truth, whole
 from symtop.base.walk import Walk
@@ -100,8 +101,8 @@ def sweep(
         return _described(datasets.describe(data, "errors and work of a sweep", units=units))
 
     kept = time.monotonic()
-    with tqdm(
-        total=len(asked), initial=len(asked) - len(rest), desc="sweep", disable=silent or None, leave=False
+    with beating(
+        tqdm(total=len(asked), initial=len(asked) - len(rest), desc="sweep", disable=silent or None, leave=False)
     ) as bar:
         try:
             for cell, table in zip(rest, in_threads(_table, rest, workers), strict=True):

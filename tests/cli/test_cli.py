@@ -84,6 +84,40 @@ def test_bad_input_is_one_sentence_and_code_2(arguments, says):
     assert "Traceback" not in done.output
 
 
+def test_a_plugin_that_registers_nothing_is_told_of(tmp_path):
+    for text, told in (("x = 1\n", True), (ANOTHER_NAME, False), (REPLACED, False)):
+        plugin = tmp_path / f"plugin_{len(text)}.py"
+        plugin.write_text(text, encoding="utf-8")
+        done = call("scenes", "--plugin", plugin)
+        assert done.exit_code == 0
+        assert (f"{plugin.name} registers no integrator and no scene" in done.output) is told
+
+
+ANOTHER_NAME = """import dataclasses
+import symtop
+symtop.register_scene(dataclasses.replace(symtop.scene("spheroid"), name="a-new-name"))
+"""
+REPLACED = """import dataclasses
+import symtop
+symtop.register(dataclasses.replace(symtop.integrators()["midpoint"], summary="mine"), replace=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["midpoint", "spheroid"], "scene 'midpoint' is unknown; it is the name of an integrator"),
+        (["rk4[axis]", "spheroid"], "scene 'rk4[axis]' is unknown; it is the name of an integrator"),
+        (["spheroid", "goldstein"], "integrator 'goldstein' is unknown; it is the name of a scene"),
+        (["sferoid", "midpoint"], "scene 'sferoid' is unknown; did you mean spheroid? (symtop scenes lists all)"),
+    ],
+)
+def test_a_scene_and_an_integrator_that_changed_places(words, told):
+    done = call("run", *words, "--step-size", "0.01")
+    assert done.exit_code == 2
+    assert told in done.output
+
+
 def test_a_plugin_that_raises_is_named(tmp_path):
     plugin = tmp_path / "broken.py"
     plugin.write_text("1 / 0\n")

@@ -211,6 +211,48 @@ def test_a_list_is_there_within_two_seconds(words):
     assert recorded(words).silence < 2.0
 
 
+@pytest.mark.slow  # half a minute: lanes of one method are compiled
+def test_a_cold_ensemble_is_never_silent_for_long(tmp_path):
+    recording = recorded(
+        ["ensemble", "strang", "--members", "2000", "--per-nutation", "50", "--nutations", "2"],
+        SYMTOP_CACHE=str(tmp_path),
+    )
+    assert recording.code == 0, recording.text
+    assert recording.silence < 2.0
+    assert recording.widest <= 80
+
+
+def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
+    from symtop.base import progress
+
+    monkeypatch.setattr(progress, "BEAT", 0.01)
+    drawn = []
+
+    class Bar:
+        disable = False
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            drawn.append("closed")
+
+        def refresh(self):
+            drawn.append("refreshed")
+
+    with progress.beating(Bar()) as bar:
+        time.sleep(0.1)
+    assert drawn.count("refreshed") >= 3
+    count = len(drawn)
+    time.sleep(0.05)
+    assert drawn[-1] == "closed"
+    assert len(drawn) == count
+    monkeypatch.setattr(bar, "disable", True, raising=False)
+    with progress.beating(bar):
+        time.sleep(0.05)
+    assert drawn[count:] == ["closed"]
+
+
 def test_a_recording_hears_a_silence(tmp_path):
     """Negative control: a plug-in that sleeps while it is loaded."""
     (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(3.0)\n")
