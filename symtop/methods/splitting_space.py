@@ -66,6 +66,7 @@ def tuned(rule: Composition, top: SymmetricTop, start: Angles, h: float) -> tupl
     return (*rule[:-1], tangent_scale(top, start, h))
 
 
+@functools.lru_cache(maxsize=256)
 def tangent_scale(top: SymmetricTop, start: Angles, h: float) -> float:
     """tan(x)/x with x = h Lm/2 I1: a Cayley drift with tau = (h/2 I1) times this turns |L| = Lm by the exact angle.
 

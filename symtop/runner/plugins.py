@@ -25,9 +25,9 @@ def load(path: str | Path) -> list[str]:
     beside = [file, *sorted(file.parent.glob("*.py"))[:MOST_NEIGHBOURS]]
     _loaded[file] = fingerprint.hashed(*(fingerprint.file_hash(path) for path in beside))
     made_of = f"plug-in {file.name}", _loaded[file]
-    for entry in (*integrators().values(), *scenes().values()):
+    for name, entry in (*integrators().items(), *scenes().items()):
         if not any(entry is known for known in before):
-            _owners[entry.name] = made_of
+            _owners[name] = made_of
     return _registered_by(file)
 
 
