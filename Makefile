@@ -18,6 +18,7 @@ DOCS := .venv/.docs
 PEERS := benchmarks/peers/.venv
 ENGINES := benchmarks/engines/.venv
 OLDER := benchmarks/engines/.venv-mujoco-3
+LEFT := $(if $(wildcard results/quick/report.html),slow,slow or quick) # every study, quickly, takes minutes by itself
 APART := --numprocesses auto --dist loadfile --no-loadscope-reorder # a file to a process, in the order of tests/conftest.py
 
 .DEFAULT_GOAL := help
@@ -53,8 +54,8 @@ check-results: $(READY)
 	@$(BIN)/symtop study --all --check $(if $(FRESH),--fresh)
 
 test: $(READY)
-	@echo "symtop: running the fast tests (make test-all runs all)"
-	@$(BIN)/python -m pytest -m "not slow" $(APART)
+	@echo "symtop: running the tests that are not marked: $(strip $(LEFT)) (after make quick, those too; make test-all: all)"
+	@$(BIN)/python -m pytest -m "not ($(strip $(LEFT)))" $(APART)
 
 test-all: $(READY)
 	@echo "symtop: running all tests"

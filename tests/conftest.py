@@ -25,14 +25,18 @@ scripts.install()  # tests import `symtop_studies`
 
 
 LONGEST = (  # files whose tests take longest, begun first: one that begins last keeps a process busy alone
-    "test_compiled_cache", "test_plugin_in_studies", "test_study", "test_archive", "test_report", "test_reference",
+    "test_plugin_in_studies", "test_study", "test_archive", "test_report", "test_reference",
     "test_command_lines", "test_cold", "test_figures", "test_blind", "test_long_runs", "test_typing",
 )  # fmt: skip
 STORED = Path(__file__).resolve().parent.parent / "results" / "quick"
 
 
+@pytest.hookimpl(tryfirst=True)  # before the marks choose
 def pytest_collection_modifyitems(items):
-    """Files in the order of `LONGEST`, then as they were."""
+    """Files in the order of `LONGEST`, then as they were; tests that read the results of every study are marked."""
+    for item in items:
+        if "quick_results" in item.fixturenames:
+            item.add_marker("quick")
     place = {name: k for k, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path.stem, len(place)))
 

@@ -12,18 +12,28 @@ ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = """
 import sys
 {before}
-import symtop
+sys.path.insert(0, {folder!r})
+import two_kernels
+from symtop.base.compiled import compile_kernel
 for _ in range(2):
-    for name in ("strang", "rk4"):
-        symtop.simulate("spheroid", name, step_size=0.01, horizon=0.1, guard=False)
+    compile_kernel(two_kernels.first)(1.0), compile_kernel(two_kernels.second)(1.0)
+"""
+KERNELS = """
+def first(x):
+    return x + 1.0
+
+
+def second(x):
+    return x + 2.0
 """
 
 
 def _heard(tmp_path, before="", terminal=False):
     """What a script that runs two methods twice prints to its standard error."""
+    (tmp_path / "two_kernels.py").write_text(KERNELS, encoding="utf-8")
     environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path), "PYTHONPATH": str(ROOT)}
     ours, theirs = pty.openpty() if terminal else os.pipe()
-    command = [sys.executable, "-c", SCRIPT.format(before=before)]
+    command = [sys.executable, "-c", SCRIPT.format(before=before, folder=str(tmp_path))]
     subprocess.run(command, env=environment, stderr=theirs, check=True)
     os.close(theirs)
     with os.fdopen(ours, "rb") as stream:

@@ -25,7 +25,7 @@ def plugin(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    "studies", [("convergence", "work_precision"), pytest.param(("drift", "stability"), marks=pytest.mark.slow)]
+    "studies", [("convergence",), pytest.param(("work_precision", "drift", "stability"), marks=pytest.mark.slow)]
 )
 def test_a_plugins_method_and_scene_are_in_every_study(studies, plugin, tmp_path):
     words = ["--quick", "--only", "simpson-of-a-user,strang", "--results", str(tmp_path), "--plugin", str(plugin)]
