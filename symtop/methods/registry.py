@@ -204,9 +204,9 @@ class Integrator:
 
 
 _BUILT_IN = (
-    "discrete_lagrangian", "unreduced", "galerkin", "exact_discrete", "lie_variational", "splitting", "runge_kutta",
-    "dormand_prince", "gauss", "kahan", "lie_runge_kutta", "energy_momentum", "generalised_alpha", "collective_gauss",
-    "scipy_ivp", "taylor", "series", "exact", "engines",
+    "discrete_lagrangian", "unreduced", "galerkin", "exact_discrete", "lie_variational", "splitting",
+    "reversible_steps", "runge_kutta", "dormand_prince", "gauss", "kahan", "lie_runge_kutta", "energy_momentum",
+    "generalised_alpha", "collective_gauss", "scipy_ivp", "taylor", "series", "exact", "engines",
 )  # fmt: skip
 ENTRY_POINTS = "symtop.integrators"  # an Integrator, or a function that returns several
 

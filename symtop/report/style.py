@@ -71,7 +71,7 @@ _LOOKS = {
     "stormer-verlet-suzuki-4": Look(GREENS[1], "s"), "stormer-verlet-blanes-moan-6": Look(GREENS[2], "v"),
     "strang": Look(GREEN, "<"), "cayley": Look(GREENS[1], ">"), "cayley-tuned": Look(GREENS[2], "D"),
     "takahashi-imada": Look(GREEN, "P"), "chin-4a": Look(GREENS[1], "X"), "yoshida-4": Look(GREENS[2], "p"),
-    "suzuki-4": Look(GREEN, "h"),
+    "suzuki-4": Look(GREEN, "h"), "stormer-verlet-reversible": Look(GREENS[2], "*"),
     "srkn-6-4": Look(GREENS[1], "8"), "srkn-11-6": Look(GREENS[2], "d"), "srkn-14-6": Look(GREEN, "H"),
     "srkn-19-8": Look(GREENS[1], "*"),
     "kahan-li-6": Look(GREENS[1], "o"), "suzuki-umeno-8": Look(GREENS[2], "s"), "kahan-li-8": Look(GREEN, "v"),

@@ -30,7 +30,7 @@ from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 
 WRONG, RIGHT = 0.05, 1e-3  # rad
-LATER = ("srkn-19-8",)  # methods that came after the runs which tests name
+LATER = ("srkn-19-8", "stormer-verlet-reversible")  # methods that came after the runs which tests name
 LONGEST = 60.0  # s of processor time
 MOST_STEPS = 1.5e5
 SEED = 20_000

@@ -1,0 +1,242 @@
+"""Verlet steps that can be retraced: order, the way back, energy over long runs, passages of a pole, bad input."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numba import njit
+
+import symtop
+from symtop.measure.accuracy import error_table
+from symtop.measure.conservation import trend
+from symtop.measure.order import power_law
+from symtop.measure.step_map import one_step, return_miss, step_map, symplectic_defect
+from symtop.methods import reversible_steps
+from symtop.methods.angles import reduced
+from symtop.methods.plan import Plan
+from symtop.methods.reversible_steps import Reversible
+from symtop.model import charts
+from symtop.model.effective import effective_force, effective_potential
+from symtop.model.scenes import closed_form, grazing
+from symtop.model.top import Angles
+
+METHOD = symtop.integrator("stormer-verlet-reversible")
+SOLVER = METHOD.solvers["angles"]
+force = njit(effective_force)
+
+
+def run(scene, h, marks, solver=SOLVER):
+    return solver(scene.top, scene.start, Plan.steps(h, np.asarray(marks)))
+
+
+def energies(scene, states):
+    """p^2/2 I1 + V of states in angles."""
+    par, _ = reduced(scene.top, scene.start)
+    height = effective_potential(states[:, 0], par.north, par.south, par.I1, par.mgl)
+    return 0.5 * states[:, 1] ** 2 / par.I1 + height
+
+
+# ---- the steps -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["spheroid", "goldstein"])
+@pytest.mark.parametrize("quantity", ["attitude", "energy"])
+def test_the_error_falls_with_the_square_of_the_step(name, quantity):
+    scene = symtop.scene(name)
+    steps = list(scene.nutation_period / np.geomspace(300, 5000, 7))
+    table = error_table(scene, METHOD, steps, 8.0, observe="attitude")
+    error, bound = table[quantity].values, table[f"{quantity}_bound"].values
+    fit = power_law(table["step_size"].values, error, error > 10.0 * bound)
+    assert fit.used.sum() >= 5
+    assert fit.slope == pytest.approx(2.0, abs=0.02)
+
+
+def by_hand(scene, eps, steps, k):
+    """Grid points (t, theta, p_theta) of the scheme as it stands in the papers, in plain Python."""
+    par, (theta, p, *_) = reduced(scene.top, scene.start)
+    pull = lambda: -k * math.cos(theta) / math.sin(theta) * p / par.I1
+    t, rho, points = 0.0, math.sin(theta) ** -k + 0.5 * eps * pull(), []
+    for _ in range(steps):
+        h = eps / rho
+        p -= 0.5 * h * effective_force(theta, par.north, par.south, par.I1, par.mgl)[0]
+        theta += h * p / par.I1
+        p -= 0.5 * h * effective_force(theta, par.north, par.south, par.I1, par.mgl)[0]
+        t, rho = t + h, rho + eps * pull()
+        points.append((t, theta, p))
+    return np.array(points)
+
+
+@pytest.mark.parametrize("k", [1.0, 2.0])
+def test_the_grid_is_that_of_the_formulas(k):
+    scene, eps = grazing(0.1), 0.02
+    points = by_hand(scene, eps, 400, k)
+    plan = Plan.steps(eps, [1])._replace(times=points[:, 0])
+    done = Reversible(k)(scene.top, scene.start, plan)
+    assert points[:, 1].min() < 0.15
+    assert done.states[:, :2] == pytest.approx(points[:, 1:], rel=1e-10)
+    other = Reversible(3.0 - k)(scene.top, scene.start, plan)
+    assert np.abs(other.states[:, :2] - points[:, 1:]).max() > 1e-6
+
+
+def test_samples_move_no_step_and_are_counted():
+    scene, h = symtop.scene("goldstein"), 0.05
+    few, many = run(scene, h, [400, 800]), run(scene, h, np.arange(801))
+    assert np.array_equal(few.states, many.states[[400, 800]])
+    assert many.states[0] == pytest.approx(reduced(scene.top, scene.start)[1], abs=0.0)
+    for done in (few, many):
+        assert done.force_evaluations == done.steps
+        assert done.newton_iterations == 0
+    assert many.steps == few.steps + 798  # the start costs nothing
+
+
+def test_blocks_of_steps_join_without_a_seam(monkeypatch):
+    scene = symtop.scene("grazing")
+    whole = run(scene, 0.02, [50, 200])
+    monkeypatch.setattr(reversible_steps, "BLOCK", 7)
+    parts = run(scene, 0.02, [50, 200])
+    assert np.array_equal(whole.states, parts.states)
+    assert whole.steps == parts.steps > 200
+
+
+def test_both_momenta_stay():
+    for name in ("spheroid", "goldstein", "grazing"):
+        scene = symtop.scene(name)
+        done, momenta = run(scene, 0.003, np.arange(0, 100_001, 500)), scene.top.momenta(scene.start)
+        for values, begun in ((done.p_phi, momenta.p_phi), (done.p_psi, momenta.p_psi)):
+            assert np.abs(values / begun - 1.0).max() < 1e-12
+
+
+# ---- structure -------------------------------------------------------------------------------------------------------
+
+
+def read_off(scene, eps, marks):
+    """The same steps with h = eps sin(theta_n), which nothing retraces: states, and those of the way back.
+
+    States (theta, p_theta) after `marks` steps, and where as many steps with p_theta turned round end.
+    """
+    par, (theta, p, *_) = reduced(scene.top, scene.start)
+    states, last = _read_off(tuple(par), theta, p, eps, np.asarray(marks))
+    back, _ = _read_off(tuple(par), *last * (1.0, -1.0), eps, np.asarray(marks[-1:]))
+    return states, back[-1] * (1.0, -1.0)
+
+
+@njit
+def _read_off(par, theta, p, eps, marks):
+    I1, _, mgl, _, north, south = par
+    states = np.empty((len(marks), 2))
+    done = 0
+    for j in range(len(marks)):
+        while done < marks[j]:
+            h = eps * np.sin(theta)
+            p -= 0.5 * h * force(theta, north, south, I1, mgl)[0]
+            theta += h * p / I1
+            p -= 0.5 * h * force(theta, north, south, I1, mgl)[0]
+            done += 1
+        states[j] = theta, p
+    return states, states[-1]
+
+
+@pytest.mark.parametrize("scene", [symtop.scene("goldstein"), grazing(0.01)], ids=lambda s: s.name)
+def test_the_way_back_has_the_same_steps(scene):
+    _, state = reduced(scene.top, scene.start)
+    back = SOLVER.onward(scene.top, scene.start, (0.01,) * 500 + (-0.01,) * 500)
+    there = SOLVER.onward(scene.top, scene.start, (0.01,) * 500)
+    assert np.abs(there.states[0] - state).max() > 0.1
+    assert back.states[0] == pytest.approx(state, abs=1e-11)
+    assert back.steps > there.steps + 500
+    assert np.abs(read_off(scene, 0.01, [500])[1] - state[:2]).max() > 1e-6
+
+
+def test_from_rest_a_run_backwards_in_time_is_the_one_forwards_with_p_theta_turned_round():
+    scene = symtop.scene("goldstein")
+    forth, back = (
+        SOLVER(scene.top, scene.start, Plan.steps(h, np.arange(300))).states * (1.0, sign, 1.0, 1.0)
+        for h, sign in ((0.01, 1.0), (-0.01, -1.0))
+    )
+    assert np.ptp(forth[:, 0]) > 0.1
+    assert np.array_equal(forth[:, :2], back[:, :2])
+
+
+@pytest.mark.parametrize("name", ["spheroid", "goldstein", "grazing"])
+def test_a_step_is_symmetric_and_not_symplectic(name):
+    step, start = step_map(METHOD, "angles", symtop.scene(name))
+    assert return_miss(step, start) < 1e-13
+    defect = symplectic_defect(step, start)
+    assert defect.size > 1e-6 > 10.0 * defect.noise
+    plain = one_step(symtop.integrator("stormer-verlet"), "angles", symtop.scene(name), step.h)
+    assert symplectic_defect(plain, start).size < 1e-9
+
+
+def test_the_energy_stays_bounded_where_that_of_steps_read_off_drifts():
+    scene, eps = grazing(0.1), 0.05
+    marks = np.arange(0, 400_001, 200)
+    done = run(scene, eps, marks)
+    assert done.outcome == "ok"
+    kept = energies(scene, done.states) - energies(scene, done.states)[0]
+    lost = energies(scene, read_off(scene, eps, marks)[0])
+    lost -= lost[0]
+    assert np.abs(kept).max() < 1.1 * np.abs(kept[:200]).max()
+    assert abs(trend(marks, kept).rise) < 0.01 * np.abs(kept).max()
+    assert trend(marks, lost).rise > 100.0 * np.abs(kept).max()
+
+
+# ---- poles -----------------------------------------------------------------------------------------------------------
+
+
+def forces_for(scene, method, error):
+    """The least force evaluations from which on finer steps keep the axis within that error, over one nutation."""
+    form, found = closed_form(scene), 0
+    for h in scene.nutation_period * np.geomspace(0.05, 1e-7, 300):
+        done = symtop.simulate(
+            scene, method, step_size=h, horizon=scene.nutation_period, samples=101, observe="axis", guard=False
+        )
+        gap = charts.axis_distance(done["axis"].values, form.axis(done["time"].values)).max()
+        if not gap < error:
+            found = 0
+        elif not found:
+            found = done.attrs["force_evaluations"]
+        elif gap < error / 4.0:
+            return found
+    raise AssertionError(method)
+
+
+def test_close_to_a_pole_it_needs_fewer_forces_than_equal_steps_and_more_than_a_chart_without_pole():
+    rows, by_gap = ("stormer-verlet", "stormer-verlet-reversible", "strang[axis]"), {}
+    for gap in (1e-2, 1e-3):
+        by_gap[gap] = plain, reversible, strang = [forces_for(grazing(gap), name, 1e-3) for name in rows]
+        assert strang < reversible < plain / 3.0
+    assert by_gap[1e-3][0] > 7.0 * by_gap[1e-2][0]
+    assert by_gap[1e-3][1] < 2.0 * by_gap[1e-2][1]
+
+
+def test_steps_of_the_square_of_the_sine_need_more_forces_than_equal_ones():
+    """They are made for a barrier of given strength, and that of a close passage is weak."""
+    square = replace(METHOD, name="square", solvers={"angles": Reversible(2.0)})
+    assert forces_for(grazing(1e-2), square, 1e-2) > 2.0 * forces_for(grazing(1e-2), "stormer-verlet", 1e-2)
+
+
+@pytest.mark.parametrize("theta", [0.0, math.pi])
+def test_a_start_on_a_pole_is_refused_in_a_sentence(theta):
+    top, start = symtop.SymmetricTop(1.0, 1.0, 1.0), Angles(theta, psi_dot=1.0)
+    words = rf"^theta must lie inside \(0, pi\) for an integrator in the angles chart, not {theta!r}$"
+    with pytest.raises(symtop.SymtopError, match=words):
+        SOLVER(top, start, Plan.steps(0.1, [10]))
+
+
+def test_runs_that_fail_say_how(monkeypatch):
+    onto_the_pole = run(grazing(0.0), 0.1, [0, 40])
+    assert onto_the_pole.outcome == "left_chart"
+    too_large = run(grazing(1e-3), 1.0, [0, 4])
+    assert too_large.outcome == "not_finite"
+    assert run(grazing(1e-3), 0.1, [0, 40]).outcome == "ok"
+    monkeypatch.setattr(reversible_steps, "STEPS", 50)
+    too_long = run(grazing(1e-6), 1.0 / 3.0, [0, 1, 6])
+    assert too_long.outcome == "out_of_budget"
+    for done in (onto_the_pole, too_large, too_long):
+        assert 0.0 < done.reached < 4.0
+        assert np.isfinite(done.states[0]).all()
+        assert np.isnan(done.states[-1]).all()
+        assert np.isnan(done.p_phi[-1])
+    assert too_long.steps == 50
+    assert np.isfinite(too_long.states[1]).all()
