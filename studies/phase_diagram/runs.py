@@ -19,18 +19,16 @@ import numpy as np
 import xarray as xr
 
 from symtop.base.numbers import EPSILON, GOLDEN
-from symtop.methods.calling import solve
-from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.plan import Plan
 from symtop.methods.registry import Integrator
 from symtop.model import charts
-from symtop.model.charts import DIMENSIONS, Array
+from symtop.model.charts import Array
 from symtop.model.effective import effective_potential
 from symtop.model.scenes import scene
 from symtop.model.top import flat
 from symtop.model.view import axis_of, space_energy
 
-from ..population.ladder import bodies, loop_of, stored
+from ..population.ladder import in_turn, stepped, stored
 from ..population.tops import Body, Tops, numbers_of
 from . import laws
 
@@ -97,25 +95,16 @@ def setting_of(row: Integrator, level: int) -> float:
 
 def run(row: Integrator, tops: Tops, setting: float, ends: Array, budget: float) -> tuple[Shown, Array]:
     """Runs of all tops to the last of the ends, and the times (n, samples) of what they show."""
-    (chart,) = row.charts()
     if row.fixed_step:
-        solver, h = loop_of(row), steps_of(tops, setting)
-        marks = np.maximum(np.rint(places(ends).ravel() * setting), 1).astype(np.int64)
+        h, marks = steps_of(tops, setting), np.maximum(np.rint(places(ends).ravel() * setting), 1).astype(np.int64)
         marks = np.maximum.accumulate(marks)
         unique, back = np.unique(marks, return_inverse=True)
-        many = solver.many(tops.numbers, h, np.tile(unique, (len(h), 1)))
-        work = np.asarray(solver.counts(many.steps, many.work)[0], dtype=float)
-        shown = Shown(many.states[:, back], many.momenta[:, back], work, many.outcome == 0)
+        done = stepped(row, tops.numbers, h, np.tile(unique, (len(h), 1)))
+        shown = Shown(done.states[:, back], done.momenta[:, back], done.work, done.outcome == 0)
         return shown, marks * h[:, np.newaxis]
     times = places(ends).ravel() * tops.period[:, np.newaxis]
-    n = len(times)
-    states, momenta = np.full((*times.shape, DIMENSIONS[chart]), np.nan), np.full((*times.shape, 2), np.nan)
-    work, ended = np.empty(n), np.zeros(n, bool)
-    for k, (top, start) in enumerate(bodies(tops, np.arange(n))):
-        one = solve(row, chart, top, start, Plan.until(times[k], setting, budget))
-        states[k], momenta[k, :, 0], momenta[k, :, 1] = one.states, one.p_phi, one.p_psi
-        work[k], ended[k] = one.force_evaluations, OUTCOMES.index(one.outcome) == 0
-    return Shown(states, momenta, work, ended), times
+    done = in_turn(row, tops.numbers, [Plan.until(one, setting, budget) for one in times])
+    return Shown(done.states, done.momenta, done.work, done.outcome == 0), times
 
 
 def errors(chart: str, tops: Tops, shown: Shown, times: Array) -> dict[str, Array]:

@@ -23,18 +23,18 @@ Variables over `quantity`, `target`, `member`, `level`, `stratum`, `guarded`:
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.base.validate import SymtopError
 from symtop.measure.settings import FLAT, LEAST_STEPS, ROUNDED
 from symtop.measure.work import TARGETS
 from symtop.methods.calling import solve
-from symtop.methods.fixed_step import FixedStep, inside
+from symtop.methods.fixed_step import inside
+from symtop.methods.many import members_of
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.plan import Plan
 from symtop.methods.registry import Integrator
@@ -97,31 +97,34 @@ def setting_of(row: Integrator, level: int) -> float:
 
 def run_level(row: Integrator, tops: Tops, chosen: Members, level: int, budget: float) -> Level:
     """Run the chosen members with one setting."""
-    (chart,) = row.charts()
     if row.fixed_step:
-        solver = loop_of(row)
         h = tops.period[chosen] / FIRST * 0.5**level
         marks = np.broadcast_to(tops.marks << level, (len(chosen), tops.marks.size))
-        many = solver.many(tops.numbers[chosen], h, marks)
-        work = np.asarray(solver.counts(many.steps, many.work)[0], dtype=float)
-        return Level(many.states, many.momenta, work, many.outcome)
-    states = np.full((len(chosen), tops.marks.size, DIMENSIONS[chart]), np.nan)
-    momenta, work = np.full((*states.shape[:2], 2), np.nan), np.empty(len(chosen))
-    outcome = np.empty(len(chosen), dtype=np.int64)
-    for k, (top, start) in enumerate(bodies(tops, chosen)):
-        plan = Plan.until(tops.times[chosen[k]], setting_of(row, level), budget)
+        return stepped(row, tops.numbers[chosen], h, marks)
+    tolerance = setting_of(row, level)
+    return in_turn(row, tops.numbers[chosen], [Plan.until(times, tolerance, budget) for times in tops.times[chosen]])
+
+
+def stepped(row: Integrator, numbers: Array, h: Array, marks: NDArray[np.int64]) -> Level:
+    """Runs of steps `h` (n,), sampled at `marks` (n, samples): in one call where the row has a loop to share."""
+    solver = inside(row.solvers[row.charts()[0]])
+    if solver is None:
+        return in_turn(row, numbers, [Plan.steps(float(step), ends) for step, ends in zip(h, marks, strict=True)])
+    many = solver.many(numbers, h, marks)
+    work = np.asarray(solver.counts(many.steps, many.work)[0], dtype=float)
+    return Level(many.states, many.momenta, work, many.outcome)
+
+
+def in_turn(row: Integrator, numbers: Array, plans: Sequence[Plan]) -> Level:
+    """Runs one after another, with equally many samples each."""
+    (chart,), shape = row.charts(), (len(plans), plans[0].times.size)
+    states, momenta = np.full((*shape, DIMENSIONS[chart]), np.nan), np.full((*shape, 2), np.nan)
+    work, outcome = np.empty(len(plans)), np.empty(len(plans), dtype=np.int64)
+    for k, ((top, start), plan) in enumerate(zip(members_of(numbers), plans, strict=True)):
         run = solve(row, chart, top, start, plan)
         states[k], momenta[k, :, 0], momenta[k, :, 1] = run.states, run.p_phi, run.p_psi
         work[k], outcome[k] = run.force_evaluations, OUTCOMES.index(run.outcome)
     return Level(states, momenta, work, outcome)
-
-
-def loop_of(row: Integrator) -> FixedStep:
-    """The fixed-step loop of a row."""
-    solver = inside(row.solvers[row.charts()[0]])
-    if solver is None:
-        raise SymtopError(f"{row.name} has no compiled loop that many tops could share")
-    return solver
 
 
 def bodies(tops: Tops, chosen: Members) -> Iterator[tuple[SymmetricTop, Angles]]:

@@ -14,13 +14,13 @@ import xarray as xr
 
 from symtop.measure.timing import timings
 from symtop.methods.calling import solve
+from symtop.methods.fixed_step import inside
 from symtop.methods.plan import Plan
 from symtop.methods.registry import Integrator, integrator
 from symtop.model.closed_forms import ClosedForms
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.population import NUMBERS, population
 
-from .ladder import loop_of
 from .tops import FIRST
 
 TOGETHER = 256  # tops of a call
@@ -42,13 +42,13 @@ def calls(row: Integrator) -> dict[str, tuple[Callable[[], object], float]]:
     (chart,), (numbers, period) = row.charts(), _tops()
     top, start = SymmetricTop(*numbers[0, :3].tolist()), Angles(*numbers[0, 3:].tolist())
     steps = round(NUTATIONS * FIRST * 2.0**FINE)
+    solver, marks, h = inside(row.solvers[chart]), np.array([steps // 2, steps]), period * (NUTATIONS / steps)
+    plan = Plan.steps(float(h[0]), marks)
     if not row.fixed_step:
         plan = Plan.until(np.array([0.5, 1.0]) * NUTATIONS * float(period[0]), TOLERANCE)
+    if solver is None:
         run = solve(row, chart, top, start, plan)
         return {"alone": (lambda: solve(row, chart, top, start, plan), float(run.force_evaluations))}
-    solver, marks = loop_of(row), np.array([steps // 2, steps])
-    h = period * (NUTATIONS / steps)
-    plan = Plan.steps(float(h[0]), marks)
     run, everyone = solver(top, start, plan), np.tile(marks, (TOGETHER, 1))
     many = solver.many(numbers, h, everyone)
     return {
@@ -61,7 +61,7 @@ def prices(names: Sequence[str], rounds: int, batch: float) -> xr.Dataset:
     """Seconds of a force evaluation: ``alone`` and ``together`` over ``integrator``, and ``spread`` of the samples.
 
     The smallest sample counts, and that of every other round by itself (``alone_half``, ``together_half``): what is
-    said of a time must be so in both halves. A row that is adaptive has the price of a run alone in both.
+    said of a time must be so in both halves. A row whose tops share no loop has the price of a run alone in both.
     """
     each = {(name, kind): call for name in names for kind, call in calls(integrator(name)).items()}
     taken = dict(zip(each, timings([call for call, _ in each.values()], rounds, batch, warm=True), strict=True))

@@ -13,8 +13,8 @@ and its change to a grid point: with p_theta turned round the same steps return,
 of any reversible method on an integrable reversible system. Steps that depend on the state cost the symplectic form.
 A sample is a step, at most half as long, from the grid point next to it and is not fed back: it moves no grid point.
 Steps and forces count both. Where eps is too large for a passage, rho falls below zero and the run ends `not_finite`.
-Source: Hairer, Soderlind, SIAM J. Sci. Comput. 26 (2005) 1838; Huang, Leimkuhler, the same 18 (1997) 239; Hairer,
-Lubich, Wanner, Geometric Numerical Integration, sections VIII.3.2 and XI.3.
+Source: Hairer, Soderlind, SIAM J. Sci. Comput. 26 (2005) 1838; Huang, Leimkuhler, SIAM J. Sci. Comput. 18 (1997) 239;
+Hairer, Lubich, Wanner, Geometric Numerical Integration, sections VIII.3.2 and XI.3.
 """
 
 import math
@@ -35,7 +35,7 @@ from symtop.methods.splitting_angles import drift_angles, force_angles, kick_ang
 from symtop.methods.splitting_loop import Stages, compose
 from symtop.model.top import Angles, SymmetricTop
 
-BLOCK, STEPS = 5_000_000, 500_000_000  # steps between returns to Python, and of a run: half a minute
+BLOCK, STEPS, SHARE = 5_000_000, 200_000_000, 10_000  # steps between returns to Python, of a run (10 s), for one asked
 NONE = (0.0, 0.0, 0.0, 0.0)
 BEGIN, RETRACE, ONWARD = 0.5, 1.0, 0.0  # updates of rho before the first step
 
@@ -77,11 +77,11 @@ def march(par, k, eps, turn, times, budget, seen, place, states, momenta):  # ty
     return seen, steps, outcome, (state, low, force, clock, rest, rho)
 
 
-def _run(top: SymmetricTop, start: Angles, k: float, parts: Sequence[tuple[float, Array]], most: int) -> Run:
+def _run(top: SymmetricTop, start: Angles, k: float, parts: Sequence[tuple[float, Array]], asked: int) -> Run:
     """The samples of the last part, each part with an eps and times of its own."""
     par, state = reduced(top, start)
     place: Any = (state, NONE, NONE[:3], NONE[:1], NONE[:1], 1.0 / math.sin(start.theta) ** k)
-    done, outcome, before, turn = 0, OK, 0.0, BEGIN
+    done, outcome, before, turn, most = 0, OK, 0.0, BEGIN, max(min(BLOCK + SHARE * asked, STEPS), 8 * asked)
     for eps, times in parts:
         seen, before, turn = 0, eps, RETRACE if eps * before < 0.0 else turn
         states, momenta = np.full((times.size, 4), np.nan), np.full((2, times.size), np.nan)
@@ -102,12 +102,12 @@ class Reversible:
 
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         """The run of a plan, whose step size is eps."""
-        return _run(top, start, self.k, [(plan.step_size, plan.times)], max(STEPS, 8 * int(plan.marks[-1])))
+        return _run(top, start, self.k, [(plan.step_size, plan.times)], int(plan.marks[-1]))
 
     def onward(self, top: SymmetricTop, start: Angles, lengths: Sequence[float]) -> Run:
         """A step of each length from where the last one stood, with its rho: a negative one retraces what was made."""
         ends = np.cumsum(lengths)
-        return _run(top, start, self.k, [(h, ends[i : i + 1]) for i, h in enumerate(lengths)], STEPS)
+        return _run(top, start, self.k, [(h, ends[i : i + 1]) for i, h in enumerate(lengths)], len(lengths))
 
 
 def built_in() -> list[Integrator]:
