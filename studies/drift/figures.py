@@ -16,7 +16,7 @@ from symtop.runner.study import Picture
 
 from . import messages, rows, words
 from .keeping import LENGTHS, chosen, keeping
-from .phase_loss import LOST
+from .phase_loss import FEWEST, LOST
 from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS, by_integrator, losses
 
 SHOWN = (
@@ -31,6 +31,9 @@ BANDS = ("energy", "modified_energy", "p_phi", "p_psi")
 LAWS = (0.0, 0.5, 1.0, 2.0)  # exponents that are drawn as lines
 SIZES = (4.5, 2.6, 3.5, 2.0)  # of a marker, by scene
 SMALLEST = 1e-17  # what is smaller is drawn here
+ZERO = 3e-17  # left of it nothing was measured but zeros
+LOSES = "#FBE3CF"  # behind a constant that is neither kept nor bounded
+NOTE = {"fontsize": style.LEAST_TEXT, "color": "#444444"}
 
 
 def pictures(data: xr.DataTree) -> list[Picture]:
@@ -58,18 +61,22 @@ def _residuals(histories: xr.Dataset) -> Picture:
                 good = np.isfinite(r) & np.isfinite(t) & (t > 0.0)
                 if good.any():
                     t, r = t[good], np.maximum(r[good], SMALLEST)
-                    axis.plot(t, r, ",", color=mark.color, alpha=0.5, zorder=2, rasterized=True)
+                    axis.plot(t, r, ",", color=mark.color, alpha=0.25, zorder=2, rasterized=True)
                     axis.plot(*envelope(t, r), **line(str(name), 0.8), label=str(name), zorder=3)
             axis.set(xscale="log", yscale="log")
-        row[0].set_ylabel(f"|change of {LABELS[constant]}|")
+        row[0].set_ylabel(f"relative change of {LABELS[constant]}")
+        row[0].annotate("exact zeros", (0.01, SMALLEST), (0, 3), xycoords=row[0].get_yaxis_transform(),
+                        textcoords="offset points", **NOTE)  # fmt: skip
     for axis, scene in zip(axes[0], data["scene"].values, strict=True):
-        axis.set_title(scene)
+        axis.set_title(f"scene {scene}")
         first, last = axis.get_xlim()
         axis.autoscale(enable=False)
-        style.slope_guide(axis, 1.0, (first * 6.0, last / 2.0), 1e-8, "$t$")
+        style.slope_guide(axis, 1.0, (first * 6.0, last / 2.0), 1e-8, "as $t$")
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
     few_ticks(*axes.flat)
+    axes[0, 0].plot([], [], " ", label="markers: largest in a span of time")
+    axes[0, 0].plot([], [], ",", color=GREY, label="dots: single samples")
     style.legend_below(figure, axes)
     headline(figure, messages.residuals(data))
     caption = (
@@ -92,11 +99,11 @@ def dots(data: xr.Dataset, columns: dict[str, str], *, log: bool) -> Any:
     bar.
     """
     names, scenes = ([str(name) for name in data[dim].values] for dim in ("integrator", "scene"))
-    figure, axes = panels(1, len(columns), height=0.4 + 0.128 * len(names), sharey=True)
+    figure, axes = panels(1, len(columns), height=0.4 + 0.128 * len(names), sharex=True, sharey=True)
     shift = np.linspace(-0.22, 0.22, len(scenes)) if len(scenes) > 1 else np.zeros(1)
     for axis, (variable, label) in zip(axes[0], columns.items(), strict=True):
         for scene, offset, size in zip(scenes, shift, SIZES * 3, strict=False):
-            axis.plot([], [], "o", color=GREY, ms=size, label=scene)
+            axis.plot([], [], "o", color=GREY, ms=size, label=f"scene {scene}")
             for row, name in enumerate(names):
                 cell, mark = data.sel(scene=scene, integrator=name), look(name)
                 value, bar = float(cell[variable]), float(cell.get(f"{variable}_interval", 0.0))
@@ -107,13 +114,21 @@ def dots(data: xr.Dataset, columns: dict[str, str], *, log: bool) -> Any:
         axis.set_xscale("log" if log else "linear")
         axis.tick_params(axis="y", labelsize=7.0, length=0)
     few_ticks(*axes.flat, most=3)
-    style.legend_below(figure, axes)
     return figure
 
 
 def _sizes(histories: xr.Dataset) -> Picture:
     data = rows.without_repeats(histories)
-    figure = dots(data, {f"{name}_largest": f"change of {LABELS[name]}" for name in CONSTANTS}, log=True)
+    columns = {f"{name}_largest": f"largest relative change\nof {LABELS[name]}" for name in CONSTANTS}
+    figure = dots(data, columns, log=True)
+    for axis, constant in zip(figure.axes, CONSTANTS, strict=True):
+        for row, name in enumerate(data["integrator"].values):
+            if not messages.holds(data.sel(integrator=name), constant):
+                axis.axhspan(row - 0.5, row + 0.5, color=LOSES, lw=0, zorder=0)
+        axis.axvline(ZERO, color=GREY, lw=0.8, ls=":", zorder=1)
+        axis.set_title("zero", loc="left", pad=2.0, **NOTE)  # above the column of exact zeros
+    figure.axes[0].fill_between([], [], [], color=LOSES, lw=0, label="shaded: neither kept nor bounded")
+    style.legend_below(figure, figure.axes)
     headline(figure, messages.sizes(data))
     caption = (
         "Largest relative residual of every row over the whole run, energies relative to E0 - min V; an exact zero "
@@ -127,7 +142,7 @@ def _sizes(histories: xr.Dataset) -> Picture:
 
 
 def _exponents(histories: xr.Dataset) -> Picture:
-    columns = {f"{name}_exponent": f"exponent of {LABELS[name]}" for name in (*CONSTANTS, "phase")}
+    columns = {f"{name}_exponent": f"growth of the error\nof {LABELS[name]}" for name in (*CONSTANTS, "phase")}
     data = rows.without_repeats(histories)
     figure = dots(data, columns, log=False)
     headline(figure, messages.exponents(data))
@@ -135,6 +150,13 @@ def _exponents(histories: xr.Dataset) -> Picture:
         axis.set(xlim=(-0.35, 2.5), xticks=(0.0, 0.5, 1.0, 2.0), xticklabels=("0", "½", "1", "2"))
         for law in LAWS:
             axis.axvline(law, color=GREY, lw=0.8, zorder=1)
+    told = (
+        "power of time: 0 bounded, ½ random walk, 1 steady drift, 2 as its square",
+        "bars: 95 %; no marker: no change",
+    )
+    for text in told:
+        figure.axes[0].plot([], [], " ", label=text)
+    style.legend_below(figure, figure.axes)
     caption = (
         "Growth exponents of the largest residual of energy and momenta, over the last two decades of time, and of the "
         "phase error of the nutation, over the last one, with 95 % intervals. 0 is a bounded error, 1/2 the random "
@@ -156,20 +178,27 @@ def _windows(data: xr.Dataset) -> Picture:
             low, middle, high = (run[f"{quantity}_{part}"].values / scale for part in ("least", "mean", "largest"))
             axis.fill_between(steps, low, high, step="pre", color=mark.color, alpha=0.3, lw=0)
             axis.step(steps, middle, where="pre", color=mark.color, lw=1.3)
+            if not np.any(low) and not np.any(high):
+                axis.annotate("exactly 0", (0.5, 0.0), (0, 4), xycoords=axis.get_yaxis_transform(), ha="center",
+                              textcoords="offset points", **NOTE)  # fmt: skip
             axis.set_xscale("log")
             axis.set_title(name if quantity == BANDS[0] else "", fontsize=7.5)
-        row[0].set_ylabel(f"{LABELS[quantity]}\n(in {scale:.0e})")
+        row[0].set_ylabel(f"{LABELS[quantity]}\nchange / {number(scale)}")
     for axis in axes[-1]:
         axis.set_xlabel("steps")
     few_ticks(*axes.flat, most=4)
-    headline(figure, f"Over {number(float(data['steps'].max()))} steps {words.moved(data).partition(',')[0]}")
+    figure.align_ylabels(axes[:, 0])
+    axes[0, 0].plot([], [], color=GREY, lw=1.3, label="mean of a window of steps")
+    axes[0, 0].fill_between([], [], [], color=GREY, alpha=0.3, lw=0, label="least to largest in it")
+    style.legend_below(figure, axes[0, 0])
+    headline(figure, messages.windows(data))
     momenta = [np.abs(data[f"{name}_{part}"]).max() for name in ("p_phi", "p_psi") for part in ("least", "largest")]
     caption = (
         f"{float(data['steps'].max()):.0e} steps of rows in angles and in the axis chart on {data['scene'].values[0]}, "
         f"all with {PER_NUTATION:.0f} steps a nutation: the band "
         "reaches from the least to the largest relative change in each window, the line is its mean. The modified "
         "energy is the energy with the h^2 term of the discrete motion, less the oscillation of order h^4 that "
-        f"remains. From the first window to the last {words.moved(data)} The momenta, recomputed inside the "
+        f"remains. {words.moved(data).capitalize()} The momenta, recomputed inside the "
         f"step, stay within {max(map(float, momenta)):.0e}."
     )
     alt = "Bands of energy, modified energy and momenta over the logarithm of the steps, a column for each method."
@@ -185,10 +214,10 @@ def _rounding(data: xr.Dataset) -> Picture:
         for drift in ensemble["drift"].values:
             axis.plot(steps, np.abs(drift), color=mark.color, lw=0.5, alpha=0.45)
         axis.plot(
-            steps, ensemble["rms"], **line(name, 0.8), label="compensated sums, rms and each start",
+            steps, ensemble["rms"], **line(name, 0.8), label="compensated sums: root mean square (thin: each start)",
         )  # fmt: skip
-        axis.plot(steps, ensemble["plain_rms"], "x--", color=BLACK, ms=3, lw=0.9, label="plain sums, rms")
-        axis.set(xscale="log", yscale="log", xlabel="steps in between")
+        axis.plot(steps, ensemble["plain_rms"], "x--", color=BLACK, ms=3, lw=0.9, label="plain sums: root mean square")
+        axis.set(xscale="log", yscale="log", xlabel="steps n")
         axis.set_title(name, fontsize=7.5)
         style.slope_guide(axis, 0.5, (steps[0] * 3.0, steps[-1]), 2e-18, r"$n^{1/2}$")
     axes[0, 0].set_ylim(bottom=1e-18)
@@ -220,6 +249,7 @@ def _horizons(data: xr.Dataset) -> Picture:
     axis, ends = axes[0, 0], {}
     for name, law in laws.items():
         work = law.work(LENGTHS)
+        work[work < FEWEST] = np.nan  # fewer steps than any run may have
         if name not in named:
             axis.plot(LENGTHS, work, color=GREY, lw=0.5, alpha=0.5, zorder=1)
             continue
@@ -227,14 +257,22 @@ def _horizons(data: xr.Dataset) -> Picture:
         axis.plot(LENGTHS, work, color=mark["color"], ls=mark["ls"], lw=1.1)
         axis.plot(law.length, law.paid, mark["marker"], color=mark["color"], ms=1.2 * mark["ms"], zorder=4)
         ends[f"{name}, order {law.order}"] = float(LENGTHS[-1]), float(work[-1]), str(mark["color"])
-    axis.set(xscale="log", yscale="log", xlim=(LENGTHS[0], LENGTHS[-1]), xlabel="nutations N that the phase must last")
+    axis.set(xscale="log", yscale="log", xlim=(LENGTHS[0], LENGTHS[-1]))
+    axis.set_xlabel(f"nutations N over which the phase error stays below {LOST:g} rad")
     axis.set_ylabel("force evaluations a nutation")
     few_ticks(axis)
+    axis.plot([], [], "o", color=BLACK, ms=4.5, label=f"measured: where its run reached {LOST:g} rad")
+    axis.plot([], [], color=BLACK, lw=1.1, label="law: as N to the power of the measured growth over the order")
+    axis.plot([], [], color=GREY, lw=0.5, alpha=0.5, label="the laws of all other methods")
+    style.legend_below(figure, axis)
     if named:
         cheapest, dearest = (pick(named, key=lambda name: laws[name].work(LENGTHS[-1])) for pick in (min, max))
         works = [number(float(laws[name].work(LENGTHS[-1]))) for name in (cheapest, dearest)]
-        headline(figure, f"To keep the phase for {number(LENGTHS[-1])} nutations {cheapest} needs {works[0]} "
-                         f"evaluations a nutation, {dearest} {works[1]}")  # fmt: skip
+        headline(
+            figure,
+            f"By their laws, a phase to {LOST:g} rad over {number(LENGTHS[-1])} nutations takes {works[0]} force "
+            f"evaluations a nutation with {cheapest}, {works[1]} with {dearest}",
+        )
         name_ends(axis, ends)
     caption = (
         f"Force evaluations per nutation that keep the phase error of the nutation of {data['scene'].values[0]} below "

@@ -12,6 +12,7 @@ from symtop.run.long_run import PER_NUTATION
 from symtop.runner.study import Table
 
 from .long_runs import PLAIN_MEMBERS
+from .messages import strayed
 from .phase_loss import LOST, SHORT, TARGET
 from .rows import charts_apart, setting, used, without_repeats
 from .tables import FAILED, HISTORIES, HORIZONS, ROUNDINGS, WINDOWS, by_integrator, losses, rounding, worst_behaviour
@@ -172,11 +173,13 @@ def moved(windows: xr.Dataset) -> str:
     """How far the means of the energies in a window move from the first to the last, at most over the integrators."""
     full = windows.dropna("window", how="all", subset=["energy_mean"])
     first, last = full.isel(window=0), full.isel(window=-1)
-    energy, modified = (np.abs(last[f"{name}_mean"] - first[f"{name}_mean"]) for name in ("energy", "modified_energy"))
-    share = energy / (first["energy_largest"] - first["energy_least"])
+    modified = np.abs(last["modified_energy_mean"] - first["modified_energy_mean"])
+    end, most = strayed(windows)
     return (
-        f"the mean energy moves by at most {float(share.max()):.0e} of the width of its oscillation, and the mean "
-        f"modified energy by at most {float(modified.max()):.0e} of the energy of the nutation."
+        f"the mean energy moves by at most {end:.0e} of the width of its oscillation from the first window to the "
+        f"last, and by at most {most:.0e} to any other, short windows holding no whole number of oscillations; the "
+        f"mean modified energy moves from the first window to the last by at most {float(modified.max()):.0e} of the "
+        "energy of the nutation."
     )
 
 

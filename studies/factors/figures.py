@@ -36,9 +36,9 @@ def _label(bar: Bar) -> str:
 def _effect(bar: Bar, before: Bar) -> str:
     """What a change did, in words."""
     times = bar.ratio if bar.ratio >= 1.0 else 1.0 / bar.ratio
-    said = f"{words.times_faster(times)} times {'faster' if bar.ratio >= 1.0 else 'slower'}"
-    noise = max(bar.time.spread, before.time.spread)
-    return said if times > 1.0 + noise else f"{said} (within the noise)"
+    if times <= 1.0 + max(bar.time.spread, before.time.spread):
+        return "no change beyond noise"
+    return f"{words.times_faster(times)} times {'faster' if bar.ratio >= 1.0 else 'slower'}"
 
 
 def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
@@ -47,7 +47,7 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
     figure, axes = style.panels(len(shown), 1, height=height)
     for axis, (scene, span, target, bars) in zip(axes[:, 0], shown, strict=True):
         seconds = [bar.time.seconds for bar in bars]
-        ends = 0.3 * min(seconds), 2000.0 * max(seconds)
+        ends = 0.3 * min(seconds), 500.0 * max(seconds)
         for k, bar in enumerate([*bars, bars[-1]]):
             total = k in (0, len(bars))
             low, high = sorted((ends[0] if total else seconds[k - 1], seconds[min(k, len(bars) - 1)]))
@@ -64,10 +64,11 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
         axis.set(xscale="log", xlim=ends, ylim=(len(bars) + 0.6, -0.6), yticks=range(len(bars) + 1))
         axis.set_yticklabels([*map(_label, bars), f"{last.name}, {last.call}"], fontsize=style.LEAST_TEXT)
         whole = words.times_faster(seconds[0] / seconds[-1])
-        order = "the call last" if bars[-1].factor == "call" else "the call first"
-        axis.set_title(
-            f"{scene}, {span:g} nutations, axis error {target:.0e}: {whole} times faster, {order}", loc="right"
-        )
+        order = "the call changed last" if bars[-1].factor == "call" else "the call changed first"
+        goal = f"scene {scene}, {span:g} nutations, axis error {style.number(target)} rad"
+        axis.set_title(f"{goal}: {whole} times faster, {order}", loc="right")
+        axis.set_xticks([tick for tick in axis.get_xticks() if ends[0] < tick < 30.0 * max(seconds)])  # no bar is there
+        axis.set_xlim(ends)
         axis.grid(visible=False, axis="y")
         axis.xaxis.set_minor_formatter("")
     for factor in filter(None, COLORS):
@@ -75,11 +76,7 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
     axes[-1, 0].set_xlabel("time of a run (s)")
     noise = max(bar.time.spread for *_, bars in shown for bar in bars)
     style.legend_below(figure, axes)
-    bars = shown[0][-1]
-    largest = max(bars[1:], key=lambda bar: bar.ratio)
-    whole = words.times_faster(bars[0].time.seconds / bars[-1].time.seconds)
-    style.headline(figure, f"The largest part of the factor {whole} is the {largest.factor}: "
-                           f"{words.times_faster(largest.ratio)} times")  # fmt: skip
+    style.headline(figure, words.waterfall_message(shown))
     return Picture(
         "waterfall",
         figure,
@@ -125,7 +122,8 @@ def draw_charts(data: xr.Dataset) -> Picture:
                 if sizes:
                     place = schemes.index(scheme)
                     axis.plot([min(sizes), max(sizes)], [place, place], color=style.GREY, lw=0.8, zorder=1)
-        axes[0, column].set(title=f"{span:g} nutations, {target:.0e}", xlabel="time of a kernel (us)")
+        axes[0, column].set(title=f"{span:g} nutations,\naxis error {style.number(target)} rad")
+        axes[0, column].set(xlabel=f"time of a bare run ({words.MICRO})")
         axes[1, column].set(xlabel="force evaluations")
     for axis in axes.flat:
         _finish(axis, schemes)
@@ -133,7 +131,7 @@ def draw_charts(data: xr.Dataset) -> Picture:
         axes[0, 0].plot([], [], "o", color="#444444", fillstyle=fill, ms=5.0, label=chart)
     style.legend_below(figure, axes)
     sentences = " ".join(words.family_sentences(data))
-    style.headline(figure, words.family_sentences(data)[0].rstrip("."))
+    style.headline(figure, words.charts_message(data))
     return Picture(
         "charts",
         figure,
@@ -148,6 +146,8 @@ def _finish(axis: Any, schemes: list[str]) -> None:
     labels = [f"{scheme} (SciPy)" if scheme == "DOP853" else scheme for scheme in schemes]
     axis.set(xscale="log", yticks=np.arange(len(schemes)), yticklabels=labels, ylim=(len(schemes) - 0.5, -0.5))
     low, high = axis.get_xlim()
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0,) if high > 100.0 * low else (1.0, 2.0, 5.0)))
-    axis.xaxis.set_major_formatter("{x:g}")
+    ratio = high / low
+    subs = (1.0,) if ratio > 100.0 else (1.0, 3.0) if ratio > 12.0 else (1.0, 2.0)
+    axis.xaxis.set_major_locator(LogLocator(subs=subs, numticks=5))
+    axis.xaxis.set_major_formatter(lambda value, _: f"{value:g}" if value < 1e4 else style.number(value))
     axis.xaxis.set_minor_formatter("")

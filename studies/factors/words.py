@@ -46,9 +46,12 @@ FACTORIAL = [
 ]  # fmt: skip
 
 
+MICRO = "\N{MICRO SIGN}s"
+
+
 def duration(value: float) -> str:
     """A time in the unit that suits it."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+    for unit, size in (("s", 1.0), ("ms", 1e-3), (MICRO, 1e-6)):
         if value >= size:
             return f"{value / size:.3g} {unit}"
     return f"{value / 1e-9:.3g} ns"
@@ -136,6 +139,27 @@ def family_sentences(data: xr.Dataset) -> list[str]:
         if parts:
             sentences.append(f"{family}: a compiled run takes {joined(parts)} as on the axis.")
     return sentences
+
+
+def charts_message(data: xr.Dataset) -> str:
+    """What a chart costs the first family that was timed in several, as a title."""
+    for family in FAMILIES:
+        found = {chart: family_ratios(data, family, chart) for chart in ("attitude", "angles")}
+        parts = [f"{np.median(ratios):.2f} times as long in {chart}" for chart, ratios in found.items() if ratios]
+        if parts:
+            return f"At equal error {family} methods run {joined(parts)} as on the axis, in the median"
+    return "No method was timed in several charts"
+
+
+def waterfall_message(shown: Sequence[tuple[str, float, float, list[Bar]]]) -> str:
+    """The largest factor of the whole gain, in every order that is drawn, as a title."""
+    bars = shown[0][-1]
+    factor = max(bars[1:], key=lambda bar: bar.ratio).factor
+    gains = [max(bar.ratio for bar in part[1:] if bar.factor == factor) for *_, part in shown]
+    orders = ["the call changed last" if part[-1].factor == "call" else "the call changed first" for *_, part in shown]
+    said = ", ".join(f"{times_faster(gain)} times with {order}" for gain, order in zip(gains, orders, strict=True))
+    whole = times_faster(bars[0].time.seconds / bars[-1].time.seconds)
+    return f"The largest step of the gain of {whole} times is the {factor}: {said}"
 
 
 def factors_sentence(data: xr.Dataset) -> str:

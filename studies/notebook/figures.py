@@ -10,7 +10,7 @@ from symtop.measure.conservation import CONSTANTS
 from symtop.model.charts import axis_distance, axis_from_angles
 from symtop.model.scenes import scene
 from symtop.report import style
-from symtop.report.figures import largest_so_far
+from symtop.report.figures import SMALLEST, largest_so_far
 from symtop.runner.study import Picture
 
 from . import solid, words
@@ -18,7 +18,7 @@ from .long_energy import better_from
 from .tables import ALPHA, FILMED, MIDPOINT, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION, Column
 from .words import PARTS
 
-NAMED = (SOLVER, *words.ORDER_TWO, "strang[axis]", "cayley[axis]")  # the others are thin grey lines
+NAMED = (SOLVER, *words.DRAWN)  # the others are thin grey lines
 LABELS = {"energy": "energy (J)", "p_phi": r"$p_\varphi$ (J s)", "p_psi": r"$p_\psi$ (J s)"}
 
 
@@ -39,11 +39,12 @@ def draw_motion(data: xr.Dataset) -> Picture:
     ):
         motion.plot(time, first[solver], line, color=color, label=label)
         difference.plot(time[1:], largest_so_far(first[solver] - first[true])[1:], line, color=color, label=label)
-    motion.set_title("the notebook's solver")
-    difference.set(title="largest difference from the closed form", yscale="log")
+    motion.set(title="by the notebook's solver (LSODA)", ylabel="angle (rad), rate (rad/s)")
+    difference.set(title="largest difference from the closed form so far", yscale="log")
     style.legend_below(figure, [motion])
     gap = float(np.abs(first[Column.SOLVER_THETA] - first[Column.TRUE_THETA]).max())
-    style.headline(figure, f"The notebook's solver follows the first scene to {style.number(gap)} rad")
+    style.headline(figure, f"The notebook's solver follows theta of the first scene, spheroid, to {style.number(gap)} "
+                           f"rad in {time[-1]:g} s")  # fmt: skip
     return Picture(
         "motion",
         figure,
@@ -62,16 +63,18 @@ def draw_derivations(data: xr.Dataset) -> Picture:
         (Column.DERIVATIONS_GAP, style.BLUE, "-", "hard way against easy way (rad)"),
         (Column.HARD_GAP, style.VERMILLION, "--", "hard way against closed form (rad)"),
         (Column.EASY_GAP, style.GREEN, ":", "easy way against closed form (rad)"),
-        (Column.ENERGY_GAP, style.BLACK, "-.", "E1 + p_psi^2/2 I3 against E (relative)"),
+        (Column.ENERGY_GAP, style.BLACK, "-.", r"$E_1 + p_\psi^2/(2 I_3)$ against $E$ (relative)"),
     )
     for axis, (name, part) in zip(axes, PARTS.items(), strict=True):
         solver = data.sel(scene=name, integrator=SOLVER)
         for column, color, line, label in lines:
-            axis.plot(solver[Column.BOTH_TIME], largest_so_far(solver[column]), line, color=color, label=label)
-        axis.set(yscale="log", title=f"{name} ({part})")
+            gap, over = largest_so_far(solver[column])[1:], 4.0 if line == ":" else 2.0  # the dotted one is on top
+            gap[gap <= SMALLEST] = np.nan  # no difference yet
+            axis.plot(solver[Column.BOTH_TIME][1:], gap, line, color=color, label=label, lw=0.5 * over, zorder=over)
+        axis.set(yscale="log", title=f"scene {name} (notebook, {part})")
     style.legend_below(figure, axes)
     gap = style.number(float(data[Column.DERIVATIONS_GAP].max()))
-    style.headline(figure, f"The hard and the easy derivation agree to {gap} rad")
+    style.headline(figure, f"The notebook's two derivations, the hard way and the easy way, agree to {gap} rad")
     return Picture(
         "two-ways",
         figure,
@@ -98,15 +101,20 @@ def draw_residuals(data: xr.Dataset) -> Picture:
             for method in data["integrator"].values:
                 _residual_line(axis, data.sel(scene=part, integrator=method), name)
             axis.set(yscale="log")
-    titles = ("residual, as it was drawn", *(f"{part}, relative, so far" for part in PARTS))
+    titles = ("the solver's, as the\nnotebook drew it", *(f"{part}:\nlargest relative so far" for part in PARTS))
     for column, title in zip(axes.T, titles, strict=True):
         column[0].set_title(title)
         column[-1].set_xlabel("time (s)")
     style.few_ticks(*axes[:, 1:].flat, most=4)
     style.legend_below(figure, axes)
+    for axis in axes[1:, 1:].flat:
+        axis.set_ylim(bottom=1e-4 * SMALLEST)
+        axis.annotate("exact zeros", (0.98, SMALLEST), (0, -3), xycoords=axis.get_yaxis_transform(), ha="right",
+                      va="top", textcoords="offset points", fontsize=style.LEAST_TEXT, color="#444444")  # fmt: skip
     largest = max(words.largest_momenta(data).values())
-    style.headline(figure, f"All discrete methods keep the momenta to {style.number(largest)}; their energy errors are "
-                           "bounded, the solver's grow")  # fmt: skip
+    lost = float(data[list(words.MOMENTA)].sel(integrator=SOLVER).to_dataarray().max())
+    style.headline(figure, f"Discrete methods keep both momenta to {style.number(largest)}; the notebook's solver, "
+                           f"{SOLVER}, changes them by {style.number(lost)}")  # fmt: skip
     return Picture(
         "residuals",
         figure,
@@ -132,7 +140,7 @@ def _residual_line(axis: Any, run: xr.Dataset, constant: str) -> None:
 
 def draw_hope(data: xr.Dataset) -> Picture:
     """The largest energy error so far of the solver and of the discrete methods, far beyond the notebook's horizon."""
-    figure, axes = style.grid(2, 2, ("time (s)", "largest relative energy error so far"), height=2.5, sharey=True)
+    figure, axes = style.grid(2, 2, ("time (s)", "largest relative\nenergy error so far"), height=2.5, sharey=True)
     for axis, (name, part) in zip(axes, PARTS.items(), strict=True):
         for method in (row for row in NAMED if row in data["integrator"].values):
             run, look = data.sel(scene=name, integrator=method), style.look(method)
@@ -141,10 +149,10 @@ def draw_hope(data: xr.Dataset) -> Picture:
             since = better_from(data, name, method) if method != SOLVER else math.inf
             if 0.0 < since < math.inf:
                 axis.axvline(since, color=look.color, lw=0.8, ls=":", zorder=1)
-        axis.set(xscale="log", yscale="log", title=f"{name} ({part})")
+        axis.set(xscale="log", yscale="log", title=f"scene {name} (notebook, {part})")
         end = float(data[Column.SAMPLE_TIME].sel(scene=name).max())
         axis.axvline(end, color=style.GREY, lw=1.0, zorder=1, label="end of the notebook")
-    axes[0].plot([], [], ":", color=style.GREY, label="from here on better than the solver")
+    axes[0].plot([], [], ":", color=style.GREY, label="from here on better than lsoda (in its colour)")
     style.few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
     style.headline(figure, words.hope_message(data))
@@ -170,12 +178,13 @@ def draw_spheres(data: xr.Dataset) -> Picture:
         lines = ((drawn, style.VERMILLION, "as the notebook drew it"), (true, style.BLACK, "where the axis is"))
         for path, color, label in lines:
             axis.plot(*path.T, color=color, lw=0.6, alpha=0.35)
-            axis.plot(*path[early].T, color=color, lw=1.6, label=label)
+            axis.plot(*path[early].T, color=color, lw=1.6, label=f"{label}, from its dot on")
             axis.plot(*path[:1].T, "o", color=color, ms=4.5)
         for letter, place in zip("xyz", 1.15 * np.eye(3), strict=True):
             axis.text(*place, letter, ha="center", va="center")
     style.legend_below(figure, axes)
-    style.headline(figure, "The curve that the notebook drew is the path of the axis, turned by a quarter")
+    style.headline(figure, "The curve that the notebook drew is the path of the axis, turned by 90° about the "
+                           "vertical z")  # fmt: skip
     return Picture(
         "spheres",
         figure,
@@ -211,23 +220,34 @@ def draw_alpha(data: xr.Dataset) -> Picture:
     rest, rate = float(second[Column.ALPHA_AT_REST]), float(second[Column.ALPHA_RATE])
     figure, (cubic, motion) = style.grid(2, 2, height=2.6)
     u, start = second[Column.COSINE], math.cos(math.radians(43.0))
-    cubic.plot(u, second[Column.CUBIC_AT_REST], color=style.BLUE, label=f"alpha = {rest:.6f}, at rest")
-    cubic.plot(u, second[Column.CUBIC_PRINTED], "--", color=style.VERMILLION, label=f"alpha = {ALPHA:g}, as printed")
+    cubic.plot(u, second[Column.CUBIC_AT_REST], color=style.BLUE, label=rf"$\alpha$ = {rest:.6f} s$^{{-2}}$, at rest")
+    cubic.plot(
+        u,
+        second[Column.CUBIC_PRINTED],
+        "--",
+        color=style.VERMILLION,
+        label=rf"$\alpha$ = {ALPHA:g} s$^{{-2}}$, as printed",
+    )
     cubic.axvline(start, color=style.GREY, lw=0.9)
     cubic.axhline(0.0, color=style.GREY, lw=0.9)
-    cubic.annotate("cos 43 deg ", (start, -0.18), fontsize=style.LEAST_TEXT, ha="right")
+    cubic.annotate("cos 43° ", (start, -0.18), fontsize=style.LEAST_TEXT, ha="right")
+    there = float(np.interp(start, u.values, second[Column.CUBIC_PRINTED].values))
+    cubic.plot([start], [there], "o", color=style.VERMILLION)
+    cubic.annotate("not zero: it\nmoves at\nthe start", (start, there), (6, 4), textcoords="offset points",
+                   fontsize=style.LEAST_TEXT, color=style.ink(style.VERMILLION))  # fmt: skip
     cubic.set(xlabel=r"$u = \cos\theta$", ylabel=r"$\dot u^2$ (1/s$^2$)", xlim=(0.2, 0.95), ylim=(-0.2, 0.35))
     cubic.set_title("the nutation cubic")
     for column, color, line, label in (
         (Column.THETA_AT_REST, style.BLUE, "-", "released at rest"),
-        (Column.THETA_FALLING, style.VERMILLION, "--", f"alpha = {ALPHA:g}, theta falling at first"),
-        (Column.THETA_RISING, style.ORANGE, ":", f"alpha = {ALPHA:g}, theta rising at first"),
+        (Column.THETA_FALLING, style.VERMILLION, "--", rf"$\alpha$ = {ALPHA:g}, $\theta$ falling at first"),
+        (Column.THETA_RISING, style.ORANGE, ":", rf"$\alpha$ = {ALPHA:g}, $\theta$ rising at first"),
     ):
         motion.plot(second[Column.ALPHA_TIME], np.degrees(second[column]), line, color=color, label=label)
-    motion.set(xlabel="time (s)", ylabel="theta (degrees)", title="the motion from each start")
+    motion.set(xlabel="time (s)", ylabel=r"$\theta$ (degrees)", title="the motion from each start")
     for axis in (cubic, motion):  # the panels share colours, not lines: a legend each
         axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False)
-    style.headline(figure, f"The printed alpha is no release at rest: theta starts at {rate:.3f} rad/s")
+    style.headline(figure, f"The alpha that the notebook prints contradicts its release at rest: theta would start to "
+                           f"change at {math.degrees(rate):.0f} degrees/s")  # fmt: skip
     return Picture(
         "alpha",
         figure,
@@ -248,7 +268,7 @@ def draw_modified_energy(data: xr.Dataset) -> Picture:
     for (column, kind, _), color in zip(kinds, (style.BLUE, style.BLACK), strict=True):
         values = midpoint[f"{column}_history"]
         axes[0, 0].plot(midpoint[Column.MODIFIED_TIME], values, color=color, label=f"{kind}, midpoint, over time")
-    axes[0, 0].set(title="spheroid, 40 steps", xlabel="time (s)", ylabel="relative change")
+    axes[0, 0].set(title="spheroid, 40 steps\na nutation", xlabel="time (s)", ylabel="relative change")
     for axis, name in zip(axes[0, 1:], PARTS, strict=True):
         for method in MODIFIED:
             run, look = data.sel(scene=name, integrator=method), style.look(method)
@@ -267,7 +287,9 @@ def draw_modified_energy(data: xr.Dataset) -> Picture:
         for power, column in ((2, Column.ENERGY_CHANGE), (4, Column.MODIFIED_CHANGE)):
             span = float(h.min()), float(h.max())
             style.slope_guide(axis, power, span, 0.2 * float(run[column].min()), f"$h^{power}$")
-        axis.set(xscale="log", yscale="log", title=name, xlabel="step size (s)", ylabel="largest change")
+        axis.set(
+            xscale="log", yscale="log", title=f"scene {name}", xlabel="step size (s)", ylabel="largest relative change"
+        )
         style.few_ticks(axis, most=4)
     style.legend_below(figure, axes)
     style.headline(figure, words.modified_message(data))

@@ -12,6 +12,7 @@ from .oscillator import ONE_SIDED
 from .tables import AGAINST_RK45, FRICTION, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOP_TOLERANCE, Column, order, tops
 
 SYMBOLS = {"midpoint": "o", "trapezoidal": "s", ONE_SIDED: "v"}
+SLOPES = {1.0: "$h$", 0.5: "$h^{1/2}$"}
 TIME = r"time ($\sqrt{m/k}$)"
 
 
@@ -35,7 +36,8 @@ def draw_notebook(data: xr.Dataset) -> Picture:
         axis.set(title=words.title(oscillator), ylim=(-1.3, 8.5))
     style.legend_below(figure, axes)
     gap = style.number(float(data[Column.UPDATE_GAP].max()))
-    style.headline(figure, f"The notebook's update is the midpoint rule, to {gap}; its guess damps nothing")
+    style.headline(figure, f"The notebook's update is the midpoint rule, to {gap}; its guess at the forces damps "
+                           "nothing")  # fmt: skip
     return Picture(
         "seed",
         figure,
@@ -70,9 +72,11 @@ def draw_orders(data: xr.Dataset) -> Picture:
     axes[1, 0].set_ylabel("relative error of\nthe slow exponent")
     style.few_ticks(*axes.flat, most=2)
     style.legend_below(figure, axes)
+    for power, column in ((1.0, 3), (0.5, 3)):
+        style.slope_guide(axes[1, column], power, (2e-4, 1e-2), 1e-6 if power == 1.0 else 0.1, SLOPES[power])
     halves = [order(data, "damping-2", m, Column.EXPONENT_ERROR).slope for m in ("trapezoidal", ONE_SIDED)]
     style.headline(figure, f"At critical damping the slow exponent is right to order {halves[0]:.1f} (trapezoidal) and "
-                           f"{halves[1]:.1f} (one-sided force) only")  # fmt: skip
+                           f"{halves[1]:.1f} (force at one end) only")  # fmt: skip
     least, most = (float(value(data[Column.STEP])) for value in (np.nanmin, np.nanmax))
     halved = (f"{m} {order(data, 'damping-2', m, Column.EXPONENT_ERROR).slope:.2f}" for m in ("trapezoidal", ONE_SIDED))
     return Picture(
@@ -100,10 +104,7 @@ def draw_decay(data: xr.Dataset) -> Picture:
             axis.plot(time[1:], error[1:], **style.line(method, 0.8), markevery=0.1, label=method)
         axis.set(xscale="log", yscale="log", title=words.title(OSCILLATORS[name]))
     style.legend_below(figure, axes)
-    largest = np.abs(data[Column.ENERGY_ERROR]).max("sample").sel(scene=AGAINST_RK45[0])
-    ends = [f"{method} {style.number(float(largest.sel(integrator=method)))}" for method in (*RULES, RK45)]
-    free = words.title(OSCILLATORS[AGAINST_RK45[0]])
-    style.headline(figure, f"Energy at equal cost, {free}: largest relative error {', '.join(ends)}")
+    style.headline(figure, words.decay_message(data))
     return Picture(
         "decay",
         figure,
@@ -120,24 +121,26 @@ def draw_tops(data: xr.Dataset) -> Picture:
     for (theta, momenta, balance), name in zip(axes.T, names, strict=True):
         first = data.sel(scene=name, integrator="midpoint")
         time = first[Column.TOP_TIME].values
-        theta.plot(time, np.degrees(first[Column.THETA]), color=style.BLUE, label="theta, midpoint")
-        theta.plot(time, np.degrees(first[Column.TRUE_THETA]), ":", color=style.BLACK, label="theta, truth")
+        theta.plot(time, np.degrees(first[Column.THETA]), color=style.BLUE, label=r"$\theta$, midpoint")
+        theta.plot(time, np.degrees(first[Column.TRUE_THETA]), ":", color=style.BLACK, label=r"$\theta$, truth")
         momenta.plot(time, first[Column.P_PHI], color=style.GREEN, label=r"$p_\varphi$")
         momenta.plot(time, first[Column.P_PSI], "--", color=style.PURPLE, label=r"$p_\psi$")
         for method in (*RULES, RK45):
             run, color = data.sel(scene=name, integrator=method), style.look(method).color
             phi, psi = largest_so_far(run[Column.BALANCE_PHI]), largest_so_far(run[Column.BALANCE_PSI])
-            balance.plot(time[1:], phi[1:], color=color, label=f"balance, {method}")
-            balance.plot(time[1:], psi[1:], "--", color=color)
-        theta.set_title(f"{name}, damped")
+            wide = 2.4 if method == RULES[0] else 1.1  # it lies below the other rule's
+            balance.plot(time[1:], phi[1:], color=color, lw=wide, label=f"balance, {method}")
+            balance.plot(time[1:], psi[1:], "--", color=color, lw=wide)
+        balance.plot([], [], "--", color=style.GREY, label=r"balance of $p_\psi$ (solid: of $p_\varphi$)")
+        theta.set_title(f"scene {name}, damped")
         balance.set(yscale="log", xlabel="time (s)")
-    labels = ("theta (degrees)", "momenta (J s)", "defect of the balance,\nrelative")
+    labels = (r"$\theta$ (degrees)", "momenta (J s)", "defect of the balance,\nrelative")
     for axis, label in zip(axes[:, 0], labels, strict=True):
         axis.set_ylabel(label)
     style.legend_below(figure, axes)
     ours, theirs = (style.number(words.largest_balance(data, some)) for some in (RULES, (RK45,)))
-    style.headline(figure, f"The momentum balance with friction holds to {ours} in the discrete rules, to {theirs} in "
-                           "RK45")  # fmt: skip
+    style.headline(figure, f"With friction the discrete rules keep the balance of the momenta to {ours}, {RK45} to "
+                           f"{theirs}")  # fmt: skip
     return Picture(
         "damped-top",
         figure,
@@ -155,7 +158,7 @@ def draw_tops(data: xr.Dataset) -> Picture:
 def draw_top_orders(data: xr.Dataset) -> Picture:
     """Errors of theta of the damped tops against the step."""
     labels = ("step size (s)", "largest error of theta (rad)")
-    figure, axes = style.grid(len(tops(data)), 2, labels, height=2.3, sharey=True)
+    figure, axes = style.grid(len(tops(data)), 2, labels, height=2.3, sharex=True, sharey=True)
     bound = {"color": style.GREY, "lw": 3, "alpha": 0.5, "label": "error of the reference"}
     orders = []
     for axis, name in zip(axes, tops(data), strict=True):
@@ -166,13 +169,14 @@ def draw_top_orders(data: xr.Dataset) -> Picture:
             orders.append(f"{method} on {name} {order(data, name, method, Column.THETA_ERROR)}")
         axis.axhline(float(run[Column.TOP_BOUND]), **bound)
         style.slope_guide(axis, 2.0, (float(h.min()), float(h.max())), 0.3 * float(error.min()), "$h^2$")
-        axis.set(xscale="log", yscale="log", title=f"{name}, damped")
+        axis.set(xscale="log", yscale="log", title=f"scene {name}, damped")
     style.few_ticks(*axes, most=4)
     style.legend_below(figure, axes)
     slopes = [order(data, name, method, Column.THETA_ERROR).slope for name in tops(data) for method in RULES]
     judged = [slope for slope in slopes if np.isfinite(slope)]
-    span = f"slopes from {min(judged):.2f} to {max(judged):.2f}" if judged else "too few steps to judge the order"
-    style.headline(figure, f"The discrete rules with friction: {span}")
+    spans = sorted({f"{slope:.2f}" for slope in (min(judged), max(judged))}) if judged else []
+    span = f"slope {' to '.join(spans)}" if judged else "too few steps to judge the order"
+    style.headline(figure, f"Order of the discrete rules with friction, by the error of theta: {span}")
     return Picture(
         "damped-top-orders",
         figure,

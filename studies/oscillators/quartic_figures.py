@@ -30,13 +30,20 @@ def draw_errors(data: xr.Dataset) -> Picture:
             axis.plot(cell[quartic.STEP], errors, look.marker, ls=look.dash, color=look.color, ms=3, label=method)
         style.slope_guide(axis, 2.0, (1e-2, 0.4), 1e-5, "$h^2$")
         axis.axvline(0.5, color=style.GREY, lw=0.9, ls=":")
-        axis.set(xscale="log", yscale="log", ylim=(1e-17, 10.0), title=name)
-    axes[0].annotate("T/2 ", (0.5, 1e-9), color="#444444", fontsize=style.LEAST_TEXT, ha="right", va="center")
+        axis.set(xscale="log", yscale="log", title=name)
+        ended = [m for m in MAPS if not np.isfinite(data[quartic.ERROR].sel(scene=name, integrator=m)).all()]
+        if ended:
+            note = "lost at longer steps:\n" + "\n".join(ended)
+            axis.annotate(note, (0.03, 0.28), xycoords="axes fraction", color="#444444", fontsize=style.LEAST_TEXT)
+    top = float(data[quartic.ERROR].sel(scene=list(QUARTICS), integrator=list(MAPS)).max())
+    axes[0].set_ylim(1e-17, 10.0 * top)
+    for axis in axes:
+        axis.annotate("T/2 ", (0.5, 1e-9), color="#444444", fontsize=style.LEAST_TEXT, ha="right", va="center")
     style.few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
     exact = float(data[quartic.ERROR].sel(scene=list(QUARTICS), integrator=MAPS[0]).max())
-    style.headline(figure, f"With exact constants the map is the motion at any step, to {style.number(exact)}; with "
-                           "constants to order h^2 it has order 2")  # fmt: skip
+    style.headline(figure, f"{MAPS[0]} is the motion at any step, to {style.number(exact)}; mcmillan, the same map "
+                           "with constants to second order, has order 2 as the others")  # fmt: skip
     return Picture(
         "quartic-errors",
         figure,
@@ -52,7 +59,7 @@ def draw_errors(data: xr.Dataset) -> Picture:
 def draw_orbits(data: xr.Dataset) -> Picture:
     """|x_{n+1}|^2 over |x_n|^2 of the maps, on the curve that the motion draws."""
     figure, axes = style.panels(len(quartic.SHOWN), len(DRAWN), height=2.3, sharex="col", sharey="col")
-    curve = {"color": style.ORANGES[2], "lw": 3.5, "label": "the motion: |x(t)|, |x(t + h)|"}
+    curve = {"color": style.ORANGES[2], "lw": 3.5, "label": "the motion: $|x(t)|^2$, $|x(t + h)|^2$"}
     for row, steps in enumerate(quartic.SHOWN):
         for axis, name in zip(axes[row], DRAWN, strict=True):
             true = data.sel(scene=name, integrator=MAPS[0]).isel(quartic_shown=row)
@@ -65,15 +72,18 @@ def draw_orbits(data: xr.Dataset) -> Picture:
             low, high = float(true[quartic.CURVE_HERE].min()), float(true[quartic.CURVE_HERE].max())
             margin = 0.25 * (high - low)
             axis.set(xlim=(low - margin, high + margin), ylim=(low - margin, high + margin))
-            axis.set_title(f"{name}, T/{steps:g}", fontsize=7.5)
-        axes[row, 0].set_ylabel("$|x_{n+1}|^2$ over the largest")
+            axis.set_title(f"{name}, step T/{steps:g}", fontsize=7.5)
+            if away := _outside(data.sel(scene=name).isel(quartic_shown=row), low - margin, high + margin):
+                axis.text(0.42, 0.45, away, transform=axis.transAxes, ha="center", va="center", color="#444444",
+                          fontsize=style.LEAST_TEXT)  # fmt: skip
+        axes[row, 0].set_ylabel("$|x_{n+1}|^2$ over the largest $|x|^2$")
     for axis in axes[-1]:
-        axis.set_xlabel("$|x_n|^2$ over the largest")
+        axis.set_xlabel("$|x_n|^2$ over the largest $|x|^2$")
     style.legend_below(figure, axes)
     far = {method: quartic.off_curve(data, DRAWN[0], method) for method in MAPS}
     off = style.number(min(value for method, value in far.items() if method != MAPS[0]))
-    at = f"at T/{quartic.SHOWN[-1]:g} the others are off by {off} at least"
-    style.headline(figure, f"Only the exact map stays on the curve of the motion: {at}")
+    at = f"with steps of T/{quartic.SHOWN[-1]:g} on {DRAWN[0]} the others are off it by {off} at least"
+    style.headline(figure, f"Only {MAPS[0]} stays on the curve of the motion: {at}")
     away = ", ".join(f"{method} {quartic.off_curve(data, DRAWN[0], method):.1g}" for method in MAPS[1:])
     return Picture(
         "quartic-orbits",
@@ -88,6 +98,17 @@ def draw_orbits(data: xr.Dataset) -> Picture:
     )
 
 
+def _outside(orbits: xr.Dataset, low: float, high: float) -> str:
+    """Which maps have points outside a panel, or none in it, as a note; empty if none has."""
+    parts = []
+    for method in MAPS:
+        values = orbits[quartic.ORBIT].sel(integrator=method).values
+        out = int(np.sum(~((values >= low) & (values <= high))))
+        if out:
+            parts.append(f"{method}:\n{out} of {values.size} points\nare outside")
+    return "\n".join(parts)
+
+
 def draw_constants(data: xr.Dataset) -> Picture:
     """A, B and delta against the step, and how their distances from the neighbours' vanish."""
     figure, axes = style.panels(1, 3, height=2.4)
@@ -96,15 +117,16 @@ def draw_constants(data: xr.Dataset) -> Picture:
     limit = quartic.oscillator_of(quartic.CHI[0])
     fine = np.linspace(0.0, 0.5, 200)
     axes[0, 0].plot(fine, 1.0 + 1.5 * limit.b * (fine * limit.period) ** 2, color=style.ORANGE)
-    axes[0, 0].annotate("$1 + 3bh^2/2$", (0.22, -0.6), color=style.ORANGE, ha="right")
+    axes[0, 0].annotate("$1 + 3bh^2/2$", (0.22, -0.6), color=style.ink(style.ORANGE), ha="right")
+    axes[0, 0].axhline(-1.0, color=style.GREY, lw=0.9, ls=":")
     axes[0, 0].plot(steps, true[quartic.A], "D-", color=LOOKS[MAPS[0]].color, ms=4)
     axes[0, 0].annotate("$A$", (0.31, 0.55), color=LOOKS[MAPS[0]].color)
     axes[0, 0].axhline(0.0, color=style.GREY, lw=0.9)
     axes[0, 0].set(ylim=(-1.3, 1.1), xlabel="step size over T", title="A")
     axes[0, 1].axhline(1.0, color=style.ORANGE)
     axes[0, 1].plot(steps, true[quartic.B_OVER], "D-", color=LOOKS[MAPS[0]].color, ms=4)
-    axes[0, 1].annotate(r"$-B/\sigma h^2$", (0.3, float(true[quartic.B_OVER].min())), ha="right")
-    axes[0, 1].set(xlabel="step size over T", title=r"$-B/\sigma h^2$")
+    axes[0, 1].annotate("limit of small steps", (0.48, 0.96), color=style.ink(style.ORANGE), ha="right", va="top")
+    axes[0, 1].set(xlabel="step size over T", title=r"$-B\,/\,(\sigma h^2)$")
     shades = (style.BLUE, style.VERMILLION, style.GREEN)
     labels = (("A", 4, 1.6), ("B", 4, 0.5), (r"\delta", 3, 1.0))  # the last: how far above its line's end
     for gap, (symbol, power, above), shade in zip(GAPS, labels, shades, strict=True):
@@ -115,8 +137,8 @@ def draw_constants(data: xr.Dataset) -> Picture:
     axes[0, 2].set(xscale="log", yscale="log", xlim=(1e-3, 0.7), ylim=(1e-7, 20.0), xlabel="step size over T")
     axes[0, 2].set_title("distance from the limit")
     style.few_ticks(axes[0, 2], most=4)
-    style.headline(figure, "The exact constants leave their limit of small steps: A stays within [-1, 1] where its "
-                           "parabola does not")  # fmt: skip
+    style.headline(figure, "The constant A of the exact map stays between -1 and 1 (dotted) at long steps, where its "
+                           "limit of small steps, a parabola, does not")  # fmt: skip
     return Picture(
         "quartic-constants",
         figure,

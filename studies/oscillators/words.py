@@ -3,6 +3,7 @@
 import numpy as np
 import xarray as xr
 
+from symtop.report.style import number
 from symtop.runner.study import Table
 
 from . import quartic_tables
@@ -47,6 +48,18 @@ def cost(data: xr.Dataset) -> str:
         f"{rules:.0f} force evaluations for a rule (step {LONG / rules:g}), {float(rk45.min()):.0f} to "
         f"{float(rk45.max()):.0f} for RK45"
     )
+
+
+def decay_message(data: xr.Dataset) -> str:
+    """Which method keeps the energy best at equal cost, for each damping, as a title."""
+    largest, parts = np.abs(data[Column.ENERGY_ERROR]).max("sample"), []
+    for name in AGAINST_RK45:
+        errors = {method: float(largest.sel(scene=name, integrator=method)) for method in (*RULES, RK45)}
+        best, worst = (pick(errors, key=lambda method: errors[method]) for pick in (min, max))
+        parts.append(
+            f"{best} with {title(OSCILLATORS[name])} ({number(errors[best])}; {worst} {number(errors[worst])})"
+        )
+    return f"At equal cost the energy is kept best by {', by '.join(parts)}"
 
 
 def energy(data: xr.Dataset) -> str:

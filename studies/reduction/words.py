@@ -28,6 +28,7 @@ HOW_TO_READ = (
     "results are two different methods, O(h^p) apart."
 )
 
+PHI, PSI = "\N{GREEK SMALL LETTER PHI}", "\N{GREEK SMALL LETTER PSI}"  # of titles
 CHARTS = ["scene", "integrator", "chart", "against", "time (ratio)", "axis error (ratio)"]
 COSTS = [
     "scene", "rule", "step (s)", "ns a step", "ns a step, unreduced", "ratio", "iterations a step",
@@ -63,8 +64,8 @@ def commuting_message(data: xr.Dataset) -> str:
     same = [method for method, gap in largest.items() if gap < COMMUTES]
     rest = [method for method in largest if method not in same]
     return (
-        f"Eliminating phi and psi before or after discretising makes the same method for {', '.join(same) or 'no rule'}"
-        f", and different ones for {', '.join(rest) or 'none'}"
+        f"Eliminating {PHI} and {PSI} before or after discretising makes the same method for "
+        f"{', '.join(same) or 'no rule'}, and different ones for {', '.join(rest) or 'none'}"
     )
 
 

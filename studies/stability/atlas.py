@@ -8,6 +8,7 @@ at one step says nothing of the next step, and is not quoted.
 """
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ LOWER_SHARE = 0.1  # of the rows may reach less far than what is quoted
 COMMON = 0.5  # of the rows must fail, at every larger setting too, before a threshold is quoted
 LASTING = 3  # settings at least, beyond a threshold: at the last one "every larger" would say nothing
 NOTABLE = 0.1  # of the failed runs: a kind of failure with a smaller share is not named
+SAME = 1.0 + 1e-9  # two ladders that end at one value end this close
 NEAR, FAR = 1e-4, 0.1  # gaps delta: next to a pole, and well away from it
 
 
@@ -105,6 +107,23 @@ def map_of(cell: xr.Dataset) -> OutcomeMap | None:
         return None
     parameter, settings = cell[Column.PARAMETER].values[rows], cell[Column.SETTING].values[columns]
     return OutcomeMap(outcome[rows][:, columns], parameter, settings, str(cell[Column.CONTROL].values))
+
+
+def common(shown: Mapping[str, OutcomeMap]) -> dict[str, OutcomeMap]:
+    """The parts of some maps that all of them have, so that shares of them compare; where there is none, the maps."""
+    axes = {name: (one.parameter, one.settings) for name, one in shown.items()}
+    ends = [(max(both[k][0] for both in axes.values()), min(both[k][-1] for both in axes.values())) for k in (0, 1)]
+    inside = {
+        name: [(values >= low / SAME) & (values <= high * SAME) for values, (low, high) in zip(both, ends, strict=True)]
+        for name, both in axes.items()
+    }
+    if not all(part.any() for parts in inside.values() for part in parts):
+        return dict(shown)
+    return {
+        name: one._replace(outcome=one.outcome[inside[name][0]][:, inside[name][1]],
+                           parameter=one.parameter[inside[name][0]], settings=one.settings[inside[name][1]])
+        for name, one in shown.items()
+    }  # fmt: skip
 
 
 def maps(data: xr.Dataset, scene: str) -> dict[str, OutcomeMap]:

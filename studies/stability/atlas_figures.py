@@ -16,31 +16,40 @@ from symtop.measure.verdicts import VERDICTS
 from symtop.methods.registry import split_name
 from symtop.report.style import GREY, LEAST_TEXT, OUTCOME_COLORS, WIDTH, headline, panels
 
-from .atlas import OutcomeMap, maps
+from .atlas import OutcomeMap, common, maps
 from .tables import Column
 
 RASTER = {"small": (55, 90), "enlarged": (150, 220)}  # pixels of a map: hatches stay visible
 SHADE = 0.72  # a hatch line is the same colour, darker
 DARK = ("not_finite", "not_converged", "accurate", "left_chart")  # colours that need white letters
 CONTROLS = {"step_size": "step (nutation periods)", "tolerance": "tolerance", "none": "nothing to set"}
-SHORT = {"step_size": "step / nutation", "tolerance": "tolerance"}  # below a small map
-HATCHES = {  # of the legend, and in the map: which pixels, by row and column
-    "left_chart": ("////", lambda row, column: (row + column) % 10 == 0),
-    "wrong_regime": ("\\\\\\\\", lambda row, column: (row - column) % 10 == 0),
+SHORT = {"step_size": "step (nutations)", "tolerance": "tolerance"}  # below a small map
+HATCHES = {  # of the legend, and in the map: which pixels, by row, counted upwards as the maps are drawn, and column
+    "left_chart": ("////", lambda row, column: (row - column) % 10 == 0),
+    "wrong_regime": ("\\\\\\\\", lambda row, column: (row + column) % 10 == 0),
     "not_converged": ("xxxx", lambda row, column: ((row + column) % 10 == 0) | ((row - column) % 10 == 0)),
     "drifting": ("----", lambda row, column: (row % 6 == 0) & (column >= 0)),
     "step_too_small": ("....", lambda row, column: (row % 5 == 0) & (column % 5 == 0)),
     "out_of_budget": ("||||", lambda row, column: (column % 6 == 0) & (row >= 0)),
 }
+NOT_TRIED = "not tried: in no share"  # the margin of a map that is smaller than its neighbours
+MARGIN = "#E4E4E4"
+LEAST_MARGIN = 0.02  # of a panel
 LINES = {  # over the maps: label and dashes
-    "limit": ("linear limit", "-"),
-    "third": ("a third of a turn a step", (0, (4, 2))),
+    "limit": ("small nutations grow beyond", "-"),
+    "third": ("nutation turns by 1/3 a step", (0, (4, 2))),
     "passage": ("one step passes the pole", (0, (1, 1.5))),
 }
 COLUMNS = 6  # of small maps
+INSET = 0.06  # of a small map's width: no tick closer to its sides, whose number would touch the neighbour's
 LETTERS = 17  # of a line above a small map
 AXES = {"spin": "spin r", "gap": r"gap $\delta$ (rad)"}  # what grows upwards
 FALL_SPEED, FALL_PERIOD = 1.2, 4.22  # of the grazing family: rad/s at the pole, and its nutation period, s
+
+
+def said(word: str) -> str:
+    """An outcome as a figure names it."""
+    return {"left_chart": "left its chart"}.get(word, word.replace("_", " "))
 
 
 def sampled(outcome: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint8]:
@@ -72,7 +81,7 @@ def _name_regions(axis: Any, outcome: NDArray[np.uint8], extent: Sequence[float]
     outcome = sampled(outcome, *np.minimum(RASTER["enlarged"], outcome.shape).tolist())
     height, width = outcome.shape
     for index in map(int, np.unique(outcome)):
-        word = VERDICTS[index].replace("_", " ")
+        word = said(VERDICTS[index])
         regions, _ = label(outcome == index)
         largest = 1 + int(np.argmax(np.bincount(regions.ravel())[1:]))
         shape = (1.0 / height, 0.55 / width)  # as the text sees a cell: it is wider than high
@@ -113,6 +122,7 @@ def draw_map(axis: Any, one: OutcomeMap, size: str = "enlarged") -> None:
     most = 5 if size == "enlarged" else 3
     axis.set_xticks(*(([], []) if one.control == "none" else _ticks(x, most)))
     axis.set_yticks(*_ticks(y, most))
+    axis.set_facecolor(MARGIN)
     if size == "enlarged":
         _name_regions(axis, one.outcome, (*x, *y))
 
@@ -149,21 +159,28 @@ def by_area(shown: Mapping[str, OutcomeMap]) -> list[str]:
 
 def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) -> Any:
     """A page of the maps over a scene's spin or gap, in the given order, each with its name and accurate share."""
-    shown = maps(data, scene)
+    shown = {name: one for name, one in maps(data, scene).items() if name in names}
+    compared, drawn = common(shown), dict[str, None]()  # the latter: outcomes and lines, for the legend
+    across, upwards = (_reach([one[k] for one in shown.values()]) for k in (2, 1))
+    inner = across[0] + INSET * (across[1] - across[0]), across[1] - INSET * (across[1] - across[0])
     columns = min(COLUMNS, len(names))
     rows = -(-len(names) // columns)
-    titles = {name: _title(name, shown[name]) for name in names}
+    titles = {name: _title(name, compared[name]) for name in names}
     high = [max(titles[name].count("\n") for name in names[k : k + columns]) + 1 for k in range(0, len(names), columns)]
     height = 0.62 + 0.115 * sum(high) / rows + 0.7 / rows
     figure, axes = panels(rows, columns, width=WIDTH * max(columns, 3) / COLUMNS, height=height)
     figure.get_layout_engine().set(w_pad=0.02, h_pad=0.015, wspace=0.01, hspace=0.01)
-    drawn: dict[str, None] = {}  # outcomes and lines, for the legend
     for axis in axes.flat[len(names) :]:
         axis.set_visible(False)
     for k, (axis, name) in enumerate(zip(axes.flat, names, strict=False)):
         one = shown[name]
-        drawn |= dict.fromkeys(VERDICTS[index] for index in np.unique(one.outcome))
+        drawn |= dict.fromkeys(VERDICTS[index] for index in np.unique(sampled(one.outcome, *RASTER["small"])))
         draw_map(axis, one, "small")
+        if one.control != "none":
+            drawn |= {} if _fills(one, across, upwards) else {NOT_TRIED: None}
+            axis.set(xlim=across, ylim=upwards)
+            axis.set_xticks(*_ticks(inner, 3))
+            axis.set_yticks(*_ticks(upwards, 3))
         drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, integrator=name), one, over))
         axis.set_title(titles[name], fontsize=LEAST_TEXT, pad=2.0, linespacing=1.0)
         axis.tick_params(length=1.5, pad=1.0, labelsize=LEAST_TEXT)
@@ -181,7 +198,20 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
 def _title(name: str, one: OutcomeMap) -> str:
     method, chart = split_name(name)
     share = f"{one.shares[0]:.0%}"
-    return "\n".join([*textwrap.wrap(method, LETTERS), f"{chart} {share}".strip()])
+    return "\n".join([*textwrap.wrap(method, LETTERS), f"[{chart}] {share}" if chart else share])
+
+
+def _fills(one: OutcomeMap, across: tuple[float, float], upwards: tuple[float, float]) -> bool:
+    """Does a map leave no margin that would be seen?"""
+    own = ((_edges(one.settings), across), (_edges(one.parameter), upwards))
+    gaps = [(part[0] - low, high - part[1], LEAST_MARGIN * (high - low)) for part, (low, high) in own]
+    return all(max(below, above) < least for below, above, least in gaps)
+
+
+def _reach(values: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
+    """Both ends of an axis for some maps, as decimal logarithms: their outermost values, at which cells are cut."""
+    low, high = (float(np.log10(pick([pick(one) for one in values]))) for pick in (np.min, np.max))
+    return (low, high) if high > low else _edges(values[0])
 
 
 def enlarged(data: xr.Dataset, family: str, name: str, message: str) -> Any:
@@ -192,19 +222,19 @@ def enlarged(data: xr.Dataset, family: str, name: str, message: str) -> Any:
     drawn: dict[str, None] = {}
     for axis, (over, (scene, shown)) in zip(axes[0], both.items(), strict=True):
         one = shown[name]
-        drawn |= dict.fromkeys(VERDICTS[index] for index in np.unique(one.outcome))
+        drawn |= dict.fromkeys(VERDICTS[index] for index in np.unique(sampled(one.outcome, *RASTER["enlarged"])))
         draw_map(axis, one)
         drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, integrator=name), one, over))
         axis.set(xlabel=CONTROLS[one.control], ylabel=AXES[over])
-        axis.set_title("another spin" if over == "spin" else "a pole next to the path")
+        axis.set_title(f"scene {scene}, {'its spin changed' if over == 'spin' else 'a fall past a pole'}")
     headline(figure, message)
     _key(figure, drawn)
     return figure
 
 
 def _key(figure: Any, drawn: Mapping[str, None]) -> None:
-    shown = [name for name in (*VERDICTS, *LINES) if name in drawn]
-    columns = 4 if figure.get_figwidth() > 5.0 else 2
+    shown = [name for name in (*VERDICTS, NOT_TRIED, *LINES) if name in drawn]
+    columns = (4 if set(drawn).isdisjoint(("limit", "third")) else 3) if figure.get_figwidth() > 5.0 else 2
     figure.legend(handles=list(map(_handle, shown)), loc="outside lower center", ncols=columns, frameon=False)
 
 
@@ -216,4 +246,5 @@ def _handle(name: str) -> Any:
     if name in LINES:
         return Line2D([], [], color="black", lw=1.1, ls=LINES[name][1], label=LINES[name][0])
     hatch = HATCHES[name][0] if name in HATCHES else None
-    return Patch(facecolor=OUTCOME_COLORS[name], label=name.replace("_", " "), hatch=hatch, edgecolor=GREY, lw=0.4)
+    color = MARGIN if name == NOT_TRIED else OUTCOME_COLORS[name]
+    return Patch(facecolor=color, label=said(name), hatch=hatch, edgecolor=GREY, lw=0.4)

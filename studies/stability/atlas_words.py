@@ -10,7 +10,7 @@ import xarray as xr
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT
 from symtop.methods.registry import split_name
 
-from .atlas import COMMON, NOTABLE, OutcomeMap, maps, pole_effect
+from .atlas import COMMON, NOTABLE, OutcomeMap, common, maps, methods_of, pole_effect
 from .tables import PERIODS, Column
 
 FAILURES = {
@@ -91,15 +91,46 @@ def _commonly(one: OutcomeMap) -> str:
 
 def ends(shown: Mapping[str, OutcomeMap]) -> tuple[str, str]:
     """Who is accurate in the largest part of its map, and in the smallest, with the shares."""
+    shares = {name: f"{one.shares[0]:.0%}" for name, one in shown.items()}
     ranked = sorted(shown, key=lambda name: -shown[name].shares[0])
-    best, worst = (f"{name} ({shown[name].shares[0]:.0%})" for name in (ranked[0], ranked[-1]))
+    best, worst = (f"{_equals([name for name in ranked if shares[name] == shares[end]])} ({shares[end]})"
+                   for end in (ranked[0], ranked[-1]))  # fmt: skip
     return best, worst
+
+
+def _equals(names: Sequence[str]) -> str:
+    """Rows of one rank: the names of one or two, or how many they are."""
+    return " and ".join(names) if len(names) < 3 else f"{len(names)} methods"
+
+
+def page_message(data: xr.Dataset, scene: str, shown: Mapping[str, OutcomeMap]) -> str:
+    """What a page of maps says, in one sentence: who is accurate in the largest part of its map, and in the smallest.
+
+    Methods that are exact at any step are named apart. Past a pole the chart decides, not the method.
+    """
+    known = methods_of(data)
+    closed = [name for name in shown if name in known and known[name].exact_steps]
+    compared = common({name: one for name, one in shown.items() if name not in closed} or shown)
+    control = "steps" if next(iter(shown.values())).control == "step_size" else "tolerances"
+    if scene == "grazing" and control == "steps":
+        shares = [(split_name(name)[1] == "angles", float(one.shares[0])) for name, one in compared.items()]
+        angles, others = ([share for turned, share in shares if turned is there] for there in (True, False))
+        if angles and others and max(angles) < min(others):
+            return (
+                f"Past a pole methods in angles are accurate in {min(angles):.0%} to {max(angles):.0%} of their runs, "
+                f"methods in other charts in {min(others):.0%} to {max(others):.0%}"
+            )
+    best, worst = ends(compared)
+    place = "gaps past a pole" if scene == "grazing" else f"spins of {scene}"
+    apart = f"; {' and '.join(closed)}: exact at any step" if closed and len(closed) < len(shown) else ""
+    return f"Accurate at most {control} and {place}: {best}; at fewest: {worst}{apart}"
 
 
 def caption(data: xr.Dataset, scene: str, names: Sequence[str]) -> str:
     """The caption of a page of maps: what it shows, who is accurate most widely and least, and who ends early."""
     shown = {name: one for name, one in maps(data, scene).items() if name in names}
-    best, worst = ends(shown)
+    compared = common(shown)
+    best, worst = ends(compared)
     ending = max(shown, key=lambda name: shown[name].early)
     early = (
         f"Runs end early in up to {shown[ending].early:.0%} of a map ({ending})."
@@ -115,9 +146,18 @@ def caption(data: xr.Dataset, scene: str, names: Sequence[str]) -> str:
     control = "step" if shown[names[0]].control == "step_size" else "tolerance"
     return (
         f"Outcome of every run of {len(names)} rows, a map each, named by method and chart, with the share of its map "
-        f"that is accurate: {what}. The {control} grows to the right. Accurate in the largest part of its map: {best}; "
+        f"that is accurate: {what}. The {control} grows to the right. "
+        f"{_counted(shown, compared)}Accurate in the largest part of its map: {best}; "
         f"in the smallest: {worst}. {early}{_without_limit(data, scene, shown) if scene != 'grazing' else ''}"
     )
+
+
+def _counted(shown: Mapping[str, OutcomeMap], compared: Mapping[str, OutcomeMap]) -> str:
+    """Of which part of the maps shares are told, if some of them are smaller than others."""
+    if all(compared[name].outcome.shape == one.outcome.shape for name, one in shown.items()):
+        return ""
+    low, high = (next(iter(compared.values())).settings[k] for k in (0, -1))
+    return f"Shares count what all maps have: {low:.2g} to {high:.2g}. Grey was not tried. "
 
 
 def _without_limit(data: xr.Dataset, family: str, shown: Mapping[str, OutcomeMap]) -> str:

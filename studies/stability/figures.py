@@ -8,9 +8,9 @@ from symtop.report.style import headline
 from symtop.runner.study import Picture
 
 from . import mechanism_figures
-from .atlas import families, maps, methods_of
+from .atlas import common, families, maps
 from .atlas_figures import by_area, enlarged, small_maps
-from .atlas_words import advice, caption, ends
+from .atlas_words import advice, caption, page_message
 
 FAMILIAR = "stormer-verlet[angles]"  # the map that is enlarged, if it is there
 CONTROLLED = {"step_size": "steps", "tolerance": "tolerances"}  # the pages of maps, by what grows to the right
@@ -31,12 +31,9 @@ def _pages(data: xr.Dataset, scene: str, over: str, name: str) -> Iterator[Pictu
         shown = {row: one for row, one in maps(data, scene).items() if one.control == control}
         if not shown:
             continue
-        names = by_area(shown)
+        names = by_area(common(shown))
         figure = small_maps(data, scene, names, over)
-        closed = [row for row, one in methods_of(data).items() if one.exact_steps]  # accurate by construction
-        best, worst = ends({row: one for row, one in shown.items() if row not in closed} or shown)
-        place = "past a pole" if over == "gap" else f"on {scene} with any spin"
-        headline(figure, f"{title.capitalize()} that stay accurate {place}: most with {best}, fewest with {worst}")
+        headline(figure, page_message(data, scene, shown))
         alt = f"Small maps of outcomes, in the order of their accurate share: {', '.join(names)}."
         yield Picture(f"{name}-{title}", figure, caption(data, scene, names), alt)
 
@@ -44,8 +41,9 @@ def _pages(data: xr.Dataset, scene: str, over: str, name: str) -> Iterator[Pictu
 def _enlarged(data: xr.Dataset, family: str) -> Picture:
     shown = maps(data, family)
     name = FAMILIAR if FAMILIAR in shown else by_area(shown)[0]
-    right, silent = shown[name].shares[0], shown[name].silent
-    message = f"{name} is accurate in {right:.0%} of its map; {silent:.0%} of its wrong runs end without an error"
+    right, past = shown[name].shares[0], maps(data, "grazing").get(name)
+    beside = "" if past is None else f" with its spin changed and in {past.shares[0]:.0%} past a pole"
+    message = f"{name} is accurate in {right:.0%} of the runs of {family}{beside}"
     figure = enlarged(data, family, name, message)
     text = f"How to read a map of the atlas. {advice(data, family)[name].sentence} {caption(data, family, [name])}"
     return Picture(f"atlas-{family}-enlarged", figure, text, f"Two maps of the outcomes of {name}, enlarged.")

@@ -1,13 +1,16 @@
 """Six ways to fail, a figure each, with what theory says as a thin grey line.
 
-Points at the upper edge of the figure of the pole, x, are runs that ended early. Values below 1e-16 are drawn there.
+In the figure of the pole the runs that ended early are crosses above the errors, a line a method. Values below 1e-16
+are drawn there.
 """
 
+import textwrap
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.ticker import NullLocator
 
 from symtop.methods.registry import split_name
 from symtop.methods.splitting_space import cayley_sleeps_from, strang_sleeps_from
@@ -18,7 +21,7 @@ from symtop.runner.study import Picture
 from . import messages
 from .failures import LOST, SEEN
 from .tables import Column
-from .words import LEAST_SAMPLED, held_fixed, mechanism_sentences
+from .words import LEAST_SAMPLED, held_fixed, mechanism_sentences, outlasting, resonant
 
 SHOWN = (
     "midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "galerkin-simpson[angles]", "strang[axis]",
@@ -26,6 +29,7 @@ SHOWN = (
 )  # fmt: skip
 PLACED = ("stormer-verlet[angles]", "midpoint[angles]", "rk4[axis]", "strang[axis]", "gauss-4[axis]")
 GUIDE = {"color": GREY, "lw": 0.9, "zorder": 1}
+ENDED = 4.0  # rad, above any error: runs that ended early are drawn over it
 FLOOR = 1e-16  # what is smaller is drawn here
 NOTE = {"fontsize": LEAST_TEXT, "color": "#444444"}
 
@@ -57,23 +61,32 @@ def _each(data: xr.Dataset, variable: str, names: Sequence[str] = SHOWN) -> list
 
 
 def _pole(axis: Any, data: xr.Dataset) -> None:
-    ends = {}
+    ends, height = {}, ENDED
     for name, cell in _each(data, Column.GRAZING_ERROR):
         x, y = cell[Column.PARAMETER].values, np.maximum(cell[Column.GRAZING_ERROR].values, FLOOR)
         every = max(1, int(np.isfinite(x).sum()) // 10)
         marks = line(name)
         axis.plot(x, y, **marks, markevery=every)
         gone = np.isfinite(x) & ~np.isfinite(y)
-        axis.plot(x[gone], np.full(int(gone.sum()), 1.0), "x", color=marks["color"], ms=3.5, mew=0.8)
+        if gone.any():
+            height *= 2.2
+            axis.plot(x[gone][::3], np.full(int(gone.sum()), height)[::3], "x", color=marks["color"], ms=3.5, mew=0.8)
         last = int(np.flatnonzero(np.isfinite(y))[-1])
         ends[name] = float(x[last]), float(y[last]), str(marks["color"])
     axis.set(xscale="log", yscale="log", xlabel=r"gap $\delta$ to the pole (rad)", ylabel="largest axis error (rad)")
-    axis.text(0.02, 0.9, "x: run ended early", transform=axis.transAxes, va="top", **NOTE)
+    if height > ENDED:
+        axis.axhline(ENDED, **GUIDE)
+        axis.text(0.02, 0.6 * ENDED, "crosses: ended early, no error to show", va="top",
+                  transform=axis.get_yaxis_transform(), **NOTE)  # fmt: skip
+        axis.set_ylim(top=3.0 * height)
+        powers = np.arange(np.floor(np.log10(axis.get_ylim()[0])) + 1, 1)
+        axis.set_yticks(10.0**powers)
+        axis.yaxis.set_minor_locator(NullLocator())
     name_ends(axis, ends)
 
 
 def _resonance(axis: Any, data: xr.Dataset) -> None:
-    ends = {}
+    ends, ringed = {}, resonant(data)
     for name, cell in _each(data, Column.SURVIVING):
         # the resonance lies between two points of the grid
         x = np.append(cell[Column.PHASE].values, float(cell[Column.THIRD_TURN_PHASE]))
@@ -82,12 +95,23 @@ def _resonance(axis: Any, data: xr.Dataset) -> None:
         order = np.argsort(x[good])
         x, y = x[good][order], y[good][order]
         marks = line(name)
-        axis.plot(x, y, **marks, markevery=5)
+        axis.plot(x, y, **marks, markevery=5, clip_on=False)
+        if name in ringed:
+            axis.plot(ringed[name], float(cell[Column.SURVIVING_AT_THIRD_TURN]), "o", ms=11, mfc="none", mec="black",
+                      mew=0.9, clip_on=False, zorder=5)  # fmt: skip
         ends[name] = float(x[-1]), float(y[-1]), str(marks["color"])
-    axis.set(xlabel=r"step, $h\omega$", ylabel="surviving displacement (rad)", ylim=(0.0, 0.33))
-    for place, label in ((3.0**0.5, r"$\sqrt{3}$"), (2.0, "2"), (12.0**0.5, r"$2\sqrt{3}$")):
+    most = float(np.nanmax(data[Column.SURVIVING].values))
+    axis.set(xlabel=r"step $h\omega$ (times the frequency of the nutation)", ylabel="displacement that survives (rad)")
+    axis.set_ylim(0.0, 1.2 * most)
+    limit, third = "2: Verlet's linear limit", r"$2\sqrt{3}$: midpoint"
+    for place, label, side, shift in (
+        (3.0**0.5, r"$\sqrt{3}$: Verlet", "right", -2), (2.0, limit, "left", 2), (12.0**0.5, third, "left", 2),
+    ):  # fmt: skip
         axis.axvline(place, color=GREY, lw=0.8, ls=(0, (5, 3)), zorder=1)
-        axis.annotate(label, (place, 0.33), (2, -2), textcoords="offset points", va="top", **NOTE)
+        axis.annotate(label, (place, 1.2 * most), (shift, -2), textcoords="offset points", va="top", ha=side, **NOTE)
+    axis.annotate(f"{most:.2g} rad is the largest tried", (0.01, most), (0, 4), textcoords="offset points",
+                  xycoords=axis.get_yaxis_transform(), **NOTE)  # fmt: skip
+    axis.annotate("ringed: the nutation turns\nby a third a step", (0.01, 0.03), xycoords="axes fraction", **NOTE)
     name_ends(axis, ends)
 
 
@@ -97,11 +121,12 @@ def _sleep(axis: Any, data: xr.Dataset) -> None:
         x, y = cell[Column.SLEEPING_STEP].values, cell[Column.SLEEPING_THRESHOLD].values
         axis.plot(x, y, **(line(name, 1.4) | {"ls": "none"}), label=name)
     x = np.linspace(0.02, 1.0, 60)
-    for law, dash, label in (
-        (cayley_sleeps_from, "-", r"$a^2 = 4 + h^2$"), (strang_sleeps_from, (0, (5, 3)), r"$a \tan(a h/4) = h$"),
-    ):  # fmt: skip
-        axis.plot(x, [law(h) for h in x], ls=dash, label=label, **GUIDE)
-    axis.set(xlabel="step h (with I1 = I3 = mgl = 1)", ylabel=r"least spin that sleeps, $a = I_3\omega_3$")
+    for law, method, label in (
+        (cayley_sleeps_from, "cayley", r"theory: $a^2 = 4 + h^2$"),
+        (strang_sleeps_from, "strang", r"theory: $a\,\mathrm{tan}\,(a h/4) = h$"),
+    ):
+        axis.plot(x, [law(h) for h in x], ls=line(method)["ls"], color=line(method)["color"], lw=0.9, label=label)
+    axis.set(xlabel="step $h$ (with $I_1 = I_3 = mgl = 1$)", ylabel=r"least spin that sleeps, $a = I_3\omega_3$")
     axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
 
 
@@ -114,32 +139,42 @@ def _separatrix(axis: Any, data: xr.Dataset) -> None:
         look = {"color": marks["color"], "ms": 1.2 * marks["ms"], "zorder": 3} if named else other
         axis.plot(x, y, marks["marker"], fillstyle=marks["fillstyle"], label=name if named else None, **look)
     error = np.geomspace(1e-16, 0.1, 50)
-    axis.plot(error, SEEN + 2.0 * np.log(LOST / error), label=r"$6/g + (2/g) \ln(0.1/e)$", **GUIDE)
-    axis.plot([], [], "o", color=GREY, ms=2.0, alpha=0.5, label="all other rows")
-    axis.set(xscale="log", xlabel="axis error e at 6/g (rad)", ylabel="time to an error of 0.1 rad (1/g)")
+    axis.plot(error, SEEN + 2.0 * np.log(LOST / error), label=r"theory: $6/g + (2/g)\,\ln\,(0.1/e)$", **GUIDE)
+    axis.plot([], [], ".", color=GREY, ms=4.0, alpha=0.5, label="all other methods")
+    axis.set(xscale="log", xlabel=rf"axis error $e$ at the time ${SEEN:g}/g$ (rad), $g = \sqrt{{mgl/I_1}}$")
+    axis.set(ylabel=f"time to an error of {LOST:g} rad (1/g)")
+    if apart := outlasting(data):
+        late = data[Column.HORIZON].sel(integrator=apart)
+        listed = textwrap.fill(", ".join(apart), 40)
+        axis.annotate(f"longer than predicted:\n{listed}", (0.98, float(late.max())), (0, -14), va="top", ha="right",
+                      xycoords=axis.get_yaxis_transform(), textcoords="offset points", **NOTE)  # fmt: skip
     axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
 
 
 def _sampling(axis: Any, data: xr.Dataset) -> None:
-    ends = {}
+    worst, hidden = messages.worst_sampled(data), messages.hidden_sampled(data)
     for name in map(str, data["integrator"].values):
         once, every = (float(data[key].sel(integrator=name)) for key in (Column.ENERGY_ONCE, Column.ENERGY_EVERY))
         marks = line(name)
         if not np.isfinite(once + every):
             continue
-        look = {"color": marks["color"], "zorder": 3} if name in PLACED else {"color": GREY, "alpha": 0.5, "zorder": 2}
-        size = 1.3 * marks["ms"] if name in PLACED else 2.5
-        axis.plot(every, max(once, FLOOR), marks["marker"], fillstyle=marks["fillstyle"], ms=size, **look)
-        if name in PLACED:
-            ends[name] = every, max(once, FLOOR), str(marks["color"])
+        if name in (*PLACED, worst):
+            look = {"color": marks["color"], "zorder": 3, "ms": 1.3 * marks["ms"], "label": name}
+            axis.plot(every, max(once, FLOOR), marks["marker"], fillstyle=marks["fillstyle"], **look)
+        else:
+            color = "black" if name in hidden else GREY
+            axis.plot(every, max(once, FLOOR), ".", color=color, ms=4.0, alpha=0.6, zorder=2)
+    if hidden:
+        axis.plot([], [], ".", color="black", ms=4.0, alpha=0.6, label="other, its error not seen")
+    axis.plot([], [], ".", color=GREY, ms=4.0, alpha=0.6, label="all other methods")
     axis.axhspan(0.0, LEAST_SAMPLED, color=GREY, alpha=0.15, lw=0)
     axis.plot([1e-15, 1e-2], [1e-15, 1e-2], **GUIDE)
     axis.set(xscale="log", yscale="log", ylabel="the same, sampled once a nutation")
     axis.set_xlabel("largest relative energy error, sampled at every step")
-    axis.annotate("below rounding", (0.99, LEAST_SAMPLED), (0, -2), xycoords=("axes fraction", "data"),
-                  textcoords="offset points", ha="right", va="top", **NOTE)  # fmt: skip
+    axis.annotate("rounding: nothing is seen here\n(zeros are drawn at $10^{-16}$)", (0.99, 0.01), va="bottom",
+                  xycoords="axes fraction", ha="right", **NOTE)  # fmt: skip
     axis.annotate("equal", (1e-3, 1e-3), (-4, 2), textcoords="offset points", ha="right", **NOTE)
-    name_ends(axis, ends)
+    axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
 
 
 def _solver(axis: Any, data: xr.Dataset) -> None:
@@ -159,7 +194,12 @@ def _solver(axis: Any, data: xr.Dataset) -> None:
         last = int(np.argmax(x))
         ends[label] = float(x[last]), float(y[last]), color
     axis.set(xscale="log", yscale="log", xlabel=f"solver tolerance of {cell['integrator'].values}, step fixed")
-    axis.set_ylabel("largest relative residual")
+    axis.set_ylabel("largest relative change")
+    loose = x[np.isclose(cell[Column.TEXTBOOK_ENERGY].values, float(cell[Column.ONE_ITERATION_ENERGY]), rtol=1e-3)]
+    if loose.size:
+        axis.axvspan(loose.min() / 2.0, x.max() * 2.0, color=GREY, alpha=0.12, lw=0)
+        axis.annotate("the textbook's stops\nafter one iteration;\nlast point: no tolerance", (x.max() * 1.7, 0.03),
+                      xycoords=("data", "axes fraction"), ha="right", **NOTE)  # fmt: skip
     name_ends(axis, ends)
 
 

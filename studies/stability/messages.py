@@ -6,12 +6,15 @@ import numpy as np
 import xarray as xr
 
 from symtop.methods.registry import split_name
+from symtop.report.style import number
 
-from .failures import LOST, SEEN
+from .atlas import FAR, NEAR, methods_of
+from .failures import LOST
 from .tables import Column
-from .words import EARLY, LEAST_SAMPLED, NEAR, halved_at_pole, resonant
+from .words import BARELY, LEAST_SAMPLED, misses, outlasting, resonant
 
 SLEEPERS = ("strang", "cayley", "midpoint", "gauss-4", "yoshida-4")  # methods, of the figure of the sleeping top
+ROUNDED, ROUNDED_ENERGY = 1e-14, 1e-12  # rad, and relative: errors up to these are rounding
 SHIFTED = 1e-3  # of the threshold: less is kept
 
 
@@ -21,56 +24,90 @@ def of_mechanism(name: str, part: xr.Dataset) -> str:
 
 
 def _pole(part: xr.Dataset) -> str:
-    halved = halved_at_pole(part)
-    shares = [f"{sum(halved[angles])} of {len(halved[angles])}" for angles in (True, False)]
-    return (
-        f"A pole within {NEAR:g} rad halves the accurate step of {shares[0]} rows in angles, of {shares[1]} elsewhere"
-    )
+    """Who ends early next to a pole, and by how much the others err more there than far away, at the step drawn."""
+    early, growth = [], []
+    for name, method in methods_of(part).items():
+        cell = part.sel(integrator=name)
+        gaps, errors = cell[Column.PARAMETER].values, cell[Column.GRAZING_ERROR].values
+        near, far = errors[gaps <= NEAR], errors[gaps >= FAR]
+        if method.control != "step_size" or not near.size or not np.isfinite(far).any():
+            continue
+        if method.charts() == ("angles",):
+            early.append(bool(np.isnan(near).all()))
+        else:
+            growth.append(float(np.max(near)) / max(float(np.nanmedian(far)), ROUNDED))
+    text = f"{sum(early)} of {len(early)} fixed-step methods in angles end early within {number(NEAR, 1)} rad of a pole"
+    most = max(growth, default=np.nan)
+    if not np.isfinite(most):
+        return text
+    return f"{text}; the {len(growth)} in other charts err at most {number(max(most, 1.0))} times as much as far away"
 
 
 def _resonances(part: xr.Dataset) -> str:
-    steps = resonant(part)
+    steps, tried = resonant(part), int(np.isfinite(part[Column.THIRD_TURN_PHASE]).sum())
     if not steps:
         return "No step that turns the nutation by a third a step was found to be unstable"
-    places = ", ".join(dict.fromkeys(f"{value:.2f}" for value in sorted(steps.values())))
-    return f"At a third of a turn a step (h omega = {places}) nothing survives, though the step is linearly stable"
+    return (
+        f"A step that turns the nutation by a third is linearly stable, yet with {len(steps)} of {tried} methods no "
+        f"displacement of {BARELY:g} rad survives it"
+    )
 
 
 def _sleeping(part: xr.Dataset) -> str:
-    moved = np.abs(part[Column.SLEEPING_THRESHOLD] - 2.0).max("rung")
-    rows = [str(name) for name in moved["integrator"].values if split_name(str(name))[0] in SLEEPERS]
-    shifts = {name: float(moved.sel(integrator=name)) for name in rows}
-    far = sorted((name for name in rows if shifts[name] > SHIFTED), key=lambda name: -shifts[name])
-    listed = ", ".join(f"{shifts[name]:.3f} with {name}" for name in far)
-    kept = sum(shift <= SHIFTED for shift in shifts.values())
-    return f"A long step moves the spin 2 from which a top sleeps by {listed or 'nothing'}; {kept} methods keep it"
+    measured = part[Column.SLEEPING_THRESHOLD]
+    rows = [str(name) for name in part["integrator"].values if split_name(str(name))[0] in SLEEPERS]
+    curves = {name: measured.sel(integrator=name).dropna("rung").values for name in rows}
+    ends = {name: float(curve[np.argmax(np.abs(curve - 2.0))]) for name, curve in curves.items() if curve.size}
+    far = sorted((name for name in ends if abs(ends[name] - 2.0) > SHIFTED), key=lambda name: -ends[name])
+    listed = ", ".join(f"{ends[name]:.2f} with {name}" for name in far)
+    kept = sum(abs(end - 2.0) <= SHIFTED for end in ends.values())
+    if not far:
+        return f"No step moves the spin 2 from which a top sleeps; {kept} methods keep it"
+    return f"Long steps move the spin from which a top sleeps from 2 to {listed}; {kept} methods keep it"
 
 
 def _separatrix(part: xr.Dataset) -> str:
-    early, time, predicted = (
-        part[key].values for key in (Column.EARLY_ERROR, Column.HORIZON, Column.PREDICTED_HORIZON)
-    )
-    good = np.isfinite(time) & np.isfinite(predicted) & (early > EARLY[0]) & (early < EARLY[1])
-    gap = float(np.median(np.abs(time - predicted)[good])) if good.any() else np.nan
-    return (
-        f"Next to the separatrix the error at time {SEEN:g}/g predicts when it reaches {LOST:g} rad; the median miss "
-        f"is {gap:.2f}/g"
-    )
+    gap, apart = misses(part), outlasting(part)
+    if not gap.size:
+        return "Next to the separatrix no run was seen to lose its accuracy"
+    rest = f"; {len(apart)} method{'s last' if len(apart) > 1 else ' lasts'} longer" if apart else ""
+    text = f"Next to the separatrix an early error predicts when it reaches {LOST:g} rad"
+    return f"{text}, to {np.median(gap):.2f}/g in the median{rest}"
+
+
+def _sampled(part: xr.Dataset) -> dict[str, tuple[float, float]]:
+    """Energy errors above rounding, sampled once a nutation and at every step, by row."""
+    once, every = part[Column.ENERGY_ONCE].values, part[Column.ENERGY_EVERY].values
+    rows = zip(map(str, part["integrator"].values), once, every, strict=True)
+    return {name: (float(a), float(b)) for name, a, b in rows if np.isfinite(a) and b > ROUNDED_ENERGY}
+
+
+def hidden_sampled(part: xr.Dataset) -> list[str]:
+    """The rows whose energy error is at rounding if it is sampled once a nutation."""
+    return [name for name, (once, _) in _sampled(part).items() if once <= LEAST_SAMPLED]
+
+
+def worst_sampled(part: xr.Dataset) -> str:
+    """The row whose energy error looks too small by the largest factor; empty if none is seen."""
+    seen = {name: every / once for name, (once, every) in _sampled(part).items() if once > LEAST_SAMPLED}
+    return max(seen, key=lambda name: seen[name], default="")
 
 
 def _sampling(part: xr.Dataset) -> str:
-    once, every = part[Column.ENERGY_ONCE].values, part[Column.ENERGY_EVERY].values
-    seen = np.isfinite(once) & (once > LEAST_SAMPLED) & (every > 1e-12)
-    hidden = int((np.isfinite(once) & (once <= LEAST_SAMPLED) & (every > 1e-12)).sum())
-    worst = float((every[seen] / once[seen]).max()) if seen.any() else 1.0
-    rest = f", and that of {hidden} rows is not seen at all" if hidden else ""
-    return f"Sampled once a nutation an energy error looks up to {worst:.0e} times too small{rest}"
+    worst, hidden = worst_sampled(part), len(hidden_sampled(part))
+    once, every = _sampled(part).get(worst, (1.0, 1.0))
+    rest = f", and that of {hidden} method{'s' if hidden > 1 else ''} is not seen at all" if hidden else ""
+    by = f" ({worst})" if worst else ""
+    return f"Sampled once a nutation an energy error looks up to {number(every / once, 1)} times too small{by}{rest}"
 
 
 def _solver(part: xr.Dataset) -> str:
     solved = float(part[Column.TEXTBOOK_ENERGY].isel(tolerance_setting=-1).max())
     one = float(part[Column.ONE_ITERATION_ENERGY].max())
-    return f"One Newton iteration a step makes an energy error of {one:.1e}; the solved equation has {solved:.1e}"
+    return (
+        f"One textbook Newton iteration a step leaves an energy error of {number(one)}; iterated to the end it leaves "
+        f"{number(solved)}"
+    )
 
 
 MESSAGES: dict[str, Callable[[xr.Dataset], str]] = {

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from symtop.runner.study import Table
 
@@ -32,6 +33,7 @@ LOOSE = 10.0  # times the change of the solved equation: lost because the solver
 BARELY = 0.02  # rad: a largest surviving displacement below this counts as none
 REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
 LEAST_SAMPLED = 1e-14  # an energy error that is rounding
+OUTLASTS = 10.0  # 1/g: two and a half digits more than the early error has
 EARLY = 1e-15, 1e-2  # rad, axis errors that predict the time next to a separatrix: above rounding, still small
 
 
@@ -158,28 +160,46 @@ def sleepers(part: xr.Dataset) -> str:
     )
 
 
+def outlasting(part: xr.Dataset) -> list[str]:
+    """The rows with a run that stays accurate next to the separatrix longer than foreseen, by more than `OUTLASTS`."""
+    longer = (part[Column.HORIZON] - part[Column.PREDICTED_HORIZON]).transpose("integrator", ...).values
+    rows = zip(map(str, part["integrator"].values), longer, strict=True)
+    return [name for name, values in rows if np.max(values[np.isfinite(values)], initial=0.0) > OUTLASTS]
+
+
+def foreseen(part: xr.Dataset) -> xr.Dataset:
+    """The runs next to the separatrix to which the law of their early error applies; others are NaN."""
+    early = part[Column.EARLY_ERROR]
+    methods, apart = methods_of(part), outlasting(part)
+    conserving = [
+        name in apart or (name in methods and "energy" in (methods[name].conserves or ()))
+        for name in map(str, part["integrator"].values)
+    ]
+    good = (early < EARLY[1]) & (early > EARLY[0]) & ~xr.DataArray(conserving, dims="integrator")
+    return part[[Column.HORIZON, Column.PREDICTED_HORIZON]].where(good)
+
+
+def misses(part: xr.Dataset) -> NDArray[np.float64]:
+    """By how much the law misses the accurate time of the runs to which it applies, in units of 1/g."""
+    runs = foreseen(part)
+    gap = np.abs(runs[Column.HORIZON] - runs[Column.PREDICTED_HORIZON]).values
+    return np.asarray(gap[np.isfinite(gap)])
+
+
 def horizons(part: xr.Dataset) -> str:
     """Is the accurate time next to a separatrix what the early error says?"""
-    names = (Column.HORIZON, Column.PREDICTED_HORIZON, Column.EARLY_ERROR)
-    horizon, predicted, early = (part[name].values for name in names)
-    methods = methods_of(part)
-    conserving = np.array([name in methods and "energy" in (methods[name].conserves or ())
-                           for name in part["integrator"].values])  # fmt: skip
-    good = np.isfinite(horizon) & np.isfinite(predicted) & (early < EARLY[1]) & (early > EARLY[0])
-    good[conserving] = False
-    gap = np.abs(horizon[good] - predicted[good])
+    gap = misses(part)
     if not gap.size:
         return ""
     text = (
         "The separatrix is the motion that rises towards the upright for ever; its time scale is 1/g = sqrt(I1/mgl). "
         f"Next to it errors grow as exp(g t/2). From the error at time {SEEN:g}/g this predicts when {gap.size} runs "
         f"reach an axis error of {LOST:g} rad; the median miss is {np.median(gap):.2f}/g, the largest "
-        f"{np.max(gap):.1f}/g, and the longest run takes {np.max(horizon[good]):.0f}/g."
+        f"{np.max(gap):.1f}/g, and the longest run takes {float(foreseen(part)[Column.HORIZON].max()):.0f}/g. Methods "
+        "that conserve the energy are not among them"
     )
-    if np.isfinite(horizon[conserving]).any():
-        least = np.nanmin(horizon[conserving])
-        text += f" Methods that conserve the energy stay below it for at least {least:.0f}/g at every step tried."
-    return text
+    apart = outlasting(part)
+    return f"{text}; the prediction is outlasted by more than {OUTLASTS:g}/g with {', '.join(apart) or 'none'}."
 
 
 def sampling(part: xr.Dataset) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.published import OTHER_BODY, START, TRAJECTORY, Published, published_values
+from symtop.report.style import number
 from symtop.runner.study import Table
 
 from .tables import BOUND, ERROR, SECONDS, bound_ratios
@@ -22,6 +23,20 @@ def bounds(data: xr.Dataset) -> str:
     return (
         f"Of {count} claimed bounds {count - broken} hold against the closed form in 45 digits; the median bound is "
         f"{ratio:.0f} times the error."
+    )
+
+
+def message(data: xr.Dataset) -> str:
+    """What the closed form keeps and an integration loses, each at its own longest time, as a title."""
+    said = f"The closed form in double is right to {number(float(data[ERROR].sel(integrator='closed form').max()))} rad"
+    names = [name for name in ("double, axis", "double, attitude") if name in data["integrator"].values]
+    integrated = data[ERROR].sel(integrator=names).stack(run=("scene", "integrator", "horizon")).dropna("run")
+    if not integrated.size:
+        return f"{said} at every time"
+    worst = integrated[int(np.argmax(integrated.values))]
+    return (
+        f"{said} at every time; a Taylor integration in double is off by up to {number(float(worst))} rad after "
+        f"{number(float(worst['horizon']))} s"
     )
 
 

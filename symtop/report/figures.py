@@ -8,12 +8,17 @@ import numpy as np
 from symtop.report.style import LEAST_TEXT, ink
 
 SMALLEST = 1e-17  # where an error of exactly zero is drawn
+LOWEST = 1e-40  # below every panel
+BELOW = "below the error bound of the reference"
 
 
 def error_band(axis: Any, bounds: Any, least: float = 1e-16) -> float:
-    """Shade what lies below the median error bound of the reference; returns that bound, or `least` without one."""
+    """Shade all that lies below the median error bound of the reference; returns that bound, or `least` without one."""
+    from matplotlib.patches import Rectangle
+
     level = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else least
-    axis.axhspan(level * 1e-3, level, color="#BBBBBB", alpha=0.45, lw=0, label="error bound of the reference")
+    shape = {"color": "#BBBBBB", "alpha": 0.45, "lw": 0, "label": BELOW, "transform": axis.get_yaxis_transform()}
+    axis.add_artist(Rectangle((0.0, LOWEST), 1.0, level - LOWEST, **shape))  # to the frame, which it does not move
     return level
 
 

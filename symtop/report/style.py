@@ -59,6 +59,8 @@ DASHES = {  # of a line, by family; a family that is not here has a solid one
     "splitting": (0, (6.0, 1.2)), "runge-kutta": (0, (3.0, 1.2)), "lie-group": (0, (6.0, 1.2, 1.0, 1.2)),
     "taylor": (0, (1.5, 0.8)), "library": (0, (1.0, 1.6)), "engine": (0, (3.0, 1.2, 1.0, 1.2)),
 }  # fmt: skip
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+FIRM = "\N{NO-BREAK SPACE}"
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
@@ -241,15 +243,21 @@ def least_text(figure: Any) -> tuple[float, str]:
 
 
 def number(value: float, digits: int = 2) -> str:
-    """A number of a title: ``1e-6``, ``0.012``, ``340``."""
+    """A number of a title as it is printed: ``10⁻⁶``, ``1.4 × 10⁻¹³``, ``0.012``, ``340``; no line breaks within it."""
     text = f"{value:.{digits}g}" if not 10.0**digits <= abs(value) < 1e4 else f"{value:.0f}"
     mantissa, mark, power = text.partition("e")
-    return f"{mantissa}e{int(power)}" if mark else text
+    if not mark:
+        return text
+    ten = f"10{str(int(power)).translate(RAISED)}"
+    return ten if mantissa == "1" else f"{mantissa}{FIRM}×{FIRM}{ten}"
 
 
 def headline(figure: Any, message: str) -> None:
-    """Write a figure's one message above it."""
-    lines = textwrap.wrap(message, round(12.3 * figure.get_figwidth()), break_on_hyphens=False)
+    """Write a figure's one message above it, in lines of about the same length."""
+    most = round(12.3 * figure.get_figwidth())
+    lines = textwrap.wrap(message, most, break_on_hyphens=False)
+    shorter = (textwrap.wrap(message, width, break_on_hyphens=False) for width in range(most // 2, most))
+    lines = next((found for found in shorter if len(found) == len(lines)), lines)  # no last line of a single word
     figure.suptitle("\n".join(lines), x=0.01, ha="left", weight="bold")
 
 
@@ -337,9 +345,13 @@ def legend_below(figure: Any, axes: Any) -> None:
 
 
 def slope_guide(axis: Any, power: float, x: tuple[float, float], y: float, label: str) -> None:
-    """A thin reference line y ~ x^power from (x[0], y), labelled below its middle."""
+    """A thin reference line y ~ x^power from (x[0], y), labelled below its middle, on the side where it is free."""
     ends = np.array(x)
     axis.plot(ends, y * (ends / ends[0]) ** power, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
     middle = float(np.sqrt(ends[0] * ends[1]))
     place = middle, y * (middle / ends[0]) ** power
-    axis.annotate(label, place, (3, -2), textcoords="offset points", color="#444444", fontsize=7.5, va="top")
+    rises = (power > 0.0) != axis.xaxis_inverted()
+    side, shift = ("left", 3) if rises else ("right", -3)
+    axis.annotate(
+        label, place, (shift, -2), textcoords="offset points", color="#444444", fontsize=7.5, va="top", ha=side
+    )

@@ -119,10 +119,48 @@ def test_labels_keep_their_order_and_their_distance(places):
 
 @pytest.mark.parametrize(
     ("value", "said"),
-    [(1e-6, "1e-6"), (0.0123, "0.012"), (185.3, "185"), (1093.0, "1093"), (30012.0, "3e4"), (7.0, "7")],
-)
+    [(1e-6, "10⁻⁶"), (1.4e-13, "1.4 × 10⁻¹³"), (0.0123, "0.012"), (185.3, "185"), (1093.0, "1093"),
+     (30012.0, "3 × 10⁴"), (7.0, "7")],
+)  # fmt: skip
 def test_a_number_of_a_title(value, said):
-    assert style.number(value) == said
+    assert style.number(value).replace(style.FIRM, " ") == said
+    assert " " not in style.number(value)
+
+
+def test_a_headline_has_no_last_line_of_a_single_word():
+    figure, _ = style.panels(1, 1)
+    style.headline(figure, "series[axis] wins on 67% of the tops at 0.001 rad, on 76% of the tops at a millionth rad")
+    lines = figure.get_suptitle().split("\n")
+    assert len(lines) == 2
+    assert min(map(len, lines)) > 0.7 * max(map(len, lines))
+
+
+@pytest.mark.parametrize(("power", "inverted"), [(2.0, False), (2.0, True), (-1.0, False)])
+def test_the_label_of_a_slope_lies_beside_its_line(power, inverted):
+    figure, axes = style.panels(1, 1)
+    axis = axes[0, 0]
+    axis.set(xscale="log", yscale="log", xlim=(1e-3, 1.0), ylim=(1e-9, 1e3))
+    if inverted:
+        axis.invert_xaxis()
+    style.slope_guide(axis, power, (1e-2, 0.5), 1e-3, "slope")
+    figure.draw_without_rendering()
+    box = axis.texts[0].get_window_extent()
+    x, y = axis.get_lines()[0].get_data()
+    at = axis.transData.transform(np.column_stack([np.geomspace(*x, 200), np.geomspace(*y, 200)]))
+    assert not any(box.contains(*one) for one in at)
+
+
+def test_the_band_of_the_reference_reaches_the_frame_and_does_not_move_it():
+    _, axes = style.panels(1, 1)
+    axis = axes[0, 0]
+    axis.plot([1.0, 2.0], [1e-10, 1e-3])
+    axis.set_yscale("log")
+    before = axis.get_ylim()
+    assert figures.error_band(axis, np.array([np.nan, 1e-12, 3e-12])) == 2e-12
+    (band,) = axis.patches
+    assert band.get_y() < before[0]
+    assert band.get_y() + band.get_height() == 2e-12
+    assert axis.get_ylim() == before
 
 
 def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_path):

@@ -6,6 +6,9 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from symtop_studies.stability import atlas, atlas_figures, atlas_words, figures, messages, outcome_maps, words
 from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row_plan, spin_unit, with_spin
 from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
@@ -16,6 +19,7 @@ from symtop.measure.errors import errors_against
 from symtop.measure.verdicts import JUDGED, VERDICTS, verdict
 from symtop.methods.registry import integrator, methods
 from symtop.model.scenes import closed_form, scene
+from symtop.report import style
 from symtop.report.style import OUTCOME_COLORS
 from symtop.run.reference import reference
 from symtop.runner import run as runner, store
@@ -287,17 +291,17 @@ def test_a_page_of_small_maps_shows_every_row_once_in_the_order_of_its_accurate_
     drawn = {picture.name: picture for picture in figures.pictures(two_maps())}
     assert list(drawn) == ["atlas-cusp-enlarged", "atlas-cusp-steps", "atlas-cusp-tolerances"]
     titles = [axis.get_title() for axis in drawn["atlas-cusp-steps"].figure.axes if axis.get_visible()]
-    assert titles == ["rk4\naxis 67%", "strang\naxis 33%"]
+    assert titles == ["rk4\n[axis] 67%", "strang\n[axis] 33%"]
     assert "2 rows" in drawn["atlas-cusp-steps"].caption
     (title,) = (axis.get_title() for axis in drawn["atlas-cusp-tolerances"].figure.axes if axis.get_visible())
-    assert title == "rk45\naxis 33%"
+    assert title == "rk45\n[axis] 33%"
     assert "The tolerance grows to the right" in drawn["atlas-cusp-tolerances"].caption
 
 
 def test_the_enlarged_map_is_that_of_a_familiar_row_and_names_its_regions():
     data = two_maps()
     figure = next(figures.pictures(data)).figure
-    assert "rk4[axis] is accurate in 67% of its map" in figure.get_suptitle()
+    assert figure.get_suptitle() == "rk4[axis] is accurate in 67% of the runs of cusp"
     assert {text.get_text() for text in figure.axes[0].texts} == {"accurate", "bounded but wrong"}
     renamed = data.assign_coords(integrator=["rk4[axis]", figures.FAMILIAR, "rk45[axis]"])
     assert next(figures.pictures(renamed)).figure.get_suptitle().startswith(figures.FAMILIAR)
@@ -310,9 +314,99 @@ def test_the_message_of_a_mechanism_follows_from_its_numbers():
             "sampling", xr.Dataset(columns, coords={"integrator": ["rk4[axis]", "strang[axis]"]})
         )
 
-    assert "up to 1e+03 times too small" in said([1e-7, 1e-6], [1e-4, 1e-6])
+    assert "up to 1000 times too small (rk4[axis])" in said([1e-7, 1e-6], [1e-4, 1e-6])
     assert "not seen" not in said([1e-7, 1e-6], [1e-4, 1e-6])
-    assert "that of 1 rows is not seen at all" in said([1e-7, 1e-16], [1e-4, 1e-6])
+    assert "that of 1 method is not seen at all" in said([1e-7, 1e-16], [1e-4, 1e-6])
+
+
+def test_the_message_of_the_sleeping_top_says_where_the_threshold_goes_not_how_far():
+    columns = {Column.SLEEPING_THRESHOLD: (("integrator", "rung"), [[2.0, 1.92], [2.01, 2.24], [2.0, 2.0]])}
+    names = ["strang[axis]", "cayley[axis]", "midpoint[angles]"]
+    said = messages.of_mechanism("sleeping", xr.Dataset(columns, coords={"integrator": names}))
+    assert "from 2 to 2.24 with cayley[axis], 1.92 with strang[axis]; 1 methods keep it" in said
+
+
+def test_the_message_of_the_pole_is_that_of_the_step_drawn():
+    gaps, broken = [1e-6, 1e-5, 0.2], [math.nan, math.nan, 1e-3]
+    columns = {
+        Column.PARAMETER: (("integrator", "parameter"), [gaps, gaps]),
+        Column.GRAZING_ERROR: (("integrator", "parameter"), [broken, [2e-4, 2e-4, 1e-4]]),
+    }
+    part = xr.Dataset(columns, coords={"integrator": ["stormer-verlet[angles]", "strang[axis]"]})
+    said = messages.of_mechanism("pole", part)
+    assert said.startswith("1 of 1 fixed-step methods in angles end early within 0.0001 rad of a pole")
+    assert "the 1 in other charts err at most 2 times as much" in said
+
+
+def test_the_runs_that_outlast_the_law_of_the_separatrix_are_named_and_not_counted():
+    columns = {
+        Column.EARLY_ERROR: (("integrator", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
+        Column.PREDICTED_HORIZON: (("integrator", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
+        Column.HORIZON: (("integrator", "setting"), [[29.5, 38.4], [72.0, 71.0]]),
+    }
+    part = xr.Dataset(columns, coords={"integrator": ["rk4[axis]", "gauss-4[axis]"]})
+    assert words.outlasting(part) == ["gauss-4[axis]"]
+    assert words.misses(part) == pytest.approx([0.5, 0.2])
+    assert messages.of_mechanism("separatrix", part).endswith("to 0.35/g in the median; 1 method lasts longer")
+    assert "outlasted by more than 10/g with gauss-4[axis]." in words.horizons(part)
+
+
+def slope(pixels):
+    """Do the dark lines of a picture rise to the right (+1), fall (-1), or neither (0)?"""
+    dark = np.mean(pixels[..., :3], axis=-1)
+    dark = dark < 0.5 * (dark.min() + dark.max())
+    rising, falling = (np.mean(dark[3:-3, 3:-3] & np.roll(dark, (-3 * k, 3), (0, 1))[3:-3, 3:-3]) for k in (1, -1))
+    return int(np.sign(rising - falling)) if abs(rising - falling) > 0.2 * max(rising, falling) else 0
+
+
+@pytest.mark.parametrize("word", ["left_chart", "wrong_regime", "not_converged"])
+def test_the_hatch_of_a_map_has_the_slope_of_its_swatch_in_the_legend(word):
+    style.use()
+    index = np.full((40, 60), VERDICTS.index(word), dtype=np.uint8)
+    slopes = []
+    for draw in ("map", "swatch"):
+        figure = Figure(figsize=(2.0, 1.6), dpi=200, layout="none")
+        axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        if draw == "map":
+            one = atlas.OutcomeMap(index, np.geomspace(0.1, 30.0, 40), np.geomspace(0.01, 1.0, 60), "step_size")
+            atlas_figures.draw_map(axis, one, "small")
+        else:
+            swatch = atlas_figures._handle(word)
+            axis.add_patch(Rectangle((0, 0), 1, 1, fc=swatch.get_facecolor(), hatch=swatch.get_hatch(), ec="black"))
+        axis.set_axis_off()
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        slopes.append(slope(np.asarray(canvas.buffer_rgba())[20:-20, 20:-20] / 255.0))
+    assert slopes[0] == slopes[1]
+    assert slopes[0] == {"left_chart": 1, "wrong_regime": -1, "not_converged": 0}[word]
+
+
+def tolerances(*ladders):
+    """Maps of methods over tolerances: accurate up to 1e-4."""
+    names = ["rk45[axis]", "radau[axis]", "dop853[axis]", "lsoda[axis]"]
+    cells = []
+    for name, ladder in zip(names, ladders, strict=False):
+        cell = hand_made([[A if value < 2e-4 else B for value in ladder]] * 4, ladder, knob_name="tolerance")
+        cells.append((Case("cusp", name), cell.sel(scene="cusp", integrator="midpoint", drop=True)))
+    return store.combine(cells)
+
+
+def test_shares_of_a_page_are_of_what_all_its_maps_have_and_panels_share_their_axes():
+    data = tolerances([1e-10, 1e-8, 1e-6, 1e-4, 1e-2], [1e-6, 1e-4, 1e-2])
+    shares = {name: one.shares[0] for name, one in atlas.common(atlas.maps(data, "cusp")).items()}
+    assert shares == pytest.approx({"rk45[axis]": 2 / 3, "radau[axis]": 2 / 3})
+    drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-tolerances"]
+    seen = [axis for axis in drawn.figure.axes if axis.get_visible()]
+    assert seen[0].get_xlim() == pytest.approx(seen[1].get_xlim())
+    assert "Shares count what all maps have: 1e-06 to 0.01." in drawn.caption
+    assert "not tried" in " ".join(text.get_text() for text in drawn.figure.legends[0].get_texts())
+
+
+def test_a_tie_has_no_single_winner():
+    ladder = [1e-6, 1e-4, 1e-2]
+    data = tolerances(ladder, ladder, ladder)
+    best, worst = atlas_words.ends(atlas.maps(data, "cusp"))
+    assert best == worst == "3 methods (67%)"
 
 
 def test_words_of_mechanisms_come_only_from_what_is_there():

@@ -6,6 +6,8 @@ import math
 import mpmath
 import numpy as np
 import pytest
+import xarray as xr
+from symtop_studies.oscillators import words
 from symtop_studies.oscillators.damped_top import Friction, damped_run, damped_truth
 from symtop_studies.oscillators.oscillator import (
     ONE_SIDED,
@@ -15,7 +17,14 @@ from symtop_studies.oscillators.oscillator import (
     notebook_positions,
     rule_sums,
 )
-from symtop_studies.oscillators.tables import Column, convergence, damped_top_table, decay, notebook_history
+from symtop_studies.oscillators.tables import (
+    AGAINST_RK45,
+    Column,
+    convergence,
+    damped_top_table,
+    decay,
+    notebook_history,
+)
 
 import symtop
 from symtop.measure.order import power_law
@@ -122,6 +131,18 @@ def test_the_midpoint_rule_conserves_the_undamped_energy_the_trapezoidal_bounds_
     assert float(rk45[Column.EVALUATIONS]) == pytest.approx(5000, rel=0.15)
     loss = np.abs(rk45[Column.ENERGY_ERROR].values)
     assert loss[-1] > 5.0 * loss[loss.size // 10]  # a drift
+
+
+def test_the_message_of_the_decay_tells_of_every_damping_that_is_drawn():
+    """Without friction the midpoint rule is best, with it rk45: a title must not tell of one panel alone."""
+    errors = {"undamped": (1e-13, 1e-3, 1e-4), "damping-0.1": (2e-2, 4e-3, 1e-3)}
+    names = dict(zip(AGAINST_RK45, errors.values(), strict=True))
+    coords = {"scene": list(names), "integrator": ["midpoint", "trapezoidal", "rk45"]}
+    values = np.array(list(names.values()))[..., None]
+    said = words.decay_message(xr.Dataset({Column.ENERGY_ERROR: (("scene", "integrator", "sample"), values)}, coords))
+    assert "by midpoint with b = 0, undamped" in said
+    assert "by rk45 with b = 0.1" in said
+    assert "midpoint 0.02" in said
 
 
 # the damped top

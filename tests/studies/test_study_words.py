@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.drift import rows, tables, words
+from symtop_studies.drift import messages, rows, tables, words
 from symtop_studies.drift.histories import run_history
 from symtop_studies.drift.study import TOLERANCE, cases
 from symtop_studies.notebook import words as notebook_words
@@ -185,8 +185,14 @@ def test_the_shift_of_the_mean_energy_is_relative_to_its_band():
     cells = xr.Dataset({"energy_mean": means, "modified_energy_mean": means * 1e-10,
                         "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
     sentence = words.moved(cells)
-    assert "the mean energy moves by at most 3e-01 of the width" in sentence
-    assert "the mean modified energy by at most 3e-15 of" in sentence
+    assert "at most 3e-01 of the width of its oscillation from the first window to the last" in sentence
+    assert "and by at most 3e-01 to any other" in sentence
+    assert "to the last by at most 3e-15 of" in sentence
+    there_and_back = cells.assign(energy_mean=means.copy(data=[[0.0, 4e-5, 1e-6, np.nan]]))
+    assert messages.strayed(there_and_back) == pytest.approx((0.01, 0.4))
+    said = messages.windows(there_and_back.assign(steps=means * 0.0 + 1e8))
+    assert "within 1% of the width" in said
+    assert "no window before strays by more than 40%" in said
 
 
 def test_a_change_of_law_is_found_in_a_run_and_an_oscillation_that_switches_on_is_none(monkeypatch):
@@ -308,6 +314,18 @@ def test_the_truth_study_says_what_the_printed_values_test():
     assert "7 of 7 printed values" in everything
     assert "Only 3 of them test a trajectory" in everything
     assert "6 of 6 agree; 4 of them test a trajectory and 2 a start." in everything
+
+
+def test_the_title_of_the_truth_study_has_a_number_whatever_was_run_longest():
+    """An integration is not run as long as the closed form: its last error is that of its own longest time."""
+    errors = [[[1e-15, 1e-13, np.nan], [3e-16, 4e-16, 5e-16]]]
+    coords = {"scene": ["spheroid"], "integrator": ["double, axis", "closed form"], "horizon": [8.0, 1e4, 1e6]}
+    data = xr.Dataset({truth_tables.ERROR: (("scene", "integrator", "horizon"), errors)}, coords=coords)
+    said = truth_words.message(data).replace("\N{NO-BREAK SPACE}", " ")
+    assert "right to 5 × 10⁻¹⁶ rad" in said
+    assert "off by up to 10⁻¹³ rad after 10⁴ s" in said
+    alone = truth_words.message(data.sel(integrator=["closed form"]))
+    assert "nan" not in said + alone
 
 
 @pytest.mark.parametrize(("bound", "holding"), [(2e-9, 2), (5e-10, 1)])
