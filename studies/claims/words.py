@@ -10,7 +10,7 @@ from symtop.runner.study import Table
 
 from .tables import findings
 
-SYMBOLS = {"confirmed": "✓", "refuted": "✗", "measured": "·", "undecided": "?", "inapplicable": "–"}
+SYMBOLS = {"confirmed": "✓", "refuted": "✗", "measured": "○", "undecided": "?", "inapplicable": "∅"}
 LEGEND = ", ".join(f"{SYMBOLS[verdict]} {verdict}" for verdict in VERDICTS)
 
 

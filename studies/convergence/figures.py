@@ -9,12 +9,11 @@ import xarray as xr
 from symtop.measure.growth import tops
 from symtop.methods.registry import split_name
 from symtop.report.figures import SMALLEST, error_band
-from symtop.report.style import GREY, few_ticks, grid, headline, legend_below, line, number, panels
+from symtop.report.style import FIRM, GREY, few_ticks, grid, headline, legend_below, line, number, panels
 from symtop.runner.study import Picture
 
 from .tables import (
     HISTORY_STEPS,
-    LARGE,
     MAIN,
     NAMED,
     Efficiency,
@@ -32,6 +31,13 @@ from .words import spans
 TARGET = 1e-6  # rad, the axis error at which costs are compared
 HORIZON = "over 8 nutations (spheroid: to t = 8)"
 SHOWN_ADAPTIVE = ("rk45[angles]", "dop853[angles]", "lsoda[angles]", "taylor[axis]", "series-adaptive[axis]")
+EQUAL = {
+    "color": "#9EC9E8",
+    "lw": 5.0,
+    "alpha": 0.8,
+    "zorder": 0.5,
+    "label": "error = tolerance",
+}  # wide: lines cross it
 WINDOWS = 18  # of time, in each of which the largest energy error is drawn
 
 
@@ -75,21 +81,22 @@ def _named(data: xr.Dataset) -> Picture:
         if "history_time" in cell and np.isfinite(cell["history_time"]).any():
             _history(energy, name, label, cell)
     energy.set_visible(bool(energy.get_lines()))
-    ends = np.array([1e-14, LARGE])
-    tolerances.plot(ends, ends, color=GREY, lw=0.9, zorder=1)
-    tolerances.text(1e-11, 2e-12, "error = tolerance", fontsize=7.0, color="#444444")
+    _equal(tolerances)
     steps.set(xlabel="step size (s)", title="error against the step")
-    tolerances.set(xlabel="tolerance", title="error against the tolerance")
+    tolerances.set(xlabel="tolerance asked for", title="error against the tolerance")
     work.set(xlabel="force evaluations per nutation", title="error against cost")
-    energy.set(xscale="log", yscale="log", xlabel="nutations", ylabel="relative change of the energy")
-    energy.set_title(f"energy over time ({HISTORY_STEPS:g} steps a nutation)")
+    energy.set(xscale="log", yscale="log", xlabel="nutations", ylabel="relative change\nof the energy")
+    energy.set_title(f"energy (fixed steps: {HISTORY_STEPS:g} a nutation)")
     few_ticks(*axes.flat)
     paid_least = least_work(part, scene, labels)
     if len(paid_least) > 1:
         (best, least), (worst, most) = paid_least[0], paid_least[-1]
-        paid_text = f"{best} needs {number(least)} force evaluations a nutation, {worst} {number(most)}"
-        headline(figure, f"{number(TARGET)} rad on {scene}: {paid_text}")
-    legend_below(figure, [work])
+        headline(
+            figure,
+            f"{best} needs {number(least)} force evaluations a nutation for {number(TARGET)}{FIRM}rad on scene "
+            f"{scene}, {worst} {number(most)}",
+        )
+    legend_below(figure, [work, tolerances])
     listed = ", ".join(f"{name} {value:.3g}" for name, value in paid_least)
     tolerance = sorted({f"{value:.1e}" for value in np.ravel(part.get("history_tolerance", np.nan)) if value > 0.0})
     caption = (
@@ -104,13 +111,23 @@ def _named(data: xr.Dataset) -> Picture:
     return Picture("named-methods", figure, caption, alt, lead="Five well-known methods")
 
 
+def _equal(axis: Any) -> None:
+    """The line where error and tolerance are equal, from frame to frame."""
+    limits = axis.get_xlim(), axis.get_ylim()
+    ends = np.array([1e-20, 1e2])
+    axis.plot(ends, ends, **EQUAL)
+    axis.set(xlim=limits[0], ylim=limits[1])
+
+
 def _history(axis: Any, name: str, label: str, cell: xr.Dataset) -> None:
     time, change = cell["history_time"].values, cell["history_energy"].values
     good = np.isfinite(time) & np.isfinite(change) & (time > 0.0)
     if good.any():
         decades = np.log10(time[good][-1] / max(time[good][0], 1.0))
         x, y = tops(time[good], np.maximum(change[good], SMALLEST), decades, WINDOWS)
-        axis.plot(x, y, **line(name), label=label)
+        axis.plot(
+            x, np.where(np.greater(y, SMALLEST), y, np.nan), **line(name), label=label
+        )  # no change at all has no place
 
 
 def least_work(part: xr.Dataset, scene: str, labels: Mapping[str, str]) -> list[tuple[str, float]]:
@@ -137,13 +154,16 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
     blocks = [orders[power] for power in sorted(orders)]
     halves = _halves(blocks)
     most = max(sum(len(block) + 1 for block in half) for half in halves)
+    best = min(middle, key=lambda name: middle[name])
+    firsts = [block[0] for block in blocks if declared_order(block[0])]
+    low = min(firsts, key=lambda name: declared_order(name) or 0)
     figure, axes = panels(1, len(halves), height=0.135 * most + 0.3, sharex=True)
     for axis, half in zip(axes[0], halves, strict=True):
         place, places, ticks = 0, [], []
         for block in half:
             power = declared_order(block[0])
-            axis.text(0.99, place, f"order {power}" if power else "no order declared", weight="bold", va="center",
-                      ha="right", transform=axis.get_yaxis_transform())  # fmt: skip
+            places.append(place)
+            ticks.append(f"order {power}" if power else "no order declared")
             place += 1
             for name in block:
                 values = [one.work for one in sizes[name]]
@@ -152,20 +172,30 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
                 axis.plot([min(values), max(values)], [place, place], color=marks["color"], lw=1.2)
                 face = "white" if open_ else marks["color"]
                 axis.plot(middle[name], place, marks["marker"], color=marks["color"], mfc=face, ms=marks["ms"])
+                if name in (best, low):
+                    axis.annotate(number(middle[name]), (max(values), place), (6, 0), textcoords="offset points",
+                                  va="center", fontsize=7.5, weight="bold")  # fmt: skip
                 places.append(place)
                 ticks.append(labels[name])
                 place += 1
         axis.set(xscale="log", yticks=places, yticklabels=ticks, ylim=(most - 0.4, -0.6))
         axis.tick_params(axis="y", labelsize=7.0, length=0)
+        for tick in axis.get_yticklabels():
+            if tick.get_text() not in labels.values():  # the head of a block
+                tick.set(weight="bold", fontsize=8.0)
         axis.grid(visible=False, axis="y")
-    best = min(middle, key=lambda name: middle[name])
-    firsts = [block[0] for block in blocks if declared_order(block[0])]
-    low = min(firsts, key=lambda name: declared_order(name) or 0)
-    figure.supxlabel(f"force evaluations a nutation for an axis error of {number(TARGET)} rad", fontsize=8.0)
-    orders_named = [f"{name} (order {declared_order(name)})" for name in (low, best)]
-    times = number(middle[low] / middle[best])
+    dark = {"color": "#444444", "lw": 0.0}
+    axes[0, 0].plot([], [], "s", ms=4.5, label=f"median over {len(scenes)} scenes", **dark)
+    axes[0, 0].plot([], [], color="#444444", lw=1.2, label="least to largest of the scenes")
+    axes[0, 0].plot([], [], "s", ms=4.5, mfc="white", label="open: beyond the errors that were measured", **dark)
+    for axis in axes[0]:
+        axis.set_xlabel("force evaluations\na nutation")
+    legend_below(figure, axes)
+    most, times = number(middle[best]), number(middle[low] / middle[best])
     headline(
-        figure, f"The best of the lowest order, {orders_named[0]}, takes {times} times the work of {orders_named[1]}"
+        figure,
+        f"To {number(TARGET)}{FIRM}rad {labels[best]} needs {most} force evaluations a nutation; {labels[low]}, the "
+        f"best of order {declared_order(low)}, {times} times as many",
     )
     caption = (
         "Efficiency constants: force evaluations per nutation that the law error = C h^p of each row, method[chart], "
@@ -192,9 +222,11 @@ def _by_tolerance(data: xr.Dataset) -> Picture:
     """Error of the adaptive rows against their tolerance, with the line where they are equal."""
     fitted, labels = tolerance_fits(data), merged(data, MAIN)
     scenes = [str(name) for name in data["scene"].values]
-    figure, axes = grid(len(scenes), min(2, len(scenes)), ("tolerance", "largest axis error (rad)"), sharey=True)
+    figure, axes = grid(
+        len(scenes), min(2, len(scenes)), ("tolerance asked for", "largest axis error (rad)"), sharey=True
+    )
     shown = [name for name in labels if name in SHOWN_ADAPTIVE]
-    ratios = []
+    ratios, worst = [], (0.0, 0.0, 0.0, axes[0])  # ratio, tolerance, error, panel
     for scene, axis in zip(scenes, axes, strict=True):
         part = data.sel(scene=scene)
         floor = error_band(axis, part[f"{MAIN}_bound"].values)
@@ -205,22 +237,33 @@ def _by_tolerance(data: xr.Dataset) -> Picture:
                 _line(axis, name, labels[name], tolerance, error)
             else:
                 axis.plot(tolerance, error, color=GREY, lw=0.6, alpha=0.6, zorder=1)
-            ratios += list((cell[MAIN].values / tolerance)[used])
-        axis.plot([], [], color=GREY, lw=0.8, label="all other rows")
-        ends = np.array([1e-14, LARGE])
-        axis.plot(ends, ends, color="black", lw=0.9, ls=(0, (5, 3)), zorder=1, label="error = tolerance")
-        axis.set(xscale="log", yscale="log", title=scene)
+            points = [*zip((cell[MAIN].values / tolerance)[used], tolerance[used], error[used], strict=True)]
+            ratios += [ratio for ratio, _, _ in points]
+            worst = max([worst, *((*map(float, point), axis) for point in points)], key=lambda point: point[0])
+        axis.plot([], [], color=GREY, lw=0.8, label="other adaptive methods")
+        axis.set(xscale="log", yscale="log", title=f"scene {scene}")
+    for axis in axes:
+        _equal(axis)
     legend_below(figure, axes)
     middle = float(np.median(ratios)) if ratios else np.nan
     few_ticks(*axes)
-    most = number(max(ratios, default=np.nan))
-    headline(figure, f"Axis errors of a run are {number(middle)} times the tolerance in the median, up to {most} times")
+    if ratios:
+        most, tolerance, error, axis = worst
+        axis.plot(tolerance, error, "o", color="black", ms=9, mfc="none", mew=1.2, zorder=4)
+        axis.annotate(
+            f"{number(most)} times", (tolerance, error), (-6, 6), textcoords="offset points", ha="right", fontsize=7.5
+        )
+        headline(
+            figure,
+            f"Errors of adaptive methods are {number(middle)} times the tolerance in the median, {number(most)} times "
+            "at most",
+        )
     slopes = {name: [fit.slope for pair, fit in fitted.items() if pair[1] == name and np.isfinite(fit.slope)]
               for name in labels}  # fmt: skip
     listed = ", ".join(f"{name} {min(values):.2f} to {max(values):.2f}" for name, values in slopes.items() if values)
     caption = (
         f"Largest axis error {HORIZON} of the adaptive methods, method[chart], against the tolerance that was asked "
-        "for; relative and absolute tolerance of the Runge-Kutta methods are equal. Lines above the dashed diagonal "
+        "for; relative and absolute tolerance of the Runge-Kutta methods are equal. Lines above the wide diagonal "
         f"lose more than they were asked for. Exponents x of error ~ tolerance^x: {listed}. Open markers: Euler "
         "angles; dotted lines: plain Python."
     )

@@ -14,11 +14,12 @@ from symtop.report.style import headline, look, panels
 from symtop.runner.study import Picture
 
 from . import words
-from .runs import QUANTITIES
+from .runs import POPULATION, QUANTITIES
 from .tables import TARGETS, TIE, Diagram, diagram, where
 
 NAMED = 10  # rows with their names on their regions
-LEAST = 5  # cells of a region that bears a name
+HATCH = "///"  # foretold
+LEAST = 8  # cells of a region that bears a name
 PALE = 0.55  # of white in a cell that is level
 FAMILIES = {
     "splitting": "splitting", "discrete-lagrangian": "discrete Lagrangian", "runge-kutta": "Runge-Kutta and Gauss",
@@ -44,15 +45,16 @@ def draw(data: xr.DataTree) -> Picture:
         for axis, quantity in zip(axes[row], QUANTITIES, strict=True):
             _panel(axis, each[name, quantity], spoken)
             axis.set_title(words.PANELS[quantity].replace(": ", "\n", 1) if row == 0 else "")
-        axes[row][0].set_ylabel(f"{words.named(name)}\nallowed error")
+        kind = "" if name == POPULATION else "scene "
+        axes[row][0].set_ylabel(f"{kind}{words.named(name)}:\nlargest error allowed")
     for axis in axes[-1]:
-        axis.set_xlabel("horizon (nutations)")
-    families = {integrator(name).family: look(name).color for name in reversed(list(area))}
+        axis.set_xlabel("run length (nutations)")
+    families = {integrator(name).family: look(name).color for name, _ in reversed(area.most_common())}
     keys = [Patch(facecolor=color, label=FAMILIES.get(family, family)) for family, color in families.items()]
     keys += [
-        Patch(facecolor="#BBBBBB", label=f"pale: another within a factor {TIE:g}"),
-        Patch(facecolor="white", edgecolor="#555555", hatch="////", label="hatched: foretold"),
-        Patch(facecolor="#F2F2F2", edgecolor="#CCCCCC", label="no row"),
+        Patch(facecolor="#BBBBBB", label=f"paler, in any colour: another within {TIE:g}"),
+        Patch(facecolor="white", edgecolor="#555555", hatch=HATCH, label="hatched: foretold, not run"),
+        Patch(facecolor="#F2F2F2", edgecolor="#CCCCCC", label="reached by none"),
     ]
     figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False)
     headline(figure, words.message(data))
@@ -83,7 +85,7 @@ def _panel(axis: Any, panel: Diagram, spoken: list[str]) -> None:
     colors[level] = PALE + (1.0 - PALE) * colors[level]
     axis.imshow(colors, extent=(x[0] - dx, x[-1] + dx, y[-1] - dy, y[0] + dy), aspect="auto", interpolation="none")
     for t, h in zip(*np.nonzero(panel.foretold), strict=True):
-        axis.add_patch(Rectangle((x[h] - dx, y[t] - dy), 2 * dx, 2 * dy, fill=False, hatch="///", ec="#00000055", lw=0))
+        axis.add_patch(Rectangle((x[h] - dx, y[t] - dy), 2 * dx, 2 * dy, fill=False, hatch=HATCH, ec="#00000055", lw=0))
     _borders(axis, panel.winner, (x, y), (dx, dy))
     for k, name in enumerate(panel.names):
         if name in spoken:

@@ -115,17 +115,18 @@ def winners_sentence(data: xr.DataTree, quantity: str) -> str:
 def message(data: xr.DataTree) -> str:
     """The figure's one message: the row that is cheapest most often, for each of the three errors."""
     name = diagrams.where(data)[0]
-    shares: dict[str, list[str]] = {}
+    shares: dict[str, list[tuple[float, str]]] = {}
     for quantity in QUANTITIES:
         panel = diagram(data, name, quantity)
         won = panel.winner[panel.winner >= 0]
         if won.size:
             k, count = Counter(won.tolist()).most_common(1)[0]
-            shares.setdefault(panel.names[k], []).append(
-                f"{quantity.replace('axis', 'phase')} ({count / won.size:.0%})"
-            )
-    said = [f"{row} for {', '.join(listed)}" for row, listed in shares.items()]
-    return f"Most often cheapest on {named(name)}, of the cells: {'; '.join(said)}"
+            shares.setdefault(panel.names[k], []).append((count / won.size, quantity.replace("axis", "phase")))
+    each = []
+    for row, ((first, quantity), *others) in shares.items():
+        rest = "".join(f", {share:.0%} for {other}" for share, other in others)
+        each.append(f"{row} is the cheapest in {first:.0%} of the cells for {quantity}{rest}")
+    return f"On {named(name)} {'; '.join(each)}"
 
 
 def population_sentence(data: xr.DataTree) -> str:

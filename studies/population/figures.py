@@ -1,6 +1,5 @@
 """The figures of the population study: run lengths, slowdowns and wins, strata, silent failures, the guard."""
 
-import math
 import textwrap
 from typing import Any
 
@@ -8,14 +7,13 @@ import numpy as np
 import xarray as xr
 
 from symtop.methods.registry import split_name
-from symtop.model.charts import Array
 from symtop.report import style
 from symtop.report.style import LEAST_TEXT, few_ticks, grid, headline, look, number, panels
 from symtop.run.guard import EXPECTED
 from symtop.runner.study import Picture
 
-from . import verdicts, words
-from .costs import run_lengths
+from . import messages, verdicts, words
+from .costs import TIE, run_lengths
 from .ladder import KEPT, WRONG
 from .verdicts import ALL, UNITS, Cell
 
@@ -26,8 +24,10 @@ SHOWN = 12  # rows of a panel of slowdowns
 FAR = 1e3  # slowdown at which an axis ends
 LATEST = 0.995  # of a named row's costs lie within the axis of a panel
 RARE = 1e-3  # share of false alarms at which an axis begins
-LINE, WORD = 0.075, 0.4  # of a panel's height and width: what a name takes at most
-LEAST = 0.05  # a row that solves less has no label on its line
+LEAST = 0.05  # a row that solves less is named in words
+OTHERS = "all other methods"
+MEAN = {"color": "black", "lw": 1.2, "ls": (0, (5, 2)), "zorder": 4}
+PAPER = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
 
 def pictures(data: xr.DataTree) -> list[Picture]:
@@ -65,78 +65,51 @@ def drawn(name: str) -> dict[str, Any]:
     return style.line(name) | {"lw": 0.9 if name in FAMILIAR else 1.7, "zorder": 3, "label": name}
 
 
-def label_lines(axis: Any, lines: dict[str, tuple[Array, Array]], top: float) -> None:
-    """Write each name on its own line: those that rise first at the height `top`, the others lower and lower.
-
-    A name that would cover another one goes up or down its line until it does not.
-    """
-    order = sorted(
-        lines, key=lambda name: float(lines[name][0][np.searchsorted(lines[name][1], 0.4 * max(lines[name][1]))])
-    )
-    height = top
-    span = max(math.log(x[-1] / x[0]) for x, _ in lines.values()) if lines else 0.0
-    written: list[tuple[float, float]] = []
-    for name in order:
-        x, y = lines[name]
-        at = max(min(height, 0.75 * float(max(y))), 0.03)
-        height = at if at > 0.8 * height else height  # a line that ends low does not press down those behind it
-        for shift in sorted(np.arange(-20, 21) * 0.02, key=abs):
-            place = at + float(shift)
-            k = min(int(np.searchsorted(y, place)), len(x) - 1)
-            if 0.03 <= place <= max(y) and not any(
-                abs(place - other) < LINE and abs(math.log(x[k] / beside)) < WORD * span for beside, other in written
-            ):
-                at = place
-                break
-        k = min(int(np.searchsorted(y, at)), len(x) - 1)
-        written.append((float(x[k]), at))
-        axis.annotate(
-            name, (x[k], at), ha="right" if k > 0.8 * len(x) else "center", va="center",
-            fontsize=LEAST_TEXT, color=style.ink(look(name).color), zorder=5,
-            bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
-        )  # fmt: skip
-        height -= 0.1
-
-
 def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Picture:
     """The share of tops that each row has solved within a cost, one panel a target."""
     targets, rows = verdicts.targets(data), named(data, horizon, unit)
     scale = 1e6 if unit != "evaluations" else 1.0
-    label = "force evaluations of a run" if unit == "evaluations" else "force evaluations x time of one (us)"
-    figure, axes = grid(len(targets), 2, (label, "share of tops solved"), height=2.5)
-    for axis, target in zip(axes, targets, strict=True):
-        taken = verdicts.costs(data, Cell(horizon, "axis", target), unit)
-        ends = [
-            np.quantile(part, LATEST) for name in rows if (part := taken.of(name)[np.isfinite(taken.of(name))]).size
-        ]
-        if not ends:
-            continue
-        budgets = np.geomspace(0.9 * taken.values.min(), 1.5 * max(ends), 400)
-        lines = {}
-        for name in taken.names:
-            share = run_lengths(taken.of(name), budgets)
+    label = "force evaluations of a run" if unit == "evaluations" else "time of a run (µs)"
+    figure, axes = grid(len(targets), 2, (label, "share of tops solved"), height=2.3, sharex=True, sharey=True)
+    each = [verdicts.costs(data, Cell(horizon, "axis", target), unit) for target in targets]
+    ends = [
+        np.quantile(part, LATEST)
+        for taken in each
+        for name in rows
+        if (part := taken.of(name)[np.isfinite(taken.of(name))]).size
+    ]
+    cheapest = min((float(taken.values.min()) for taken in each if taken.values.size), default=1.0)
+    budgets = np.geomspace(0.9 * cheapest, 1.5 * max(ends, default=1.1 * cheapest), 400)
+    for axis, target, taken in zip(axes, targets, each, strict=True):
+        shares = {name: run_lengths(taken.of(name), budgets) for name in taken.names}
+        lacking = [name for name in rows if name not in shares or shares[name][-1] < LEAST]
+        for name, share in shares.items():
             if name in rows:
                 first = 5 * rows.index(name)  # markers of two lines seldom meet
-                axis.plot(scale * budgets, share, markevery=(first, len(budgets) // MARKS), **drawn(name))
-                if share[-1] >= LEAST:
-                    lines[name] = scale * budgets, share
+                there = share if name not in lacking else np.full_like(share, np.nan)  # kept for the legend
+                axis.plot(scale * budgets, there, markevery=(first, len(budgets) // MARKS), **drawn(name))
             else:
                 axis.plot(scale * budgets, share, color=style.GREY, lw=0.6, alpha=0.4, zorder=1)
-        label_lines(axis, lines, 0.78)
+        axis.axhline(messages.HALF, color="black", lw=0.8, ls=(0, (1, 2)), zorder=2)
+        half = messages.first_to_half(data, Cell(horizon, "axis", target), unit)
+        if half is not None:
+            axis.plot(half.cost, messages.HALF, "o", color="black", ms=9, mfc="none", mew=1.2, zorder=4)
+            said = f"{number(half.cost)}{'' if unit == 'evaluations' else ' µs'} "
+            axis.text(
+                half.cost, messages.HALF + 0.05, f"{said}  ", ha="right", va="bottom", fontsize=LEAST_TEXT, zorder=5
+            )
         axis.set(xscale="log", ylim=(0.0, 1.03), title=f"axis error below {power(target)} rad")
         axis.set_xlim(scale * budgets[0], scale * budgets[-1])
         axis.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
-        if axis is axes[0]:
-            axis.annotate(
-                "faster", (0.03, 0.93), (0.2, 0.93), xycoords="axes fraction", va="center",
-                arrowprops={"arrowstyle": "->"},
-            )  # fmt: skip
-        if lacking := [name for name in rows if name not in lines]:
+        if lacking:
             said = f"below {LEAST:.0%} within the budget:\n" + "\n".join(lacking)
             axis.text(0.02, 0.97, said, transform=axis.transAxes, fontsize=LEAST_TEXT, color="#444444", va="top")
+    axes[0].plot([], [], color=style.GREY, lw=0.8, label=OTHERS)
+    axes[0].plot([], [], "o", color="black", ms=7, mfc="none", mew=1.2, label="first to half of the tops")
     few_ticks(*axes, most=5)
     first = verdicts.costs(data, Cell(horizon, "axis", targets[0]), unit)
-    headline(figure, _ahead(data, horizon, unit))
+    style.legend_below(figure, axes)
+    headline(figure, messages.run_lengths(data, unit, horizon))
     asked = first.values.shape[1]
     return Picture(
         f"run-lengths-{unit}",
@@ -145,31 +118,17 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
         f"the left is faster, one that ends higher solves more tops within {words.budget(data, horizon)} force "
         f"evaluations a nutation. {words.span(data, horizon)} ({asked:,} of them have a nutation wider than the "
         "coarsest error), no named scene. At each cost every row has the step or tolerance that suits the top. "
-        f"Cost in {UNITS[unit]}. Thick: rows that win on the most tops; thin: familiar ones; grey: all others. "
+        f"Cost in {UNITS[unit]}. Thick: rows that win on the most tops; thin: familiar ones; grey: all others. Ring: "
+        "where the first row has solved half of the tops. "
         f"{words.winner_sentence(data, Cell(horizon, 'axis', targets[0]), unit)}.",
-        f"Empirical distribution functions of the cost, one panel for each axis error, {len(rows)} lines labelled.",
+        f"Empirical distribution functions of the cost, one panel for each axis error, {len(rows)} lines with a name.",
     )
-
-
-def _ahead(data: xr.DataTree, horizon: str, unit: str) -> str:
-    """Who wins on the most tops at the coarsest target and at the finest that anybody meets, as a title."""
-    winners = []
-    for target in verdicts.targets(data):
-        taken, won = verdicts.best(data, Cell(horizon, "axis", target), unit)
-        if won is not None:
-            winners.append((taken.names[won.row], f"on {won.share.value:.0%} of the tops at {number(target)} rad"))
-    if not winners:
-        return "No row meets a target"
-    (first, where), (last, there) = winners[0], winners[-1]
-    if len(winners) < 2:
-        return f"{first} wins {where}"
-    return f"{first} wins {where}, {there if last == first else f'{last} {there}'}"
 
 
 def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
     """The best rows of each target: median and 10 to 90 % of the slowdown, and the share of tops on which they win."""
     targets = verdicts.targets(data)
-    labels = ("slowdown: cost over the cheapest row's", "")
+    labels = ("times the least cost", "")
     figure, axes = grid(len(targets), 2, labels, height=0.145 * SHOWN + 0.75)
     for axis, target in zip(axes, targets, strict=True):
         listed = verdicts.standings(verdicts.costs(data, Cell(horizon, "axis", target), words.UNIT))
@@ -184,7 +143,7 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
             said = f"{one.won.value:.0%}, {one.level.value:.0%}"
             axis.annotate(
                 said,
-                (1.02, place),
+                (1.06, place),
                 xycoords=("axes fraction", "data"),
                 va="center",
                 fontsize=LEAST_TEXT,
@@ -194,8 +153,8 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
         axis.set_yticklabels([one.name for one in listed], fontsize=LEAST_TEXT)
         axis.set_title(f"to {power(target)} rad")
         axis.annotate(
-            "wins,\nlevel",
-            (1.02, 1.0),
+            "wins, wins\nor ties",
+            (1.06, 1.0),
             xycoords="axes fraction",
             fontsize=LEAST_TEXT,
             va="bottom",
@@ -203,7 +162,16 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
         )
         axis.set_xticks([1.0, 10.0, 100.0, 1000.0], ["1", "10", "100", "1000"])
         axis.grid(visible=False, axis="y")
-    headline(figure, _ahead(data, horizon, words.UNIT))
+    dark = {"color": "#444444", "lw": 0.0}
+    axes[0].plot([], [], "D", ms=5, label="median over the tops", **dark)
+    axes[0].plot([], [], color="#444444", lw=1.5, label="10 to 90 % of the tops")
+    axes[0].plot([], [], ">", ms=4, mfc="white", label="not reached on 10 % of the tops", **dark)
+    style.legend_below(figure, axes)
+    figure.legends[0].set_title(
+        f"Sorted by wins: tops on which all others cost at least {TIE:g} times as much, of those that some method "
+        "solves.\nLeft out: methods that solve less than half of them."
+    )
+    headline(figure, messages.slowdowns(data, horizon))
     return Picture(
         f"slowdowns-{horizon}",
         figure,
@@ -236,8 +204,9 @@ def draw_strata(data: xr.DataTree) -> Picture:
                     axis.fill_between(*box, color=shade, lw=0)
                     color = "white" if shade @ np.array([0.3, 0.59, 0.11]) < 0.55 else "black"
                     share = f"{won.share.value:.0%}" if won.share.count else "level"
-                    name = "\n".join(textwrap.wrap(f"{'' if won.sure else '~'}{method}", 12))
-                    label = f"{name}\n{chart} {share}"
+                    row = method if chart == "axis" else taken.names[won.row]
+                    name = "\n".join(textwrap.wrap(f"{'' if won.sure else '~'}{row}", 12))
+                    label = f"{name}\n{share}"
                 axis.text(column, line, label, ha="center", va="center", fontsize=LEAST_TEXT, color=color)
         axis.set(
             xlim=(-0.5, len(targets) - 0.5), ylim=(len(kinds) - 0.5, -0.5), yticks=range(len(kinds)),
@@ -246,7 +215,13 @@ def draw_strata(data: xr.DataTree) -> Picture:
         )  # fmt: skip
         axis.grid(visible=False)
         axis.tick_params(length=0)
-    headline(figure, words.strata_message(data))
+    axes[0, 0].set_ylabel("kind of top")
+    figure.supxlabel(
+        "In a cell: the method (on the axis e and L if it names no chart) that is the cheapest on the most tops, and\n"
+        "on what share of them. Pale, ~: its lead may be chance. None: no method reaches the error.",
+        fontsize=7.5, ha="left", x=0.01,
+    )  # fmt: skip
+    headline(figure, messages.strata(data))
     return Picture(
         "strata",
         figure,
@@ -274,13 +249,25 @@ def draw_silent(data: xr.DataTree) -> Picture:
                 axis.plot(one.setting, values, **drawn(name))
             else:
                 axis.plot(one.setting, values, color=style.GREY, lw=0.6, alpha=0.5, zorder=1)
-    for axis, title in zip(axes[0], ("runs that are wrong", "of the wrong runs, those that look healthy"), strict=True):
-        axis.set(xscale="log", ylim=(0.0, 1.03), title=title, xlabel="steps a nutation", ylabel="share")
+    steps = np.array([axes[0, 0].dataLim.x0, axes[0, 0].dataLim.x1])
+    axes[0, 0].plot([], [], color=style.GREY, lw=0.8, label=OTHERS)
+    share = words.hidden(data)
+    axes[0, 1].plot(steps, [share.everywhere] * 2, label="all methods together", **MEAN)
+    axes[0, 1].plot((words.FINE, steps[1]), [share.fine] * 2, **MEAN)
+    for place, value in ((1.1 * steps[0], share.everywhere), (1.05 * words.FINE, share.fine)):
+        axes[0, 1].text(place, value + 0.01, f"{value:.0%}", weight="bold", va="bottom", bbox=PAPER, zorder=5)
+    titles = {f"wrong: axis off by more than {WRONG:g} rad": "runs", "wrong runs that look healthy": "wrong runs"}
+    for axis, (title, of) in zip(axes[0], titles.items(), strict=True):
+        axis.set(xscale="log", ylim=(0.0, 1.03), title=title, xlabel="steps a nutation", ylabel=f"share of {of}")
         axis.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
         axis.xaxis.set_major_formatter("{x:g}")
     few_ticks(*axes.flat, most=4)
     style.legend_below(figure, axes)
-    headline(figure, words.silent_message(data))
+    figure.legends[0].set_title(
+        f"{words.span(data, 'short')}. Healthy: a run that ends without an error and keeps energy and momenta to "
+        f"{KEPT:.0%}.\nRight: lines end where less than 1 % of the runs are wrong."
+    )
+    headline(figure, messages.silent(data))
     return Picture(
         "silent",
         figure,
@@ -301,11 +288,12 @@ def draw_guard(data: xr.DataTree) -> Picture:
     figure, axes = panels(1, len(spans), height=2.9, sharey=True)
     for axis, horizon in zip(axes[0], spans, strict=True):
         for score, label, color, spot in (
-            ("foretold", "the guard, before the run", style.BLACK, (0.03, 0.92)),
+            ("foretold", "the guard, before the run", style.BLACK, (0.25, 0.90)),
             ("watched", "energy and momenta, after it", style.ORANGES[1], (0.40, 0.35)),
         ):
             curve, (hits, alarms) = verdicts.detected(data, horizon, score), verdicts.caught(data, horizon, score)
-            axis.plot(np.maximum(curve.alarms, RARE), curve.hits, color=color, lw=2.0)
+            seen = max(int(np.searchsorted(curve.alarms, RARE, side="right")) - 1, 0)  # where the panel begins
+            axis.plot(np.maximum(curve.alarms, RARE)[seen:], curve.hits[seen:], color=color, lw=2.0)
             axis.plot(max(alarms.value, RARE), hits.value, "o", color=color, ms=7)
             axis.annotate(
                 f"{label}\n{words.percent(hits)} of wrong runs,\n{words.percent(alarms)} of right ones",
@@ -313,10 +301,9 @@ def draw_guard(data: xr.DataTree) -> Picture:
                 color=color, va="top", arrowprops={"arrowstyle": "-", "color": color, "lw": 0.7},
             )  # fmt: skip
         axis.set(xscale="log", xlim=(RARE, 1.05), ylim=(-0.01, 1.03), title=words.span(data, horizon))
-        axis.set(xlabel="false alarms: share of right runs with a warning", ylabel="hits: share of wrong runs")
-    hits, alarms = verdicts.caught(data, spans[0])
-    headline(figure, f"Before a run the guard finds {words.percent(hits)} of the wrong ones, and suspects "
-                     f"{words.percent(alarms)} of the right ones")  # fmt: skip
+        axis.set(xlabel="share of right runs that are suspected")
+    axes[0, 0].set_ylabel("share of wrong runs that are found")
+    headline(figure, messages.guard(data))
     return Picture(
         "guard",
         figure,

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -138,43 +139,32 @@ def strata_sentence(data: xr.DataTree, horizon: str = "short") -> str:
     )
 
 
-def strata_message(data: xr.DataTree, horizon: str = "short") -> str:
-    """How many rows win a stratum, and who most often, as a title."""
-    owners: Counter[str] = Counter()
-    for target in verdicts.targets(data):
-        for stratum in verdicts.strata(data):
-            part, won = verdicts.best(data, Cell(horizon, "axis", target, stratum), UNIT)
-            if won is not None:
-                owners[part.names[won.row]] += 1
-    if not owners:
-        return "No row wins a stratum"
-    first, times = owners.most_common(1)[0]
-    return (
-        f"{len(owners)} row{'s' * (len(owners) > 1)} share the strata: {first} wins {times} of {sum(owners.values())} "
-        "cells of stratum and accuracy"
-    )
+class Hidden(NamedTuple):
+    """Wrong runs that look healthy."""
+
+    wrong: float  # runs
+    everywhere: float  # share of all wrong runs that look healthy
+    fine: float  # among rows with a fixed step, of at least `FINE` steps a nutation
 
 
-def silent_message(data: xr.DataTree) -> str:
-    """The share of wrong runs that nothing warns of, as a title."""
+def hidden(data: xr.DataTree) -> Hidden:
+    """Wrong runs that nothing warns of, of all and among small steps."""
     each = [verdicts.health(data, name) for name in verdicts.judged_rows(data)]
     wrong, silent = sum(one.wrong.sum() for one in each), sum(one.silent.sum() for one in each)
-    return f"{silent / max(wrong, 1):.0%} of the wrong runs look healthy: they end ok and keep energy and momenta"
+    small = [one for one in each if one.fixed_step]
+    missed = sum(one.wrong[one.setting >= FINE].sum() for one in small)
+    unseen = sum(one.silent[one.setting >= FINE].sum() for one in small)
+    return Hidden(float(wrong), float(silent / max(wrong, 1.0)), float(unseen / max(missed, 1.0)))
 
 
 def silent_sentence(data: xr.DataTree) -> str:
     """How many wrong runs nothing warns of, over all rows and among small steps."""
-    each = [verdicts.health(data, name) for name in verdicts.judged_rows(data)]
-    wrong, silent = sum(one.wrong.sum() for one in each), sum(one.silent.sum() for one in each)
-    fine = [
-        (one.wrong[one.setting >= FINE].sum(), one.silent[one.setting >= FINE].sum()) for one in each if one.fixed_step
-    ]
-    hidden = sum(part for _, part in fine) / max(sum(part for part, _ in fine), 1)
+    share = hidden(data)
     return (
-        f"Of {wrong:,.0f} wrong runs, with the axis off by more than {WRONG:g} rad after "
-        f"{verdicts.nutations(data, 'short'):g} nutations, {silent / max(wrong, 1):.0%} give no sign of it: they end "
+        f"Of {share.wrong:,.0f} wrong runs, with the axis off by more than {WRONG:g} rad after "
+        f"{verdicts.nutations(data, 'short'):g} nutations, {share.everywhere:.0%} give no sign of it: they end "
         f"without an error and keep energy and momenta to {KEPT:.0%}. Among those with at least {FINE:g} steps a "
-        f"nutation it is {hidden:.0%}."
+        f"nutation it is {share.fine:.0%}."
     )
 
 

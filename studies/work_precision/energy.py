@@ -160,15 +160,18 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def message(data: xr.Dataset, chart: str) -> str:
-    """In how many pairs the energy error of a structure-preserving row is smaller at all run times, as a title."""
+    """In what share of pairs the energy error of a structure-preserving row is smaller at all run times, as a title."""
     parts = []
     for classic, compared in crossings(data, chart).items():
         pairs = [one for listed in compared.values() for one in listed]
         if pairs:
-            parts.append(f"{classic} in {sum(one.share == 1.0 for one in pairs)} of {len(pairs)}")
+            parts.append(f"{classic} in {sum(one.share == 1.0 for one in pairs) / len(pairs):.0%}")
     if not parts:
         return "Energy errors at equal run time"
-    return f"Structure-preserving rows have less energy error at every run time than {', than '.join(parts)} pairs"
+    return (
+        f"Structure-preserving methods keep energy better at every run time than {', than '.join(parts)} of the pairs "
+        "of a method and a scene"
+    )
 
 
 def at_equal_steps(data: xr.Dataset, names: Sequence[str], scene: str) -> str:

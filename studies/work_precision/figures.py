@@ -9,10 +9,11 @@ import xarray as xr
 
 from symtop.measure import ranking
 from symtop.measure.phase import PARTS
-from symtop.report.figures import error_band, name_ends, pareto
+from symtop.report.figures import bound_of, error_band, pareto
 from symtop.report.style import (
     BLACK,
     GREY,
+    LEAST_TEXT,
     few_ticks,
     grid,
     headline,
@@ -28,14 +29,14 @@ from symtop.runner.study import Picture
 from . import energy, words
 from .rankings import slowdown, winners
 
-NAMED = (  # rows with a colour and a name in the fronts; all others are thin and grey
-    "rk4[axis]", "midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]", "srkn-14-6[axis]",
-    "series[axis]", "taylor[axis]", "rk45[angles]",
+NAMED = (  # rows with a colour and a name in the fronts, below the owners of the front; all others are thin and grey
+    "series[axis]", "taylor[axis]", "takahashi-imada[axis]", "srkn-14-6[axis]", "rk4[axis]", "midpoint[angles]",
+    "rk45[angles]", "stormer-verlet[angles]",
 )  # fmt: skip
 ENERGY = {
     "axis": (
-        "rk4[axis]", "strang[axis]", "takahashi-imada[axis]", "srkn-14-6[axis]", "gauss-4[axis]", "gauss-8[axis]",
-        "taylor[axis]",
+        "rk4[axis]", "rk45-compiled[axis]", "taylor[axis]", "strang[axis]", "takahashi-imada[axis]",
+        "srkn-14-6[axis]", "gauss-4[axis]", "gauss-8[axis]",
     ),
     "angles": (
         "rk4[angles]", "rk45-compiled[angles]", "midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]",
@@ -44,9 +45,13 @@ ENERGY = {
 }  # fmt: skip
 PARTS_OF = ("midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]", "rk4[axis]",
             "rk45-compiled[angles]", "gauss-8[axis]")  # fmt: skip
-COSTS = {"seconds": "wall time of one run (s)", "force_evaluations": "force evaluations of one run"}
+MOST = 8  # names in a legend
+COSTS = {"seconds": "wall time of one run (s)", "force_evaluations": "force evaluations of one run",
+         "evaluations_a_nutation": "force evaluations a nutation"}  # fmt: skip
+SAME = 1.5  # an error that grows less stays the same
 LEAST = 1e-15  # the lowest error that is drawn, where the reference has no bound
 OTHERS = {"color": GREY, "lw": 0.5, "alpha": 0.5, "zorder": 1}  # a line without a name
+FRONT = "front of compiled methods"
 FILLS = "Open markers: Euler angles; full ones: (e, L)."
 
 
@@ -68,28 +73,34 @@ def _fronts(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     scenes = [str(scene) for scene in data["scene"].values]
     figure, axes = lead(len(scenes), (COSTS[cost], "largest axis error (rad)"))
     ranked = ranking.ranked(data)
-    shown = [row for row in NAMED if row in ranked]
-    owners: Counter[str] = Counter()
-    for axis, scene in zip(axes, scenes, strict=True):
-        cell = data.sel(scene=scene).isel(horizon=far)
-        floor = 0.5 * error_band(axis, cell["axis_bound"].values, LEAST)
+    cells = {scene: data.sel(scene=scene).isel(horizon=far) for scene in scenes}
+    compiled = [row for row in words.of_implementation(data, "compiled") if row in ranked]
+    floors = {scene: 0.5 * bound_of(cell["axis_bound"].values, LEAST) for scene, cell in cells.items()}
+    fronts = {scene: _front(cell.sel(integrator=compiled), cost, floors[scene]) for scene, cell in cells.items()}
+    owners = Counter(owner for _, _, owned in fronts.values() for owner in owned)
+    most = [row for row, _ in owners.most_common(4)]
+    there = np.isfinite(data[cost].isel(horizon=far)).any(["scene", "setting"])
+    wanted = [row for row in dict.fromkeys([*most[:2], *NAMED]) if row in ranked]
+    shown = [row for row in wanted if bool(there.sel(integrator=row))][:MOST]
+    for axis, (scene, cell) in zip(axes, cells.items(), strict=True):
+        error_band(axis, cell["axis_bound"].values, LEAST)
+        floor = floors[scene]
         for row in ranked:
             if row not in shown:
                 axis.plot(*_curve(cell.sel(integrator=row), "axis", cost, floor), **OTHERS)
         _draw(axis, cell, shown, "axis", cost, floor, 1.0 if axis is axes[0] else 0.6)
-        compiled = [row for row in words.of_implementation(cell, "compiled") if row in ranked]
-        owners.update(_front(axis, cell.sel(integrator=compiled), cost, floor))
+        x, y, _ = fronts[scene]
+        axis.step(x, y, where="post", color=BLACK, alpha=0.2, lw=4.0, zorder=1, label=FRONT)
         if cost == "seconds":
-            _closed_form(axis, cell, named=axis is axes[0])
-        axis.set_title(scene)
-    axes[0].set_ylim(LEAST, 3.0)
+            _closed_form(axis, cell)
+        axis.set_title(f"scene {scene}" if axis is axes[0] else scene)
+    axes[0].set_ylim(LEAST, 10.0)
     same_limits(axes)
     few_ticks(axes[0])
-    few_ticks(*axes[1:], most=4)
-    most = [row for row, _ in owners.most_common(4)]
+    few_ticks(*axes[1:], most=3)
     unit = "time" if cost == "seconds" else "work"
-    headline(figure, f"Least {unit} {words.spans(data)[far]}: most of the front belongs to {' and '.join(most[:2])}")
-    _name_lines(axes[0], data.isel(scene=0, horizon=far), shown, "axis", cost)
+    headline(figure, message(most, unit, words.spans(data)[far]))
+    _key(axes[0], shown)
     timed = (
         " A run is shown if it was timed, as its row's cheapest for some target or for the comparison of energies; all "
         "times are measured. All rows have the scene, the horizon and the call, of the bare compiled loop. Dotted: the "
@@ -108,15 +119,26 @@ def _fronts(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     )
 
 
-def _name_lines(axis: Any, cell: xr.Dataset, names: Sequence[str], quantity: str, cost: str) -> None:
-    """Name each line at its end, the most accurate of its runs that is in the panel."""
-    ends = {}
-    for name in names:
-        x, y = _curve(cell.sel(integrator=name), quantity, cost, axis.get_ylim()[0])
-        if x.size:
-            last = int(np.argmax(x))
-            ends[name] = float(x[last]), float(y[last]), look(name).color
-    name_ends(axis, ends)
+def message(most: Sequence[str], unit: str, span: str) -> str:
+    """Who owns most of the front."""
+    if not most:
+        return f"No method has a run {span}"
+    return f"{' and '.join(most[:2])} make{'s' * (len(most) < 2)} up most of the front of least {unit} {span}"
+
+
+def _key(axis: Any, names: Sequence[str]) -> None:
+    """Two legends at the right of a panel: the named lines, and below them whatever else is drawn."""
+    axis.plot([], [], **(OTHERS | {"lw": 0.8, "alpha": 0.8}), label="other methods")
+    handles = {label: handle for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    parts = [label for label in handles if label in names], [label for label in handles if label not in names]
+    for labels, place, anchor in zip(parts, ("upper left", "lower left"), ((1.0, 1.03), (1.0, -0.03)), strict=True):
+        drawn = axis.legend(
+            [handles[label] for label in labels], labels, loc=place, bbox_to_anchor=anchor, frameon=False,
+            fontsize=LEAST_TEXT, borderaxespad=0.3, handlelength=2.4,
+        )  # fmt: skip
+        if labels is parts[0]:  # the second would take its place
+            axis.add_artist(drawn)
+            drawn.set_clip_on(False)
 
 
 def _curve(runs: xr.Dataset, quantity: str, cost: str, floor: float) -> tuple[Any, Any]:
@@ -126,30 +148,22 @@ def _curve(runs: xr.Dataset, quantity: str, cost: str, floor: float) -> tuple[An
     return x[there], np.maximum(y[there], floor)
 
 
-def _front(axis: Any, cell: xr.Dataset, cost: str, floor: float) -> list[str]:
-    """Draw the front of some rows; returns the owner of each of its points."""
+def _front(cell: xr.Dataset, cost: str, floor: float) -> tuple[Any, Any, list[str]]:
+    """The front of some rows: cost and error of its points, and who owns each."""
     x, y = cell[cost].values, np.maximum(cell["axis"].values, floor)
     on = pareto(x, y)
-    if not on.any():
-        return []
     order = np.argsort(x[on])
     x, y, owners = (part[on][order] for part in (x, y, np.broadcast_to(cell["integrator"].values[:, None], x.shape)))
-    axis.step(x, y, where="post", color=BLACK, alpha=0.2, lw=4.0, zorder=1)
-    return [str(owner) for owner in owners]
+    return x, y, [str(owner) for owner in owners]
 
 
-def _closed_form(axis: Any, cell: xr.Dataset, *, named: bool) -> None:
-    """The time of what takes no steps, as a dotted line, with its set-up in words if it is `named`."""
+def _closed_form(axis: Any, cell: xr.Dataset) -> None:
+    """The time of what takes no steps, as a dotted line."""
     for row in (name for name in map(str, cell["integrator"].values) if name not in ranking.ranked(cell)):
         at = float(cell["seconds"].sel(integrator=row).min())
         if np.isfinite(at):
-            axis.axvline(at, color=look(row).color, ls=":", lw=1.0, zorder=1)
-            if not named:
-                continue
-            before = words.seconds(float(cell["set_up_seconds"].sel(integrator=row).min()))
-            axis.annotate(
-                f"exact: set-up {before}", (at, 1.5), rotation=90, fontsize=7.0, color="#444444", ha="right", va="top"
-            )
+            said = f"closed form: {words.seconds(at).replace('us', 'µs')}"
+            axis.axvline(at, color=look(row).color, ls=":", lw=1.0, zorder=1, label=said)
 
 
 def _energy(data: xr.Dataset, chart: str) -> Picture:
@@ -166,40 +180,41 @@ def _energy(data: xr.Dataset, chart: str) -> Picture:
                 axis.plot(*_curve(cell.sel(integrator=row), "energy", "seconds", floor), **OTHERS)
         _draw(axis, cell, shown, "energy", "seconds", floor, 1.0 if axis is axes[0] else 0.6)
         bad = _ended_badly(cell.sel(integrator=classic + structured))
-        axis.set_title(f"{scene}{bad}")
-    axes[0].set_ylim(1e-16, 30.0)
+        axis.set_title(f"{'scene ' * (axis is axes[0])}{scene}{bad}")
+    axes[0].set_ylim(1e-16, 300.0)
     same_limits(axes)
     few_ticks(axes[0])
-    few_ticks(*axes[1:], most=4)
+    few_ticks(*axes[1:], most=3)
     headline(figure, energy.message(data, chart))
-    _name_lines(axes[0], data.isel(scene=0, horizon=-1), shown, "energy", "seconds")
+    _key(axes[0], shown)
     return Picture(
         f"energy-{chart}",
         figure,
         f"Largest energy error {words.spans(data)[-1]} against {COSTS['seconds']}, one panel a scene, step or "
         f"tolerance varying along each line. Every row works in the chart of {energy.CHARTS[chart]}, so that lines "
-        "differ by the method alone; grey: the other structure-preserving rows. A number in brackets is that of the "
-        f"rows none of whose runs ends well. {energy.sentence(data, chart)}",
+        "differ by the method alone; grey: the other structure-preserving rows. A row fails if none of its runs "
+        f"ends well. {energy.sentence(data, chart)}",
         f"Log-log plots of energy error against time at the long horizon, rows of the chart {chart}, a panel a scene.",
     )
 
 
 def _ended_badly(cell: xr.Dataset) -> str:
-    """How many rows have no run that ended well on a scene, in brackets; empty if all have one."""
+    """How many methods have no run that ended well on a scene, on a line; empty if all have one."""
     bad = ~(cell["outcome"] == "ok").any("setting").values
-    return f" ({bad.sum()} of {bad.size})" if bad.any() else ""
+    return f"\n{bad.sum()} of {bad.size} methods fail{'s' * int(bad.sum() == 1)}" if bad.any() else ""
 
 
 def _parts(data: xr.Dataset) -> Picture:
     scene = data.isel(scene=0)
+    scene = scene.assign(evaluations_a_nutation=scene["force_evaluations"] / scene["horizon"])  # alike at equal steps
     name, spans = str(scene["scene"].values), words.spans(data)
     rows = [row for row in PARTS_OF if row in data["integrator"].values]
     shape = {"height": 1.9, "sharex": True, "sharey": "row"}
-    figure, axes = grid(2 * len(PARTS), 2, (COSTS["force_evaluations"], ""), **shape)
+    figure, axes = grid(2 * len(PARTS), 2, (COSTS["evaluations_a_nutation"], ""), **shape)
     for row, (part, label) in enumerate(PARTS.items()):
         for far, axis in zip((0, -1), axes[2 * row : 2 * row + 2], strict=True):
-            _draw(axis, scene.isel(horizon=far), rows, part, "force_evaluations", 5e-17)
-            axis.set(title="" if row else f"{name}, {spans[far]}", ylabel="" if far else label)
+            _draw(axis, scene.isel(horizon=far), rows, part, "evaluations_a_nutation", 5e-17)
+            axis.set(title="" if row else f"scene {name}, {spans[far]}", ylabel="" if far else label)
     few_ticks(*axes)
     legend_below(figure, axes)
     first, last = (f"{data['horizon'].values[far]:g}" for far in (0, -1))
@@ -207,19 +222,27 @@ def _parts(data: xr.Dataset) -> Picture:
                for part in ("shape", "nutation_lag")}  # fmt: skip
     known = [[value for value in values if np.isfinite(value)] for values in growths.values()]
     if all(known):
-        shape_grows, lag_grows = (number(float(np.median(values))) for values in known)
-        by = f"by a factor of {shape_grows}, the lag by {lag_grows} (medians)"
-        headline(figure, f"From {first} to {last} nutations the error of the path grows {by}")
+        headline(figure, growth_message((first, last), *known))
     else:
         headline(figure, f"Parts of the axis error over {first} and {last} nutations")
     return Picture(
         "parts",
         figure,
-        f"Parts of the axis error on {name}: distance from the true path (shape), and how far the run is behind or "
+        f"Parts of the axis error on {name} against force evaluations a nutation, which are alike at equal "
+        "steps: distance from the true path (shape), and how far the run is behind or "
         f"ahead of the truth in its nutation and in its precession (lags). From {first} to {last} nutation periods, at "
         f"equal step or tolerance, the shape error grows by a factor of {words.growth(scene, rows, 'shape')}; the "
         f"nutation lag by a factor of {words.growth(scene, rows, 'nutation_lag')}. {FILLS}",
         "Shape error, nutation lag and precession lag against work at two horizons.",
+    )
+
+
+def growth_message(horizons: tuple[str, str], shapes: Sequence[float], lags: Sequence[float]) -> str:
+    """How the errors of the path and of the nutation's phase grow from one horizon to another at equal steps."""
+    same, lag = sum(value < SAME for value in shapes), number(float(np.median(lags)))
+    return (
+        f"From {horizons[0]} to {horizons[1]} nutations the error of the path stays the same with {same} of "
+        f"{len(shapes)} methods above rounding, at equal steps; the lag in the nutation grows {lag} times in the median"
     )
 
 

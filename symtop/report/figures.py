@@ -9,14 +9,19 @@ from symtop.report.style import LEAST_TEXT, ink
 
 SMALLEST = 1e-17  # where an error of exactly zero is drawn
 LOWEST = 1e-40  # below every panel
-BELOW = "below the error bound of the reference"
+BELOW = "below the reference's error bound"
+
+
+def bound_of(bounds: Any, least: float = 1e-16) -> float:
+    """The median error bound of the reference, or `least` without one."""
+    return float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else least
 
 
 def error_band(axis: Any, bounds: Any, least: float = 1e-16) -> float:
     """Shade all that lies below the median error bound of the reference; returns that bound, or `least` without one."""
     from matplotlib.patches import Rectangle
 
-    level = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else least
+    level = bound_of(bounds, least)
     shape = {"color": "#BBBBBB", "alpha": 0.45, "lw": 0, "label": BELOW, "transform": axis.get_yaxis_transform()}
     axis.add_artist(Rectangle((0.0, LOWEST), 1.0, level - LOWEST, **shape))  # to the frame, which it does not move
     return level

@@ -12,6 +12,7 @@ from symtop.judging.claims_order import measured_order
 from symtop.judging.ledger import CLAIMS
 from symtop.measure.order import BESIDE, order_verdict
 from symtop.methods.registry import integrator, methods, rows, split_name
+from symtop.report.figures import BELOW
 from symtop.runner import store
 from symtop.runner.study import Case
 
@@ -89,6 +90,23 @@ def test_the_first_figure_shows_the_five_named_methods_by_step_tolerance_and_wor
     assert steps == {"midpoint", "trapezoidal", "stormer-verlet"}
     assert energy == set()  # these cases have no history: they are not of the scene that has one
     assert not drawn[0].figure.axes[3].get_visible()
+
+
+def test_the_titles_have_numbers_that_their_figures_show(data):
+    _, constants, tolerance = figures.pictures(data)
+    for picture in (constants, tolerance):
+        title = " ".join(picture.figure.get_suptitle().split("\n"))
+        said = [text.get_text() for axis in picture.figure.axes for text in axis.texts]
+        assert said
+        assert any(text in title for text in said)
+    heads = [text for axis in constants.figure.axes for text in axis.get_yticklabels() if text.get_weight() == "bold"]
+    assert {text.get_text() for text in heads} == {"order 2", "order 4"}
+    for axis in tolerance.figure.axes:
+        assert {"error = tolerance", BELOW} <= set(axis.get_legend_handles_labels()[1])
+        (x, y) = next(line.get_data() for line in axis.get_lines() if line.get_label() == "error = tolerance")
+        assert list(x) == list(y)
+        assert x[0] < axis.get_xlim()[0]
+        assert x[-1] > axis.get_xlim()[1]
 
 
 def test_the_energy_over_time_is_that_of_the_run_that_it_names():

@@ -9,6 +9,7 @@ from symtop_studies.engines import documentation, figures, listed, study, tables
 
 import symtop
 from symtop.methods.registry import engines, integrator
+from symtop.report import style
 
 GOLDSTEIN = symtop.scene("goldstein")
 
@@ -135,6 +136,20 @@ def test_the_figures_name_every_row(measured):
     assert {text.get_text() for text in error.figure.axes[0].texts} >= set(words.rows(measured))
     for picture in (cost, shares):
         assert {label.get_text() for label in picture.figure.axes[0].get_yticklabels()} == set(words.rows(measured))
+
+
+def test_no_error_lies_outside_the_figure_of_costs(measured):
+    """And the numbers of its title, on the scene that the title names, are among those drawn."""
+    figure = figures.draw_cost(measured).figure
+    drawn = [[float(x) for line in axis.get_lines() for x in line.get_xdata()] for axis in figure.axes]
+    for axis, values in zip(figure.axes, drawn, strict=True):
+        low, high = axis.get_xlim()
+        assert low < min(values) <= max(values) < high
+    title = " ".join(figure.get_suptitle().split("\n"))
+    assert f"on scene {words.SLOW}" in title
+    off = [words.level(measured, row, words.USUAL) for row in words.rows(measured)]
+    assert all(style.number(value) in title and value in drawn[0] for value in (min(off), max(off)))
+    assert f"on scene {words.SLOW}" in " ".join(figures.draw_error(measured).figure.get_suptitle().split("\n"))
 
 
 def test_shares_count_tops_within_five_degrees(measured):

@@ -172,3 +172,9 @@ def test_every_target_has_a_row_of_the_picture(data):
     axes = picture.figure.axes
     assert len(axes) == 2 * len(runs.QUANTITIES)
     assert axes[0].images[0].get_array().shape[:2] == (len(TARGETS), runs.horizons()[::2].size)
+    said = " ".join(picture.figure.get_suptitle().split("\n"))
+    assert " is the cheapest in " in said
+    (key,) = picture.figure.legends
+    swatches = {text.get_text(): patch for text, patch in zip(key.get_texts(), key.get_patches(), strict=True)}
+    hatched = {patch.get_hatch() for axis in axes for patch in axis.patches}
+    assert hatched <= {swatches["hatched: foretold, not run"].get_hatch()}

@@ -1,6 +1,7 @@
 """The study of populations: scales and errors of many tops, the arithmetic of costs and shares, and its verdicts."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from symtop.measure.work import TARGETS, nutation_width
 from symtop.methods.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
+from symtop.report import style
 from symtop.report.style import look
 
 INF, NAN = math.inf, math.nan
@@ -330,11 +332,27 @@ def test_quick_results_hold_every_verdict(quick_results):
 @pytest.mark.parametrize("draw", [lambda data: figures.draw_run_lengths(data, "evaluations"), figures.draw_silent])
 def test_a_row_looks_as_in_every_other_figure(quick_results, draw):
     drawn = draw(datasets.read_any(quick_results / "population.nc")).figure
-    lines = [line for axis in drawn.axes for line in axis.get_lines() if not line.get_label().startswith("_")]
+    lines = [line for axis in drawn.axes for line in axis.get_lines() if line.get_label().endswith("]")]
     assert {line.get_label() for line in lines} > {"strang[axis]", "midpoint[angles]"}
     for line in lines:
         mark = look(line.get_label())
         assert (line.get_color(), line.get_marker(), line.get_fillstyle()) == (mark.color, mark.marker, mark.fill)
+
+
+def test_the_titles_say_what_their_figures_show(quick_results):
+    data = datasets.read_any(quick_results / "population.nc")
+    titles = {one.name: " ".join(one.figure.get_suptitle().split("\n")) for one in figures.pictures(data)}
+    assert "wins" not in titles["run-lengths-alone"]  # it shows who has solved how many tops
+    drawn = figures.draw_run_lengths(data, "alone").figure
+    said = {text.get_text().strip() for axis in drawn.axes for text in axis.texts}
+    named = re.findall(r" in (\S+)", titles["run-lengths-alone"].replace(style.FIRM, "_").replace(",", ""))
+    assert named
+    assert all(number.replace("_", " ") in said for number in named)
+    assert titles["slowdowns-short"].startswith("Over 10 nutations ")
+    assert titles["slowdowns-long"].startswith("Over 100 nutations ")
+    shares = re.findall(r"\d+%", titles["silent"])
+    drawn = figures.draw_silent(data).figure
+    assert shares == [text.get_text() for text in drawn.axes[1].texts]
 
 
 @pytest.mark.parametrize("quantity", ["axis", "attitude", "energy"])

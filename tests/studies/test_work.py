@@ -9,13 +9,23 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.work_precision import energy, opening, timing_rounds as rounds_module, words as work_words
+from matplotlib.legend import Legend
+from symtop_studies.work_precision import (
+    energy,
+    figures as work_figures,
+    opening,
+    rankings,
+    timing_rounds as rounds_module,
+    words as work_words,
+)
 from symtop_studies.work_precision.timing_rounds import Effort, TimedRun, contenders, timed_runs, timing_rounds
 
 import symtop
+from symtop.base import datasets
 from symtop.measure import ranking
 from symtop.measure.timing import Timing
 from symtop.measure.work import TARGETS, least_work, work_table
+from symtop.report.figures import BELOW
 from symtop.runner import depends, run as runner, store
 from symtop.runner.study import Case, Study
 
@@ -246,3 +256,38 @@ def test_a_study_may_have_a_second_round_made_from_the_first(tmp_path, monkeypat
     assert runner.run(study, tmp_path, quiet=True)["computed"] == 0
     alone = Case("spheroid", "midpoint", timed=True)
     assert depends.digest(study, alone) == depends.digest(study, dataclasses.replace(alone))
+
+
+def legends_of(axis):
+    found = [one for one in axis.get_children() if isinstance(one, Legend)]
+    return {text.get_text() for one in found for text in one.get_texts()}
+
+
+def test_a_front_names_the_methods_of_its_title_and_all_that_it_draws(quick_results):
+    data = datasets.read(quick_results / "work_precision.nc")
+    for picture in work_figures.pictures(data)[:3]:
+        title = " ".join(picture.figure.get_suptitle().split("\n"))
+        named = legends_of(picture.figure.axes[0])
+        owners = title.partition(" make")[0].split(" and ")
+        assert set(owners) <= named
+        assert {work_figures.FRONT, "other methods", BELOW} <= named
+        colored = {one.get_label() for axis in picture.figure.axes for one in axis.get_lines() if len(one.get_xdata())}
+        assert {label for label in named if label.endswith("]")} <= colored
+
+
+def test_the_title_of_slowdowns_names_the_fastest_before_the_one_that_fails_least():
+    table = xr.DataArray([[1.0, 1.0, np.nan], [50.0, 60.0, 70.0]], dims=("integrator", "problem"),
+                         coords={"integrator": ["quick", "sure"]})  # fmt: skip
+    assert rankings.slowdown_message(table) == (
+        "quick meets 2 of 3 targets, in the least time in the median; sure meets 3, in 60 times as much"
+    )
+    assert rankings.slowdown_message(table.sel(integrator=["sure"])) == (
+        "sure meets 3 of 3 targets, in 60 times the least time in the median"
+    )
+
+
+def test_the_title_of_the_parts_tells_what_stays_from_what_grows():
+    said = work_figures.growth_message(("10", "1000"), [1.0, 1.02, 99.0], [100.0, 101.0, 9e3])
+    assert "stays the same with 2 of 3 methods" in said
+    assert "grows 101 times" in said
+    assert "factor of 1" not in said
