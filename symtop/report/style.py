@@ -59,8 +59,7 @@ DASHES = {  # of a line, by family; a family that is not here has a solid one
     "splitting": (0, (6.0, 1.2)), "runge-kutta": (0, (3.0, 1.2)), "lie-group": (0, (6.0, 1.2, 1.0, 1.2)),
     "taylor": (0, (1.5, 0.8)), "library": (0, (1.0, 1.6)), "engine": (0, (3.0, 1.2, 1.0, 1.2)),
 }  # fmt: skip
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-FIRM = "\N{NO-BREAK SPACE}"
+RAISED, FIRM = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"), "\N{NO-BREAK SPACE}"
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
@@ -139,9 +138,8 @@ def look(name: str) -> Look:
 
 def line(name: str, scale: float = 1.0) -> dict[str, Any]:
     """What ``plot`` needs to draw an integrator or a row: colour, line, and marker of `scale` times its size."""
-    mark = look(name)
-    shape = {"color": mark.color, "ls": mark.dash, "marker": mark.marker, "fillstyle": mark.fill}
-    return shape | {"ms": scale * mark.size}
+    one = look(name)
+    return {"color": one.color, "ls": one.dash, "marker": one.marker, "fillstyle": one.fill, "ms": scale * one.size}
 
 
 def ink(color: str) -> tuple[float, ...]:
@@ -246,18 +244,15 @@ def number(value: float, digits: int = 2) -> str:
     """A number of a title as it is printed: ``10⁻⁶``, ``1.4 × 10⁻¹³``, ``0.012``, ``340``; no line breaks within it."""
     text = f"{value:.{digits}g}" if not 10.0**digits <= abs(value) < 1e4 else f"{value:.0f}"
     mantissa, mark, power = text.partition("e")
-    if not mark:
-        return text
-    ten = f"10{str(int(power)).translate(RAISED)}"
-    return ten if mantissa == "1" else f"{mantissa}{FIRM}×{FIRM}{ten}"
+    ten = f"10{str(int(power or 0)).translate(RAISED)}"
+    return text if not mark else ten if mantissa == "1" else f"{mantissa}{FIRM}×{FIRM}{ten}"
 
 
 def headline(figure: Any, message: str) -> None:
     """Write a figure's one message above it, in lines of about the same length."""
     most = round(12.3 * figure.get_figwidth())
-    lines = textwrap.wrap(message, most, break_on_hyphens=False)
-    shorter = (textwrap.wrap(message, width, break_on_hyphens=False) for width in range(most // 2, most))
-    lines = next((found for found in shorter if len(found) == len(lines)), lines)  # no last line of a single word
+    wrapped = [textwrap.wrap(message, width, break_on_hyphens=False) for width in range(most // 2, most + 1)]
+    lines = next(found for found in wrapped if len(found) == len(wrapped[-1]))  # no last line of a single word
     figure.suptitle("\n".join(lines), x=0.01, ha="left", weight="bold")
 
 
@@ -350,8 +345,6 @@ def slope_guide(axis: Any, power: float, x: tuple[float, float], y: float, label
     axis.plot(ends, y * (ends / ends[0]) ** power, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
     middle = float(np.sqrt(ends[0] * ends[1]))
     place = middle, y * (middle / ends[0]) ** power
-    rises = (power > 0.0) != axis.xaxis_inverted()
-    side, shift = ("left", 3) if rises else ("right", -3)
-    axis.annotate(
-        label, place, (shift, -2), textcoords="offset points", color="#444444", fontsize=7.5, va="top", ha=side
-    )
+    side, shift = ("left", 3) if (power > 0.0) != axis.xaxis_inverted() else ("right", -3)
+    said = {"color": "#444444", "fontsize": 7.5, "va": "top", "ha": side}
+    axis.annotate(label, place, (shift, -2), textcoords="offset points", **said)
