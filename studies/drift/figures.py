@@ -75,8 +75,8 @@ def _residuals(histories: xr.Dataset) -> Picture:
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
     few_ticks(*axes.flat)
-    axes[0, 0].plot([], [], " ", label="markers: largest in a span of time")
-    axes[0, 0].plot([], [], ",", color=GREY, label="dots: single samples")
+    told = "markers: the largest in a span of time\ndots: single samples"  # where every panel of p_phi is empty
+    axes[1, 0].text(0.98, 0.45, told, transform=axes[1, 0].transAxes, ha="right", va="center", **NOTE)
     style.legend_below(figure, axes)
     headline(figure, messages.residuals(data))
     caption = (
