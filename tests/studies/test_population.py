@@ -135,7 +135,10 @@ def test_samples_fall_on_the_same_times_at_every_step(tops):
     assert np.diff(phases).max() < 0.25  # they see all phases of the nutation
 
 
-@pytest.mark.parametrize("name", ["strang[axis]", "midpoint[angles]", "rk4[attitude]", "rk45-compiled[axis]"])
+EACH = ("strang[axis]", "midpoint[angles]", "stormer-verlet-reversible[angles]", "rk4[attitude]", "rk45-compiled[axis]")
+
+
+@pytest.mark.parametrize("name", EACH)
 def test_errors_of_many_runs_are_those_of_each(tops, name):
     row, chosen = integrator(name), np.flatnonzero(strata_of(60, 3) < 2)[:4]
     level = 5 if row.fixed_step else 4
@@ -150,6 +153,14 @@ def test_errors_of_many_runs_are_those_of_each(tops, name):
         for quantity in set(ASKED) & many.keys():  # a dozen samples against a thousand
             assert 0.3 * alone[quantity] <= many[quantity][k] <= 1.001 * alone[quantity] + 1e-14
         assert many[MOMENTA][k] <= max(alone["p_phi"], alone["p_psi"]) * 1.001 + 1e-14
+
+
+def test_runs_in_turn_are_those_of_a_shared_loop(tops, monkeypatch):
+    row, chosen = integrator("stormer-verlet[angles]"), np.arange(6)
+    shared = ladder.run_level(row, tops, chosen, 5, 1e6)
+    monkeypatch.setattr(ladder, "inside", lambda _: None)
+    for one, other in zip(shared, ladder.run_level(row, tops, chosen, 5, 1e6), strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
 
 
 def test_a_failed_run_has_an_infinite_error(tops):
