@@ -92,8 +92,7 @@ _LOOKS = {
     "rk45": Look(VERMILLION, "D"), "dop853": Look(VERMILLION, "o"), "lsoda": Look(REDS[1], "s"),
     "radau": Look(REDS[2], "v"),
     "taylor": Look(BLACK, "*", 6.0), "taylor-longdouble": Look(BLACK, "o"), "taylor-quad": Look(BLACKS[1], "s"),
-    "series": Look(BLACKS[1], "D"), "series-adaptive": Look(BLACKS[1], "^"),
-    "exact": Look(GREY, "x"),
+    "series": Look(BLACKS[1], "D"), "series-adaptive": Look(BLACKS[1], "^"), "exact": Look(GREY, "x"),
     "no-gyro": Look(SKY, "o"), "no-gyro-float32": Look(SKIES[2], "o"), "no-gyro-linear": Look(SKIES[1], "o"),
     "mujoco-euler": Look(SKIES[1], "s"), "mujoco-implicit": Look(SKIES[2], "s"), "bullet": Look(SKY, "v"),
     "bullet-float32": Look(SKIES[2], "v"), "jolt": Look(SKY, "^"), "jolt-float32": Look(SKIES[2], "^"),
@@ -250,8 +249,8 @@ def number(value: float, digits: int = 2) -> str:
 
 def headline(figure: Any, message: str) -> None:
     """Write a figure's one message above it, in lines of about the same length."""
-    most = round(12.3 * figure.get_figwidth())
-    wrapped = [textwrap.wrap(message, width, break_on_hyphens=False) for width in range(most // 2, most + 1)]
+    widths = range(round(6.15 * figure.get_figwidth()), round(12.3 * figure.get_figwidth()) + 1)
+    wrapped = [textwrap.wrap(message, width, break_on_hyphens=False) for width in widths]
     lines = next(found for found in wrapped if len(found) == len(wrapped[-1]))  # no last line of a single word
     figure.suptitle("\n".join(lines), x=0.01, ha="left", weight="bold")
 
@@ -259,7 +258,8 @@ def headline(figure: Any, message: str) -> None:
 def panels(rows: int, columns: int, width: float = WIDTH, height: float = 2.3, **options: Any) -> Any:
     """A grid of axes, always two-dimensional, with room for a title above and a legend below; sizes in inches."""
     use()
-    return plt.subplots(rows, columns, figsize=(width, height * rows + 0.8), squeeze=False, **options)
+    tall = max(2.6, height * rows + 0.8)  # a study of one method has few rows, and its legend needs the room
+    return plt.subplots(rows, columns, figsize=(width, tall), squeeze=False, **options)
 
 
 def grid(count: int, columns: int, labels: tuple[str, str] = ("", ""), **options: Any) -> Any:
