@@ -77,7 +77,9 @@ def _message(data: xr.Dataset, known: dict[str, list[str]]) -> str:
     gains = _gains(data, known)
     if not gains:
         return ""
-    return f"SciPy's solve_ivp takes {gains[0]} as long as symtop in a public call, {gains[1]} as an inner loop"
+    return (
+        f"SciPy's solve_ivp, compiled, takes {gains[0]} as long as symtop in a public call, {gains[1]} as an inner loop"
+    )
 
 
 def _gain(data: xr.Dataset, known: dict[str, list[str]]) -> str:

@@ -255,8 +255,8 @@ def _by_tolerance(data: xr.Dataset) -> Picture:
         )
         headline(
             figure,
-            f"Errors of adaptive methods are {number(middle)} times the tolerance in the median, {number(most)} times "
-            "at most",
+            f"Where the tolerance rules, the error of adaptive methods is {number(middle)} times the tolerance in the "
+            f"median, {number(most)} times at most",
         )
     slopes = {name: [fit.slope for pair, fit in fitted.items() if pair[1] == name and np.isfinite(fit.slope)]
               for name in labels}  # fmt: skip

@@ -137,7 +137,7 @@ def draw_constants(data: xr.Dataset) -> Picture:
     axes[0, 2].set(xscale="log", yscale="log", xlim=(1e-3, 0.7), ylim=(1e-7, 20.0), xlabel="step size over T")
     axes[0, 2].set_title("distance from the limit")
     style.few_ticks(axes[0, 2], most=4)
-    style.headline(figure, "The constant A of the exact map stays between -1 and 1 (dotted) at long steps, where its "
+    style.headline(figure, "The constant A of the exact map stays above -1 (dotted) at long steps, where its "
                            "limit of small steps, a parabola, does not")  # fmt: skip
     return Picture(
         "quartic-constants",

@@ -125,8 +125,8 @@ def message(data: xr.DataTree) -> str:
     each = []
     for row, ((first, quantity), *others) in shares.items():
         rest = "".join(f", {share:.0%} for {other}" for share, other in others)
-        each.append(f"{row} is the cheapest in {first:.0%} of the cells for {quantity}{rest}")
-    return f"On {named(name)} {'; '.join(each)}"
+        each.append(f"{row} is the cheapest in {first:.0%} for {quantity}{rest}")
+    return f"On {named(name)}, of the cells that some method reaches, {'; '.join(each)}"
 
 
 def population_sentence(data: xr.DataTree) -> str:

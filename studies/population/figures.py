@@ -169,7 +169,7 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
     style.legend_below(figure, axes)
     figure.legends[0].set_title(
         f"Sorted by wins: tops on which all others cost at least {TIE:g} times as much, of those that some method "
-        "solves.\nLeft out: methods that solve less than half of them."
+        f"solves.\nThe first {SHOWN} of the methods that solve at least half of them."
     )
     headline(figure, messages.slowdowns(data, horizon))
     return Picture(
@@ -265,7 +265,7 @@ def draw_silent(data: xr.DataTree) -> Picture:
     style.legend_below(figure, axes)
     figure.legends[0].set_title(
         f"{words.span(data, 'short')}. Healthy: a run that ends without an error and keeps energy and momenta to "
-        f"{KEPT:.0%}.\nRight: lines end where less than 1 % of the runs are wrong."
+        f"{KEPT:.0%}.\nLines end at the most steps tried; right, also where less than 1 % of the runs are wrong."
     )
     headline(figure, messages.silent(data))
     return Picture(

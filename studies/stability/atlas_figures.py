@@ -192,6 +192,10 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
             axis.set_xlabel(SHORT[one.control], fontsize=LEAST_TEXT, labelpad=1.0)
     figure.supylabel(AXES[over], fontsize=8.0)
     _key(figure, drawn)
+    if NOT_TRIED in drawn:
+        settings = next(iter(compared.values())).settings
+        told = f"Shares count what was tried with all: {settings[0]:.1g} to {settings[-1]:.1g}"
+        figure.legends[0].set_title(told, {"size": LEAST_TEXT})
     return figure
 
 

@@ -40,7 +40,8 @@ def _pole(part: xr.Dataset) -> str:
     most = max(growth, default=np.nan)
     if not np.isfinite(most):
         return text
-    return f"{text}; the {len(growth)} in other charts err at most {number(max(most, 1.0))} times as much as far away"
+    grown = f"err at most {number(max(most, 1.0))} times as much as beyond {number(FAR, 1)} rad"
+    return f"{text}; the {len(growth)} in other charts {grown}"
 
 
 def _resonances(part: xr.Dataset) -> str:
