@@ -1,13 +1,25 @@
 """A clock on the terminal that goes on while one piece of work takes long, such as a compilation."""
 
 import contextlib
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from typing import Any
 
-from tqdm import tqdm
-
 BEAT = 1.0  # seconds from one look of the clock to the next
+CLOCK = """
+import signal, sys, threading, time
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+words, beat, began, ended = sys.argv[1], float(sys.argv[2]), time.monotonic(), threading.Event()
+threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
+while True:
+    minutes, seconds = divmod(int(time.monotonic() - began), 60)
+    print(f"\\r{words}: {minutes:02d}:{seconds:02d}", end="", file=sys.stderr, flush=True)
+    if ended.wait(beat):
+        break
+print("\\r\\x1b[K", end="", file=sys.stderr, flush=True)
+"""
 
 
 @contextlib.contextmanager
@@ -32,7 +44,19 @@ def beating(bar: Any) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def ticking(words: str) -> Iterator[Any]:
-    """Some words and the time since, on the standard error if that is a terminal, drawn each second until the end."""
-    with beating(tqdm(desc=words, bar_format="{desc}: {elapsed}", disable=None, leave=False)) as bar:
-        yield bar
+def ticking(words: str) -> Iterator[None]:
+    """Some words and the time since, on the standard error if that is a terminal, drawn each second until the end.
+
+    A process of its own draws them: a compiler that holds Python's lock, as heyoka's does for seconds, stops threads.
+    """
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield
+        return
+    command = [sys.executable, "-I", "-S", "-c", CLOCK, words, str(BEAT)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as clock:  # noqa: S603  (our own words)
+        try:
+            yield
+        finally:
+            assert clock.stdin is not None  # noqa: S101
+            clock.stdin.close()  # which ends it, as the end of this process would
+            clock.wait()

@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 import time
 
 import pytest
@@ -220,6 +221,33 @@ def test_a_cold_ensemble_is_never_silent_for_long(tmp_path):
     assert recording.code == 0, recording.text
     assert recording.silence < 2.0
     assert recording.widest <= 80
+
+
+LOCKED = """
+import ctypes
+import symtop
+rk4 = symtop.integrator("rk4").solvers["axis"]
+def holds_the_lock(*asked):
+    ctypes.PyDLL(None).usleep(2_500_000)  # as a compiler in C++ does, which no thread of Python can interrupt
+    return rk4(*asked)
+symtop.register(
+    symtop.Integrator(
+        name="holds-the-lock", family="other", summary="", solvers={"axis": holds_the_lock}, order=4,
+        implementation="python",
+    )
+)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the C library is loaded by another name there")
+def test_the_clock_goes_on_while_somebody_holds_the_lock_of_python(tmp_path):
+    (tmp_path / "locked.py").write_text(LOCKED, encoding="utf-8")
+    words = ["run", "spheroid", "holds-the-lock", "--step-size", "0.01", "--no-guard"]
+    recording = recorded([*words, "--plugin", str(tmp_path / "locked.py")])
+    assert recording.code == 0, recording.text
+    assert "running: 00:02" in recording.text
+    assert recording.silence < 2.0
+    assert recording.text.rindex("running: ") < recording.text.index("holds-the-lock[axis] on spheroid: reached")
 
 
 def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
