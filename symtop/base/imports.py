@@ -2,7 +2,7 @@
 
 A package is known by its name and folder (`roots`). Statements are found wherever they stand, also within functions;
 what imports a module under a name that is made at run time is not seen. Files of `PLUMBING` move numbers and make none:
-bad input, labels, caches and fingerprints, and every ``__init__.py``.
+bad input, labels, caches, clocks and fingerprints, and every ``__init__.py``.
 """
 
 import ast
@@ -14,7 +14,7 @@ from pathlib import Path
 PACKAGE = Path(__file__).resolve().parent.parent
 PLUMBING = frozenset(
     Path(__file__).resolve().with_name(f"{name}.py")
-    for name in ("cache", "datasets", "fingerprint", "imports", "signals", "validate", "walk")
+    for name in ("cache", "clock", "datasets", "fingerprint", "imports", "progress", "signals", "validate", "walk")
 )
 roots: dict[str, Path] = {PACKAGE.name: PACKAGE}  # name of a package: its folder
 Imported = tuple[str, tuple[str, ...]]  # module, names

@@ -5,21 +5,11 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 BEAT = 1.0  # seconds from one look of the clock to the next
-CLOCK = """
-import signal, sys, threading, time
-signal.signal(signal.SIGINT, signal.SIG_IGN)
-words, beat, began, ended = sys.argv[1], float(sys.argv[2]), time.monotonic(), threading.Event()
-threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
-while True:
-    minutes, seconds = divmod(int(time.monotonic() - began), 60)
-    print(f"\\r{words}: {minutes:02d}:{seconds:02d}", end="", file=sys.stderr, flush=True)
-    if ended.wait(beat):
-        break
-print("\\r\\x1b[K", end="", file=sys.stderr, flush=True)
-"""
+CLOCK = Path(__file__).with_name("clock.py")  # run as a script
 
 
 @contextlib.contextmanager
@@ -52,7 +42,7 @@ def ticking(words: str) -> Iterator[None]:
     if sys.stderr is None or not sys.stderr.isatty():
         yield
         return
-    command = [sys.executable, "-I", "-S", "-c", CLOCK, words, str(BEAT)]
+    command = [sys.executable, "-I", "-S", str(CLOCK), words, str(BEAT)]
     with subprocess.Popen(command, stdin=subprocess.PIPE) as clock:  # noqa: S603  (our own words)
         try:
             yield
