@@ -19,7 +19,11 @@ from .words import LEGEND, SYMBOLS, count_words
 MARKED = ("midpoint", "strang", "galerkin-simpson", "sofroniou-spaletta-10", "gauss-4", "gauss-12", "rk4", "rk45")
 REFINED = 100.0  # a defect that falls by more than this over the differencing widths is an error of the differencing
 WORST = ("refuted", "undecided", "confirmed", "measured", "inapplicable")  # in a cell, from the left
-VERDICTS_SAID = {"measured": "measured, not claimed", "inapplicable": "does not apply"}
+VERDICTS_SAID = {
+    "confirmed": "claim confirmed, yes or no",
+    "measured": "measured, not claimed",
+    "inapplicable": "does not apply",
+}
 TITLES = {"runge-kutta": "Runge-Kutta", "lie-group": "Lie-group", "taylor": "Taylor", "discrete-lagrangian":
           "discrete-Lagrangian"}  # fmt: skip
 ROWS = {  # what a name alone does not say

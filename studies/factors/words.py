@@ -156,8 +156,10 @@ def waterfall_message(shown: Sequence[tuple[str, float, float, list[Bar]]]) -> s
     bars = shown[0][-1]
     factor = max(bars[1:], key=lambda bar: bar.ratio).factor
     gains = [max(bar.ratio for bar in part[1:] if bar.factor == factor) for *_, part in shown]
-    orders = ["the call changed last" if part[-1].factor == "call" else "the call changed first" for *_, part in shown]
-    said = ", ".join(f"{times_faster(gain)} times with {order}" for gain, order in zip(gains, orders, strict=True))
+    orders = ["last" if part[-1].factor == "call" else "first" for *_, part in shown]
+    said = ", ".join(
+        f"{times_faster(gain)} times if the call is made bare {at}" for gain, at in zip(gains, orders, strict=True)
+    )
     whole = times_faster(bars[0].time.seconds / bars[-1].time.seconds)
     return f"The largest step of the gain of {whole} times is the {factor}: {said}"
 

@@ -95,7 +95,7 @@ def draw_residuals(data: xr.Dataset) -> Picture:
     for line, name in zip(axes, CONSTANTS, strict=True):
         values = solver[name] - (solver[name].mean() if name == "energy" else solver[name][0])
         line[0].plot(solver[Column.SAMPLE_TIME], values, color=style.look(SOLVER).color, lw=1.0)
-        line[0].set_ylabel(LABELS[name])
+        line[0].set_ylabel(f"change of {LABELS[name]}")
         line[0].ticklabel_format(axis="y", scilimits=(-2, 2))
         for axis, part in zip(line[1:], PARTS, strict=True):
             for method in data["integrator"].values:

@@ -83,7 +83,7 @@ def draw_orbits(data: xr.Dataset) -> Picture:
     far = {method: quartic.off_curve(data, DRAWN[0], method) for method in MAPS}
     off = style.number(min(value for method, value in far.items() if method != MAPS[0]))
     at = f"with steps of T/{quartic.SHOWN[-1]:g} on {DRAWN[0]} the others are off it by {off} at least"
-    style.headline(figure, f"Only {MAPS[0]} stays on the curve of the motion: {at}")
+    style.headline(figure, f"At every step {MAPS[0]} stays on the curve of the motion: {at}")
     away = ", ".join(f"{method} {quartic.off_curve(data, DRAWN[0], method):.1g}" for method in MAPS[1:])
     return Picture(
         "quartic-orbits",
@@ -105,7 +105,7 @@ def _outside(orbits: xr.Dataset, low: float, high: float) -> str:
         values = orbits[quartic.ORBIT].sel(integrator=method).values
         out = int(np.sum(~((values >= low) & (values <= high))))
         if out:
-            parts.append(f"{method}:\n{out} of {values.size} points\nare outside")
+            parts.append(f"{method}:\n{out} of {values.size} points\noff the chart")
     return "\n".join(parts)
 
 

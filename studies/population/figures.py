@@ -102,7 +102,7 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
         axis.set_xlim(scale * budgets[0], scale * budgets[-1])
         axis.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
         if lacking:
-            said = f"below {LEAST:.0%} within the budget:\n" + "\n".join(lacking)
+            said = f"below {LEAST:.0%} at any cost drawn:\n" + "\n".join(lacking)
             axis.text(0.02, 0.97, said, transform=axis.transAxes, fontsize=LEAST_TEXT, color="#444444", va="top")
     axes[0].plot([], [], color=style.GREY, lw=0.8, label=OTHERS)
     axes[0].plot([], [], "o", color="black", ms=7, mfc="none", mew=1.2, label="first to half of the tops")

@@ -54,9 +54,11 @@ def run_lengths(data: xr.DataTree, unit: str, horizon: str) -> str:
     said = [f"to {ten(target)} in {number(known[target].cost)}{FIRM}{makes}" for target in ends]
     names = [known[target].name for target in ends]
     if len(set(names)) == 1:
-        return f"{over(data, horizon).capitalize()} {names[0]} solves half of the tops first: {', '.join(said)}"
+        return (
+            f"{over(data, horizon).capitalize()} {names[0]} is the first to solve half of the tops: {', '.join(said)}"
+        )
     each_by = [f"by {name} {words}" for name, words in zip(names, said, strict=True)]
-    return f"{over(data, horizon).capitalize()} half of the tops are solved first {', '.join(each_by)}"
+    return f"{over(data, horizon).capitalize()} half of the tops are first solved {', '.join(each_by)}"
 
 
 def slowdowns(data: xr.DataTree, horizon: str) -> str:

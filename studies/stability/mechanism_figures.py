@@ -139,10 +139,10 @@ def _separatrix(axis: Any, data: xr.Dataset) -> None:
         look = {"color": marks["color"], "ms": 1.2 * marks["ms"], "zorder": 3} if named else other
         axis.plot(x, y, marks["marker"], fillstyle=marks["fillstyle"], label=name if named else None, **look)
     error = np.geomspace(1e-16, 0.1, 50)
-    axis.plot(error, SEEN + 2.0 * np.log(LOST / error), label=r"theory: $6/g + (2/g)\,\ln\,(0.1/e)$", **GUIDE)
+    axis.plot(error, SEEN + 2.0 * np.log(LOST / error), label=r"theory: $(6 + 2\,\ln\,(0.1/e))/\lambda$", **GUIDE)
     axis.plot([], [], ".", color=GREY, ms=4.0, alpha=0.5, label="all other methods")
-    axis.set(xscale="log", xlabel=rf"axis error $e$ at the time ${SEEN:g}/g$ (rad), $g = \sqrt{{mgl/I_1}}$")
-    axis.set(ylabel=f"time to an error of {LOST:g} rad (1/g)")
+    axis.set(xscale="log", xlabel=rf"axis error $e$ at the time ${SEEN:g}/\lambda$ (rad), $\lambda = \sqrt{{mgl/I_1}}$")
+    axis.set(ylabel=f"time to an error of {LOST:g} rad ($1/\\lambda$)")
     if apart := outlasting(data):
         late = data[Column.HORIZON].sel(integrator=apart)
         listed = textwrap.fill(", ".join(apart), 40)

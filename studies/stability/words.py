@@ -33,7 +33,7 @@ LOOSE = 10.0  # times the change of the solved equation: lost because the solver
 BARELY = 0.02  # rad: a largest surviving displacement below this counts as none
 REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
 LEAST_SAMPLED = 1e-14  # an energy error that is rounding
-OUTLASTS = 10.0  # 1/g: two and a half digits more than the early error has
+OUTLASTS = 10.0  # 1/λ: two and a half digits more than the early error has
 EARLY = 1e-15, 1e-2  # rad, axis errors that predict the time next to a separatrix: above rounding, still small
 
 
@@ -62,7 +62,7 @@ def held_fixed(data: xr.Dataset, mechanism: str) -> str:
     elif mechanism == "sleeping":
         text = "Scene sleeping, linearised about the upright"
     elif mechanism == "separatrix":
-        text = f"Scene separatrix, to {LONGEST:g}/g, a point for each step or tolerance"
+        text = f"Scene separatrix, to {LONGEST:g}/λ, a point for each step or tolerance"
     elif mechanism == "sampling":
         steps, periods = of("goldstein", Column.SAMPLED_STEPS, Column.SAMPLED_PERIODS)
         text = f"Scene goldstein, {steps:.0f} steps a nutation, {periods:.0f} nutations"
@@ -180,7 +180,7 @@ def foreseen(part: xr.Dataset) -> xr.Dataset:
 
 
 def misses(part: xr.Dataset) -> NDArray[np.float64]:
-    """By how much the law misses the accurate time of the runs to which it applies, in units of 1/g."""
+    """By how much the law misses the accurate time of the runs to which it applies, in units of 1/λ."""
     runs = foreseen(part)
     gap = np.abs(runs[Column.HORIZON] - runs[Column.PREDICTED_HORIZON]).values
     return np.asarray(gap[np.isfinite(gap)])
@@ -192,14 +192,14 @@ def horizons(part: xr.Dataset) -> str:
     if not gap.size:
         return ""
     text = (
-        "The separatrix is the motion that rises towards the upright for ever; its time scale is 1/g = sqrt(I1/mgl). "
-        f"Next to it errors grow as exp(g t/2). From the error at time {SEEN:g}/g this predicts when {gap.size} runs "
-        f"reach an axis error of {LOST:g} rad; the median miss is {np.median(gap):.2f}/g, the largest "
-        f"{np.max(gap):.1f}/g, and the longest run takes {float(foreseen(part)[Column.HORIZON].max()):.0f}/g. Methods "
+        "The separatrix is the motion that rises towards the upright for ever; its time scale is 1/λ = sqrt(I1/mgl). "
+        f"Next to it errors grow as exp(λ t/2). From the error at time {SEEN:g}/λ this predicts when {gap.size} runs "
+        f"reach an axis error of {LOST:g} rad; the median miss is {np.median(gap):.2f}/λ, the largest "
+        f"{np.max(gap):.1f}/λ, and the longest run takes {float(foreseen(part)[Column.HORIZON].max()):.0f}/λ. Methods "
         "that conserve the energy are not among them"
     )
     apart = outlasting(part)
-    return f"{text}; the prediction is outlasted by more than {OUTLASTS:g}/g with {', '.join(apart) or 'none'}."
+    return f"{text}; the prediction is outlasted by more than {OUTLASTS:g}/λ with {', '.join(apart) or 'none'}."
 
 
 def sampling(part: xr.Dataset) -> str:

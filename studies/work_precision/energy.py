@@ -169,8 +169,8 @@ def message(data: xr.Dataset, chart: str) -> str:
     if not parts:
         return "Energy errors at equal run time"
     return (
-        f"Structure-preserving methods keep energy better at every run time than {', than '.join(parts)} of the pairs "
-        "of a method and a scene"
+        "At every run time that both have, structure-preserving methods keep energy better than "
+        f"{', than '.join(parts)} of the pairs of a method and a scene"
     )
 
 

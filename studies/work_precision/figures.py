@@ -51,7 +51,7 @@ COSTS = {"seconds": "wall time of one run (s)", "force_evaluations": "force eval
 SAME = 1.5  # an error that grows less stays the same
 LEAST = 1e-15  # the lowest error that is drawn, where the reference has no bound
 OTHERS = {"color": GREY, "lw": 0.5, "alpha": 0.5, "zorder": 1}  # a line without a name
-FRONT = "front of compiled methods"
+FRONT = "front of all compiled methods"
 FILLS = "Open markers: Euler angles; full ones: (e, L)."
 
 
@@ -241,7 +241,7 @@ def growth_message(horizons: tuple[str, str], shapes: Sequence[float], lags: Seq
     """How the errors of the path and of the nutation's phase grow from one horizon to another at equal steps."""
     same, lag = sum(value < SAME for value in shapes), number(float(np.median(lags)))
     return (
-        f"From {horizons[0]} to {horizons[1]} nutations the error of the path stays the same with {same} of "
+        f"From {horizons[0]} to {horizons[1]} nutations the shape error stays the same with {same} of the "
         f"{len(shapes)} methods above rounding, at equal steps; the lag in the nutation grows {lag} times in the median"
     )
 

@@ -64,8 +64,10 @@ def winners(data: xr.Dataset) -> Picture:
     if ranks:
         first, times = ranks[0]
         others = len({won.best.integrator for won in met}) - 1
+        close = sum(won.level for won in met if won.best.integrator == first)
+        noise = f", {close} of them within the noise" if close else ""
         rest = f", {others} other{'s' * (others > 1)} in the rest" if others else ""
-        headline(figure, f"{first} is the fastest in {times} of {len(met)} cells{rest}")
+        headline(figure, f"{first} is the fastest in {times} of {len(met)} cells{noise}{rest}")
     return Picture(
         "winners",
         figure,
@@ -135,7 +137,9 @@ def slowdown_message(merged: xr.DataArray) -> str:
     if not np.isfinite(middle[best]):
         return "No method meets half of the targets"
     times = "" if middle[best] < LEVEL else f"{number(float(middle[best]))} times "
-    first = f"{names[best]} meets {met[best]} of {asked} targets, in {times}the least time in the median"
+    first = (
+        f"{names[best]} meets {met[best]} of {asked} targets that can be met, in {times}the least time in the median"
+    )
     if met[surest] <= met[best] or not np.isfinite(middle[surest]):
         return first
     return f"{first}; {names[surest]} meets {met[surest]}, in {number(float(middle[surest]))} times as much"

@@ -258,7 +258,7 @@ def test_figures_tables_and_sentences_come_from_the_dataset(measured):
         _, _, _, bars = words.waterfalls(measured, call_first=order)[0]
         factor = said.partition(" times is the ")[2].partition(":")[0]
         largest = max(bar.ratio for bar in bars[1:] if bar.factor == factor)
-        assert f"{words.times_faster(largest)} times with the call changed {'first' if order else 'last'}" in said
+        assert f"{words.times_faster(largest)} times if the call is made bare {'first' if order else 'last'}" in said
     text = " ".join(words.verdict(measured))
     for phrase in ("rk45[angles] called through solve_ivp", "in the inner loop", "Dormand-Prince: a compiled run"):
         assert phrase in text
