@@ -35,7 +35,7 @@ def inner(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Inner:
     if fixed is not None:
         ends = Plan.steps(plan.step_size, plan.marks[-1:])
         return Inner(lambda: fixed(top, start, ends), lambda run: run.states[-1])
-    if method.family == "taylor":
+    if method.name == "taylor":
         stepper = taylor.stepper(chart, "double", plan.tolerance)
         numbers, parameters = taylor.start_numbers(chart, "double", top, start)
         begin, par, horizon = np.array(numbers), np.array(parameters[: stepper.pars.size]), plan.horizon

@@ -69,7 +69,7 @@ def _gains(data: xr.Dataset, known: dict[str, list[str]]) -> list[str]:
     spans = [summary.span(data, call, known.get(OURS, []), theirs) for call in NAMES]
     if not theirs or None in spans:
         return []
-    return [f"{low:.2g} to {high:{'.2g' if high < 100.0 else '.0f'}} times" for low, high in spans]  # type: ignore[misc]
+    return [f"{summary.printed(low)} to {summary.printed(high)} times" for low, high in spans]  # type: ignore[misc]
 
 
 def _message(data: xr.Dataset, known: dict[str, list[str]]) -> str:
@@ -78,7 +78,8 @@ def _message(data: xr.Dataset, known: dict[str, list[str]]) -> str:
     if not gains:
         return ""
     return (
-        f"SciPy's solve_ivp, compiled, takes {gains[0]} as long as symtop in a public call, {gains[1]} as an inner loop"
+        f"SciPy's solve_ivp, compiled, takes {gains[0]} as long as symtop's methods for this top in a public call, "
+        f"{gains[1]} as an inner loop"
     )
 
 

@@ -94,8 +94,13 @@ def span(data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str]
     return (min(ratios), max(ratios)) if ratios else None
 
 
+def printed(value: float) -> str:
+    """A ratio of times as it is printed: ``1.06``, ``23.4``, ``1,110``."""
+    return f"{value:.3g}" if value < 100.0 else f"{float(f'{value:.3g}'):,.0f}"
+
+
 def _range(ratios: tuple[float, float] | None) -> str:
-    return "not reached" if ratios is None else f"{ratios[0]:.3g} to {ratios[1]:.3g}"
+    return "not reached" if ratios is None else f"{printed(ratios[0])} to {printed(ratios[1])}"
 
 
 def verdict(data: xr.Dataset) -> list[str]:
@@ -169,7 +174,7 @@ def _cells(data: xr.Dataset, scene: str, target: float, rows: Sequence[str], our
         if theirs is None:
             cells += ["", "not reached", ""]
             continue
-        times = "" if mine is None else f"{theirs.timing.best / mine.timing.best:.3g}"
+        times = "" if mine is None else printed(theirs.timing.best / mine.timing.best)
         cells += [theirs.row, shown(theirs.timing.best) + ("" if theirs.timing.reliable else " (noisy)"), times]
     return cells
 

@@ -64,7 +64,7 @@ def winners(data: xr.Dataset) -> Picture:
     if ranks:
         first, times = ranks[0]
         others = len({won.best.integrator for won in met}) - 1
-        close = sum(won.level for won in met if won.best.integrator == first)
+        close = sum(bool(won.level) for won in met if won.best.integrator == first)
         noise = f", {close} of them within the noise" if close else ""
         rest = f", {others} other{'s' * (others > 1)} in the rest" if others else ""
         headline(figure, f"{first} is the fastest in {times} of {len(met)} cells{noise}{rest}")

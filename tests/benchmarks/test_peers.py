@@ -249,3 +249,13 @@ def test_compiling_is_not_taken_for_a_slow_solver(scene, monkeypatch):
     monkeypatch.setattr(measure, "accuracy", run)
     assert len(measure.search(scene, method)) == 5
     assert calls[0] == calls[1]
+
+
+# ---- our own rows ----------------------------------------------------------------------------------------------------
+
+
+def test_own_rows_are_those_that_integrate_and_heyokas_is_one_alone(scene, monkeypatch):
+    wanted = ("exact", "exact-discrete", "series", "taylor", "strang")
+    monkeypatch.setattr(measure, "methods", lambda: {name: symtop.integrator(name) for name in wanted})
+    packages = {peer.method.name: peer.package for peer, _ in measure.ours(scene, lambda _: None)}
+    assert packages == {"series": measure.OURS, "strang": measure.OURS, "taylor": measure.HEYOKA}
