@@ -125,11 +125,11 @@ def _caches() -> list[Finding]:
 
     root, yesterday = cache_root(), time.time() - DAY
     findings = [_writable("cache", root, "set SYMTOP_CACHE to a folder that can be written")]
-    for name, kind, remedy in (("kernels", "kernels", "compiled again"), ("reference", "files", "computed again")):
+    for name, kind, remedy in (("kernels", "kernel", "compiled again"), ("reference", "file", "computed again")):
         entries = by_last_use(root / name)
         size = sum(map(size_of, entries))
         recent = sum(entry.stat().st_mtime >= yesterday for entry in entries)
-        result = f"{len(entries)} {kind}, {_bytes(size)}"
+        result = f"{len(entries)} {kind}{'s' * (len(entries) != 1)}, {_bytes(size)}"
         result += f", {recent} of them used or made within a day" if entries else ""
         advice = f"{root / name} may be deleted at any time; what is needed is {remedy}"
         findings.append(Finding(f"{name} cache", result, size < LARGE_CACHE, advice))
@@ -180,7 +180,7 @@ def _self_check() -> list[Finding]:
     for name, step, allowed in runs:
         data = simulate("spheroid", name, step_size=step, samples=41, observe="attitude", guard=False)
         gap = float(np.max(np.abs(data["axis"].values - exact["axis"].values)))
-        result = f"{gap:.1e} rad from the closed form on spheroid (allowed {allowed:g})"
+        result = f"{gap:.1e} rad from the truth on spheroid (allowed {allowed:g})"
         findings.append(Finding(name, result, gap <= allowed, wrong))
     return [*findings, Finding("self-check", f"{time.perf_counter() - began:.1f} s")]
 

@@ -195,3 +195,49 @@ def test_what_cannot_be_written_or_counted_is_refused(words, said):
     done = CliRunner().invoke(main, words.split())
     assert done.exit_code == 2
     assert said in done.output
+
+
+ENDING = """
+import atexit, sys, threading, time
+import symtop.cli.__main__ as command
+
+class Heavy:
+    def __del__(self):
+        time.sleep(5.0)
+
+def work():
+    time.sleep(0.5)
+    print("the thread is done")
+
+def main():
+    print("the answer")
+    {before}
+    sys.exit({code})
+
+command.kept, command.main = Heavy(), main
+atexit.register(print, "what was registered")
+command.run()
+"""
+
+
+def ending(before="", code="3"):
+    began = time.monotonic()
+    words = [sys.executable, "-c", ENDING.format(before=before, code=code)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    return done, time.monotonic() - began
+
+
+def test_a_command_ends_with_its_code_and_takes_nothing_apart():
+    done, seconds = ending()
+    assert (done.returncode, done.stdout, done.stderr) == (3, "the answer\nwhat was registered\n", "")
+    assert seconds < 5.0
+    assert ending(code="None")[0].returncode == 0
+
+
+def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_does():
+    done, seconds = ending(before="threading.Thread(target=work).start()")
+    assert done.stdout.splitlines() == ["the answer", "the thread is done", "what was registered"]
+    assert done.returncode == 3
+    assert seconds > 5.0  # everything was taken apart
+    done, _ = ending(code="'a text'")
+    assert (done.returncode, done.stderr) == (1, "a text\n")
