@@ -21,7 +21,6 @@ one belongs to an integrator follows from the kernel and the rule inside its sol
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import newton
 
 from symtop.methods.discrete_lagrangian import rule_of
 from symtop.methods.galerkin import is_galerkin
@@ -37,6 +36,8 @@ Step = Callable[[float, float, float], tuple[float, float]]  # (theta, p_theta, 
 
 def routhian_step(scene: Scene, rule: Quadrature) -> Step:
     """The discrete Lagrangian of the Routhian of a scene."""
+    from scipy.optimize import newton  # 0.3 s, which a study with nothing to do need not take
+
     top, momenta = scene.top, scene.top.momenta(scene.start)
     a, w = np.array(rule.nodes), np.array(rule.weights)
 
@@ -62,6 +63,8 @@ def routhian_galerkin_step(scene: Scene) -> Step:
     The mass of theta is constant, so that this is Lobatto IIIA-IIIB of order 4, and one scalar equation remains:
     m + (h^2/24 I1) V'(theta + m) = h p_theta/2 I1 - (h^2/12 I1) V'(theta) with m = theta_m - theta.
     """
+    from scipy.optimize import newton
+
     top, momenta = scene.top, scene.top.momenta(scene.start)
 
     def step(theta: float, p_theta: float, h: float) -> tuple[float, float]:

@@ -73,7 +73,7 @@ def _separatrix(part: xr.Dataset) -> str:
         return "Next to the separatrix no run was seen to lose its accuracy"
     rest = f"; {len(apart)} method{'s last' if len(apart) > 1 else ' lasts'} longer" if apart else ""
     text = f"Next to the separatrix an early error predicts when it reaches {LOST:g} rad"
-    return f"{text}, to {np.median(gap):.2f}/g in the median{rest}"
+    return f"{text}, to {np.median(gap):.2f}/λ in the median{rest}"
 
 
 def _sampled(part: xr.Dataset) -> dict[str, tuple[float, float]]:

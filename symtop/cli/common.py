@@ -17,12 +17,14 @@ from symtop.base.validate import SymtopError
 
 LONGEST_NAME = 80  # characters of a file that are told
 FIGURES = (".png", ".svg", ".pdf")
+PLUGINS = "symtop.plugins"  # in the context of a command: plug-ins were given
 
 
 def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]) -> None:
     if files and not ctx.resilient_parsing:  # as shell completion parses
         from symtop.runner import plugins
 
+        ctx.meta[PLUGINS] = True
         for file in files:
             if not plugins.load(file):
                 warn(f"{Path(file).name} registers no integrator and no scene (symtop.register, symtop.register_scene)")

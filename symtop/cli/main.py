@@ -15,7 +15,7 @@ import click
 from symtop import __version__
 from symtop.base.validate import SymtopError, positive
 from symtop.cli import cite, ensembles, judge, lists, runs, tools
-from symtop.cli.common import Group, json_option, plugin_option, results_option, tell_of_compiling, warn
+from symtop.cli.common import PLUGINS, Group, json_option, plugin_option, results_option, tell_of_compiling, warn
 from symtop.cli.completion import completing
 
 
@@ -100,14 +100,20 @@ def study(
 def report(results: str, embed: bool) -> None:
     """Gather the findings of all studies into one page beside its figures.
 
-    If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``.
+    If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``. A page that
+    is up to date is not written again.
     """
-    from symtop.report import page
+    from symtop.report.unchanged import PAGE, is_current
 
     folder = Path(results)
     if not any(folder.glob("*.json")) and any((folder / "quick").glob("*.json")):
         warn(f"{folder} holds no findings; the report is made of those in {folder / 'quick'}")
         folder /= "quick"
+    if not click.get_current_context().meta.get(PLUGINS) and is_current(folder, embed=embed):
+        click.echo(f"report: {folder / PAGE} (up to date)")
+        return
+    from symtop.report import page
+
     click.echo(f"report: {page.write(folder, embed=embed)}")
 
 

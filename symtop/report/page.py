@@ -21,7 +21,8 @@ from symtop.methods.registry import integrators, split_name
 from symtop.report import markdown, method, tables
 from symtop.report.mathml import mathml
 from symtop.report.style import look
-from symtop.runner import run as runner, store
+from symtop.report.unchanged import PAGE, WORDS, made_of
+from symtop.runner import plugins, run as runner, store
 
 TITLE = "Integrators on the heavy symmetric top"
 INTRODUCTION = (
@@ -140,7 +141,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
         loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    studies = gather(results, embed=embed)
+    mark, studies = made_of(results, embed=embed, plugins=plugins.loaded()), gather(results, embed=embed)
     _named(studies)
     titles = {study["study"]: study["title"] for study in studies}
     provenance = next((study for study in reversed(studies) if not study["measured"]), studies[-1])["provenance"]
@@ -151,6 +152,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
     measured = method.parts()
     text = environment.get_template("report.html").render(
         title=TITLE,
+        made_of=mark,
         introduction=INTRODUCTION,
         rows=ROWS,
         css="".join((templates / name).read_text(encoding="utf-8") for name in ("style.css", "report.css")),
@@ -167,9 +169,9 @@ def write(results: Path, *, embed: bool = False) -> Path:
         quick=any(study["quick"] for study in studies),
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
-    target = results / "report.html"
+    target = results / PAGE
     store.write_text(target, text)
     opening = ["# " + TITLE, INTRODUCTION, *(markdown.opening(study, titles) for study in studies), ROWS]
     opening.append(markdown.measured(measured))
-    store.write_text(results / "report.md", markdown.page(studies, opening, facts))
+    store.write_text(results / WORDS, markdown.page(studies, opening, facts))
     return target

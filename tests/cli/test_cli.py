@@ -203,7 +203,7 @@ import symtop.cli.__main__ as command
 
 class Heavy:
     def __del__(self):
-        time.sleep(5.0)
+        time.sleep(1.5)
 
 def work():
     time.sleep(0.5)
@@ -230,7 +230,7 @@ def ending(before="", code="3"):
 def test_a_command_ends_with_its_code_and_takes_nothing_apart():
     done, seconds = ending()
     assert (done.returncode, done.stdout, done.stderr) == (3, "the answer\nwhat was registered\n", "")
-    assert seconds < 5.0
+    assert seconds < 1.5
     assert ending(code="None")[0].returncode == 0
 
 
@@ -238,6 +238,6 @@ def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_doe
     done, seconds = ending(before="threading.Thread(target=work).start()")
     assert done.stdout.splitlines() == ["the answer", "the thread is done", "what was registered"]
     assert done.returncode == 3
-    assert seconds > 5.0  # everything was taken apart
+    assert seconds > 1.5  # everything was taken apart
     done, _ = ending(code="'a text'")
     assert (done.returncode, done.stderr) == (1, "a text\n")

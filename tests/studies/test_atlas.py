@@ -347,8 +347,8 @@ def test_the_runs_that_outlast_the_law_of_the_separatrix_are_named_and_not_count
     part = xr.Dataset(columns, coords={"integrator": ["rk4[axis]", "gauss-4[axis]"]})
     assert words.outlasting(part) == ["gauss-4[axis]"]
     assert words.misses(part) == pytest.approx([0.5, 0.2])
-    assert messages.of_mechanism("separatrix", part).endswith("to 0.35/g in the median; 1 method lasts longer")
-    assert "outlasted by more than 10/g with gauss-4[axis]." in words.horizons(part)
+    assert messages.of_mechanism("separatrix", part).endswith("to 0.35/λ in the median; 1 method lasts longer")
+    assert "outlasted by more than 10/λ with gauss-4[axis]." in words.horizons(part)
 
 
 def slope(pixels):
