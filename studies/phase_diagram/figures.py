@@ -7,7 +7,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch, Rectangle
-from scipy import ndimage
 
 from symtop.methods.registry import integrator, split_name
 from symtop.report.style import headline, look, panels
@@ -106,6 +105,8 @@ def _borders(axis: Any, winner: Any, centres: tuple[Any, Any], half: tuple[float
 
 def _name(axis: Any, mine: Any, name: str, centres: tuple[Any, Any]) -> None:
     """The name on the thickest place of the largest region of a row."""
+    from scipy import ndimage  # takes 0.15 s, which a study with nothing to do need not
+
     regions, count = ndimage.label(mine)
     if not count:
         return

@@ -34,10 +34,15 @@ TOLERANCE = 1e-10  # rad: Newton's last correction; the one after it would be it
 Step = Callable[[float, float, float], tuple[float, float]]  # (theta, p_theta, h) -> increments of theta and p_theta
 
 
+def solved(defect: Callable[[float], float], near: float, slope: Callable[[float], float]) -> float:
+    """The zero of a function next to a guess, by Newton's iteration."""
+    from scipy.optimize import newton  # takes 0.3 s, which a study with nothing to do need not
+
+    return float(newton(defect, near, slope, tol=TOLERANCE))
+
+
 def routhian_step(scene: Scene, rule: Quadrature) -> Step:
     """The discrete Lagrangian of the Routhian of a scene."""
-    from scipy.optimize import newton  # 0.3 s, which a study with nothing to do need not take
-
     top, momenta = scene.top, scene.top.momenta(scene.start)
     a, w = np.array(rule.nodes), np.array(rule.weights)
 
@@ -51,7 +56,7 @@ def routhian_step(scene: Scene, rule: Quadrature) -> Step:
             curvature = top.potential_curvature(theta + a * d, momenta)
             return -1.0 - scale * float(np.sum(w * (1.0 - a) * a * curvature))
 
-        d = newton(defect, flight, slope, tol=TOLERANCE)
+        d = solved(defect, flight, slope)
         return d, -h * float(np.sum(w * top.potential_slope(theta + a * d, momenta)))
 
     return step
@@ -63,8 +68,6 @@ def routhian_galerkin_step(scene: Scene) -> Step:
     The mass of theta is constant, so that this is Lobatto IIIA-IIIB of order 4, and one scalar equation remains:
     m + (h^2/24 I1) V'(theta + m) = h p_theta/2 I1 - (h^2/12 I1) V'(theta) with m = theta_m - theta.
     """
-    from scipy.optimize import newton
-
     top, momenta = scene.top, scene.top.momenta(scene.start)
 
     def step(theta: float, p_theta: float, h: float) -> tuple[float, float]:
@@ -80,7 +83,7 @@ def routhian_galerkin_step(scene: Scene) -> Step:
             return -1.0 - scale / 24.0 * float(top.potential_curvature(theta + m, momenta))
 
         V0 = slope(0.0)
-        Vm = slope(newton(defect, 0.5 * flight, tangent, tol=TOLERANCE))
+        Vm = slope(solved(defect, 0.5 * flight, tangent))
         d = flight - scale * (V0 + 2.0 * Vm) / 6.0
         return d, -h * (V0 + 4.0 * Vm + slope(d)) / 6.0
 
