@@ -52,8 +52,8 @@ def test_a_study_in_workers_is_run_resumed_and_recomputed(poorer, tmp_path):
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)[0]["computed"] == 12
     next((tmp_path / "results" / "cases" / "probe").glob("loop--rk4*.nc")).unlink()
-    assert json.loads(poorer("study", PROBE, "--json").stdout)[0]["computed"] == 1
-    assert json.loads(poorer("study", PROBE, "--json").stdout)[0]["computed"] == 0
+    assert json.loads(poorer("study", PROBE, "--jobs", 1, "--json").stdout)[0]["computed"] == 1
+    assert json.loads(poorer("study", PROBE, "--jobs", 1, "--json").stdout)[0]["computed"] == 0
 
 
 def test_a_long_run_ends_and_leaves_no_checkpoint(poorer, tmp_path):

@@ -74,7 +74,7 @@ def _matrix(judged: dict[str, list[Finding]]) -> Picture:
     said = {verdict: f"{SYMBOLS[verdict]} {VERDICTS_SAID.get(verdict, verdict)}" for verdict in WORST}
     handles = [Patch(facecolor=COLORS[verdict], edgecolor=style.GREY, lw=0.4, label=label)
                for verdict, label in said.items()]  # fmt: skip
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     number = Counter(one.verdict for row in judged.values() for one in row)
     decided = number["confirmed"] + number["refuted"]
     style.headline(figure, f"{number['confirmed']} of {decided} claims that could be judged are confirmed, "

