@@ -21,6 +21,9 @@ OLDER := benchmarks/engines/.venv-mujoco-3
 LEFT := $(if $(wildcard results/quick/report.html),slow,slow or quick) # every study, quickly, takes minutes by itself
 APART := --numprocesses auto --dist loadfile --no-loadscope-reorder # a file to a process, in the order of tests/conftest.py
 
+# Where the environment forbids Python to keep its bytecode, each process compiles hundreds of files anew, 0.6 s.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help setup studies quick report check-results test test-all lint bench peers engines docs snapshot archive clean
 

@@ -155,6 +155,7 @@ def outcome(words):
 def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
     """513 of them and more; the same lines without what is bad are right."""
     monkeypatch.chdir(folder)
+    monkeypatch.setattr("sys.dont_write_bytecode", False)  # as on most machines
     monkeypatch.setattr("socketserver.BaseServer.serve_forever", lambda *_: pytest.fail("it serves"))
     before = sorted(path.name for path in folder.iterdir())
     above = sorted(path.name for path in folder.parent.iterdir())

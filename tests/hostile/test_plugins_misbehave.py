@@ -124,7 +124,8 @@ def test_a_study_whose_measure_exits_has_a_case_that_failed(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["../out", "/tmp/out", "a/b", "..", "", "x\0y", "é"])
-def test_a_study_writes_nothing_beside_its_results(tmp_path, name):
+def test_a_study_writes_nothing_beside_its_results(tmp_path, monkeypatch, name):
+    monkeypatch.setattr("sys.dont_write_bytecode", False)  # as on most machines
     script = tmp_path / "named.py"
     script.write_text(f"from symtop.runner.study import Study\nSTUDY = Study({name!r}, *[None] * 7)\n")
     code, lines = said_of(["study", str(script), "--results", str(tmp_path / "in" / "r")])
