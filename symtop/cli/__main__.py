@@ -21,9 +21,13 @@ def run() -> None:
         if not alone or not (end.code is None or isinstance(end.code, int)):
             raise
         atexit._run_exitfuncs()
-        sys.stdout.flush()  # a reader that is gone is an error as usual
-        sys.stderr.flush()
-        os._exit(end.code or 0)
+        code = end.code or 0
+        for stream in (sys.stdout, sys.stderr):
+            try:
+                stream.flush()
+            except OSError:  # nobody reads it, or the disk is full
+                code = code or 1
+        os._exit(code)
 
 
 if __name__ == "__main__":

@@ -56,6 +56,9 @@ class Group(click.Group):
             warn(self._spoken(str(error)))
             ctx.exit(2)
         except OSError as error:
+            if error.errno in (errno.ENOSPC, errno.EDQUOT) and error.filename is None:
+                warn(f"cannot write what there is to say: {error.strerror}")
+                ctx.exit(2)
             if error.errno == errno.EPIPE or error.filename is None:  # a reader that has left is click's
                 raise
             name = str(error.filename)

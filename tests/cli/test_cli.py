@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -232,6 +233,15 @@ def test_a_command_ends_with_its_code_and_takes_nothing_apart():
     assert (done.returncode, done.stdout, done.stderr) == (3, "the answer\nwhat was registered\n", "")
     assert seconds < 1.5
     assert ending(code="None")[0].returncode == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+def test_what_cannot_be_printed_is_told_in_a_sentence():
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([sys.executable, "-m", "symtop.cli", "scenes"], stdout=full, stderr=subprocess.PIPE,
+                              text=True, timeout=60, check=False)  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr == "symtop: cannot write what there is to say: No space left on device\n"
 
 
 def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_does():
