@@ -10,11 +10,11 @@ from symtop.runner.study import Opening, Table
 from . import verdicts, words
 
 HEADER = [
-    "run length", "axis error (rad)", "cheapest most often", "on so many tops",
+    "run length", "axis error (rad)", "cheapest most often", "on so many of the tops that a row solves",
     "time over the cheapest, median (90 % of tops)", "meets it on", "next",
 ]  # fmt: skip
 EXPLAINED = {
-    "work_precision": "nine scenes, one motion each, explain it by the work of every row",
+    "work_precision": "the times and the work of every row on eight named scenes",
     "stability": "where rows fail",
 }
 
@@ -33,6 +33,8 @@ def opening(data: xr.DataTree) -> Opening:
         first, *others = verdicts.standings(taken)
         ahead[first.name] += 1
         slow = first.slowdown[2]
+        if others and not others[0].won.count:
+            others = []
         following = f"{others[0].name} {words.percent(others[0].won)}" if others else ""
         rows.append(
             [*start, first.name if won.sure else f"{first.name} (not sure)",
@@ -55,8 +57,9 @@ def opening(data: xr.DataTree) -> Opening:
     closest = f"No row is the cheapest on every top. The closest contest is at {min(won_by)[1]}." if won_by else ""
     measured = (
         f"Measured on {drawn}, drawn at random. A row is a method in one chart, at the coarsest step or tolerance that "
-        "meets the error; times are those of the bare compiled loop. For your own scene and accuracy: symtop recommend "
-        "SCENE --accuracy 1e-6."
+        "meets the error; times are those of the bare compiled loop. A row meets the error on a share of all tops "
+        "whose nutation is wider than it; it is the cheapest on a share of those that some row solves. For your own "
+        "scene and accuracy: symtop recommend SCENE --accuracy 1e-6."
     )
     said = [first_choice, closest, words.silent_sentence(data), words.warning_sentence(data), measured]
     table = Table("Wins on random tops", HEADER, rows)

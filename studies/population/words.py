@@ -90,12 +90,13 @@ def winner_sentence(data: xr.DataTree, cell: Cell, unit: str = UNIT) -> str:
     taken, won = verdicts.best(data, cell, unit)
     if won is None:
         return ""
-    name, following = taken.names[won.row], taken.names[won.next_row]
+    name = taken.names[won.row]
+    following = f"{taken.names[won.next_row]} on {percent(won.next_share)}" if won.next_share.count else "no other row"
     standing = next(one for one in verdicts.standings(taken) if one.name == name)
     sure = "" if won.sure else ", a lead that may be chance or noise of the times"
     return (
         f"{cell.target:.0e}: {name} on {percent(won.share)} ({interval(won.share)}), with a median slowdown of "
-        f"{ratio(standing.slowdown[1])} over all tops, then {following} on {percent(won.next_share)}{sure}"
+        f"{ratio(standing.slowdown[1])} over all tops, then {following}{sure}"
     )
 
 
@@ -170,12 +171,24 @@ def silent_sentence(data: xr.DataTree) -> str:
 
 def warning_sentence(data: xr.DataTree) -> str:
     """How often the guard warns over the short horizon, of wrong runs and of right ones."""
-    hits, alarms = verdicts.caught(data, "short")
+    said = []
+    for horizon in verdicts.horizons(data):
+        hits, alarms = verdicts.caught(data, horizon)
+        said.append(
+            f"over {verdicts.nutations(data, horizon):g} nutations, on {asked_of(data, horizon)} of the tops, it "
+            f"warned of {hits.count:,} of {hits.total:,} runs that ended more than {WRONG:g} rad off, and of "
+            f"{percent(alarms)} of {alarms.total:,} that ended within {EXPECTED:g} rad"
+        )
     return (
-        f"Before a run, the guard tries the method on two nutations. It warned of {percent(hits)} of {hits.total:,} "
-        f"runs that would be wrong, and of {percent(alarms)} of {alarms.total:,} that would be right "
-        f"({verdicts.nutations(data, 'short'):g} nutations)."
+        "Before a run, the guard tries the method on two nutations. Asked at the coarsest steps or tolerances of each "
+        f"row, {'; '.join(said)}."
     )
+
+
+def asked_of(data: xr.DataTree, horizon: str) -> int:
+    """How many tops the guard was asked about."""
+    told = data[horizon].to_dataset()["foretold"].notnull()
+    return int(told.any([name for name in told.dims if name != "guarded"]).sum())
 
 
 def guard_sentence(data: xr.DataTree) -> str:
@@ -192,8 +205,8 @@ def guard_sentence(data: xr.DataTree) -> str:
     return (
         "The guard, which runs a short piece of the method before the run, warns "
         f"{', and '.join(said)}. Right: below the {EXPECTED:g} rad that it warns of; wrong: above {WRONG:g} rad. "
-        f"A look at energy and momenta after the run, to {KEPT:.0%}, finds {percent(seen[0])} of the wrong runs over "
-        f"{verdicts.nutations(data, 'short'):g} nutations and suspects {percent(seen[1])} of the right ones."
+        f"A look at energy and momenta after these runs, to {KEPT:.0%}, finds {percent(seen[0])} of the wrong ones "
+        f"over {verdicts.nutations(data, 'short'):g} nutations and suspects {percent(seen[1])} of the right ones."
     )
 
 

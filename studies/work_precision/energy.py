@@ -181,7 +181,7 @@ def at_equal_steps(data: xr.Dataset, names: Sequence[str], scene: str) -> str:
     known = [name for name in names if name in last["integrator"].values]
     ends = {name: at_steps(last.sel(integrator=name), STEPS * periods) for name in known}
     listed = [
-        f"{name} ({work:.2g} force evaluations a step) {error:.1e}"
+        f"{name} (force evaluations a step: {work:.2g}) {error:.1e}"
         for name, (error, work) in ends.items()
         if np.isfinite(error)
     ]

@@ -38,7 +38,7 @@ def opening(data: xr.Dataset) -> Opening:
             rows.append(row)
     if ahead:
         (first, times), *others = ahead.most_common()
-        listed = "; " + ", ".join(f"{name} for {count}" for name, count in others) if others else ""
+        listed = "; " + ", ".join(f"{name} is in {count}" for name, count in others) if others else ""
         sentences.append(
             f"For the direction of the axis, begin with {first}. It is the first choice in {times} of the {len(rows)} "
             f"lines of the table{listed}. The first choice meets the error on the most scenes and takes, of the rows "
