@@ -177,7 +177,7 @@ def test_energies_are_compared_within_a_chart():
     assert "Never less: midpoint[angles]." in energy.sentence(data, "angles")
     error, work = energy.at_steps(data.isel(scene=0, horizon=0).sel(integrator="rk4[axis]"), 118.0)
     assert (error, work) == (pytest.approx(0.1 * 118.0**-4), pytest.approx(4.0))
-    assert "strang[axis] (1 force evaluations a step)" in energy.at_equal_steps(
+    assert "strang[axis] (force evaluations a step: 1)" in energy.at_equal_steps(
         data, ["rk4[axis]", "strang[axis]"], "x"
     )
 
