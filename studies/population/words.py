@@ -170,7 +170,7 @@ def silent_sentence(data: xr.DataTree) -> str:
 
 
 def warning_sentence(data: xr.DataTree) -> str:
-    """How often the guard warns over the short horizon, of wrong runs and of right ones."""
+    """How often the guard warns over each horizon, of wrong runs and of right ones."""
     said = []
     for horizon in verdicts.horizons(data):
         hits, alarms = verdicts.caught(data, horizon)
