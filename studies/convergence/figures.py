@@ -146,8 +146,8 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
     labels = merged(stepping(data), MAIN)
     scenes = [str(name) for name in data["scene"].values]
     sizes = {name: [works[scene, name] for scene in scenes if (scene, name) in works] for name in labels}
-    sizes = {name: found for name, found in sizes.items() if found}
-    middle = {name: float(np.median([one.work for one in found])) for name, found in sizes.items()}
+    sizes = {name: known for name, known in sizes.items() if known}
+    middle = {name: float(np.median([one.work for one in known])) for name, known in sizes.items()}
     orders: dict[int, list[str]] = {}
     for name in sorted(sizes, key=lambda name: middle[name]):
         orders.setdefault(declared_order(name) or 0, []).append(name)

@@ -155,7 +155,7 @@ def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Effici
     A step h costs E force evaluations, so that C h^p = error takes E T (C / error)^(1/p) of them in a nutation T. E is
     the median over the steps of the fit.
     """
-    found = {}
+    foretold = {}
     for (name, label), fit in fits(data, MAIN).items():
         if not (np.isfinite(fit.slope) and fit.used.any()):
             continue
@@ -165,5 +165,5 @@ def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Effici
         constant = np.median(cell[MAIN].values[used] / steps**order)
         work = float(each * scene(name).nutation_period * (constant / error) ** (1.0 / order))
         inside = cell[MAIN].values[used].min() <= error <= cell[MAIN].values[used].max()
-        found[name, label] = Efficiency(work, not inside)
-    return found
+        foretold[name, label] = Efficiency(work, not inside)
+    return foretold

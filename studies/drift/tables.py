@@ -35,15 +35,15 @@ def worst_behaviour(histories: xr.Dataset, name: str) -> str:
     if not (histories["outcome"] == "ok").all():
         return FAILED
     columns = (histories[f"{name}_{part}"].values for part in ("largest", "exponent", "exponent_interval"))
-    grains = [grain(str(where), name) for where in histories["scene"].values]
-    found = (behaviour(*map(float, one)) for one in zip(*columns, grains, strict=True))
-    return max(found, key=BEHAVIOURS.index)
+    grains = [grain(str(scene_name), name) for scene_name in histories["scene"].values]
+    behaviours = (behaviour(*map(float, one)) for one in zip(*columns, grains, strict=True))
+    return max(behaviours, key=BEHAVIOURS.index)
 
 
-def grain(where: str, name: str) -> float:
+def grain(scene_name: str, name: str) -> float:
     """The rounding of a constant on a scene, in units of the machine's: that of an energy counts from E0 - min V."""
     known = scenes()
-    return known[where].energy_grain if name == "energy" and where in known else 1.0
+    return known[scene_name].energy_grain if name == "energy" and scene_name in known else 1.0
 
 
 def rounding(cell: xr.Dataset, name: str) -> float:

@@ -144,8 +144,8 @@ def family_sentences(data: xr.Dataset) -> list[str]:
 def charts_message(data: xr.Dataset) -> str:
     """What a chart costs the first family that was timed in several, as a title."""
     for family in FAMILIES:
-        found = {chart: family_ratios(data, family, chart) for chart in ("attitude", "angles")}
-        parts = [f"{np.median(ratios):.2f} times as long in {chart}" for chart, ratios in found.items() if ratios]
+        ratios_in = {chart: family_ratios(data, family, chart) for chart in ("attitude", "angles")}
+        parts = [f"{np.median(ratios):.2f} times as long in {chart}" for chart, ratios in ratios_in.items() if ratios]
         if parts:
             return f"At equal error {family} methods run {joined(parts)} as on the axis, in the median"
     return "No method was timed in several charts"

@@ -134,8 +134,8 @@ def _implicit(oscillator: Quartic, h: float, steps: int) -> Array:
     for n in range(1, steps + 1):
         c = x + 0.5 * h * v
         bend, middle = 2.0 * oscillator.sigma * quarter, 1.0 - 3.0 * oscillator.b * quarter
-        found = np.roots([bend * bend, -2.0 * middle * bend, middle * middle, -(abs(c) ** 2)])
-        s = min(root.real for root in found if abs(root.imag) <= REAL * abs(root))  # the one of small steps
+        roots = np.roots([bend * bend, -2.0 * middle * bend, middle * middle, -(abs(c) ** 2)])
+        s = min(root.real for root in roots if abs(root.imag) <= REAL * abs(root))  # the one of small steps
         y = c / (1.0 - quarter * oscillator.slope(s))
         kick = h * oscillator.slope(s) * y
         x, v = 2.0 * y - x, v + kick

@@ -21,10 +21,10 @@ COUNT = 10
 
 def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
     """Settings of the checks: quantity, target, horizon, and of two rows the two settings."""
-    found: dict[str, list[tuple[float, dict[str, Any]]]] = {}
+    eligible: dict[str, list[tuple[float, dict[str, Any]]]] = {}
     for quantity in QUANTITIES:
         panel = tables.diagram(data, tables.SCENE, quantity)
-        found[quantity] = []
+        eligible[quantity] = []
         for at in zip(
             *np.nonzero(panel.foretold & (panel.ratio >= tables.TIE) & np.isfinite(panel.ratio)), strict=True
         ):
@@ -35,8 +35,8 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
                 continue
             settings = {"integrators": pair, "quantity": quantity, "target": tables.TARGETS[at[0]], "horizon": horizon,
                         "settings": [values for values, _, _ in parts]}  # fmt: skip
-            found[quantity].append((horizon / parts[0][2], settings))
-    queues = [sorted(each, key=lambda one: -one[0]) for each in found.values()]
+            eligible[quantity].append((horizon / parts[0][2], settings))
+    queues = [sorted(each, key=lambda one: -one[0]) for each in eligible.values()]
     taken: list[dict[str, Any]] = []
     while any(queues) and len(taken) < COUNT:
         for queue in queues:

@@ -14,7 +14,7 @@ from symtop.runner.study import Picture
 
 from . import words
 from .runs import POPULATION, QUANTITIES
-from .tables import TARGETS, TIE, Diagram, diagram, where
+from .tables import TARGETS, TIE, Diagram, diagram, tops_run
 
 NAMED = 10  # rows with their names on their regions
 HATCH = "///"  # foretold
@@ -33,7 +33,7 @@ def pictures(data: xr.DataTree) -> list[Picture]:
 
 def draw(data: xr.DataTree) -> Picture:
     """Three panels a population or scene."""
-    places = where(data)
+    places = tops_run(data)
     each = {(name, quantity): diagram(data, name, quantity) for name in places for quantity in QUANTITIES}
     area: Counter[str] = Counter()
     for panel in each.values():

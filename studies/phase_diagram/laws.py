@@ -85,10 +85,10 @@ def fit(horizons: Array, errors: Array, most: float = 2.0, *, drifts: bool = Fal
         for power in POWERS:
             x = columns(power)
             a = x.sum(axis=1) / (x * x).sum(axis=1)
-            found = ((a[:, np.newaxis] * x - good) ** 2).sum(axis=1)
-            better = enough & (found < best) & (power <= most)
+            misfit = ((a[:, np.newaxis] * x - good) ** 2).sum(axis=1)
+            better = enough & (misfit < best) & (power <= most)
             powers[better], coefficients[better] = (power, np.nan), np.stack([a, a * np.nan], axis=1)[better]
-            best = np.where(better, found, best)
+            best = np.where(better, misfit, best)
         for low, high in PAIRS:
             x, y = columns(low), columns(high)
             xx, yy, xy, x1, y1 = ((p * q).sum(axis=1) for p, q in ((x, x), (y, y), (x, y), (x, good), (y, good)))

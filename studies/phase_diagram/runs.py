@@ -64,10 +64,10 @@ def horizons() -> Array:
     return np.logspace(FIRST, LAST, round((LAST - FIRST) * PER_DECADE) + 1)
 
 
-def tops_of(where: str, members: int, seed: int) -> Tops:
+def tops_of(name: str, members: int, seed: int) -> Tops:
     """The first members of the population with a nutation, or the one top of a scene."""
-    if where != POPULATION:
-        one = scene(where)
+    if name != POPULATION:
+        one = scene(name)
         return Tops(np.array([flat(one.top, one.start)]), 10.0)
     drawn = Tops(numbers_of(2 * members, seed), 10.0)
     return Tops(drawn.numbers[drawn.known][:members], 10.0)
@@ -203,12 +203,12 @@ def foretold(seen: Array, work: Array, far: Array, grain: Array, *, drifts: bool
     for s in range(seen.shape[1]):
         for q, name in enumerate(QUANTITIES):
             runs = seen[q, s].T
-            found = laws.fit(far, runs, MOST[name], drifts=drifts)
+            law = laws.fit(far, runs, MOST[name], drifts=drifts)
             noise = laws.rounding(name, w[:, np.newaxis], far, evaluations[s])
-            beyond = np.hypot(found.at(far), noise)
+            beyond = np.hypot(law.at(far), noise)
             beyond = np.where(np.isinf(runs).any(axis=1, keepdims=True), np.inf, beyond)
             error[q, s] = np.maximum.accumulate(np.where(np.isnan(runs), beyond, runs), axis=1).T
-            for key, value in zip(LAW, (found.leading, found.slope, found.interval), strict=True):
+            for key, value in zip(LAW, (law.leading, law.slope, law.interval), strict=True):
                 columns[key][q, s] = value
     data: dict[str, Any] = {
         "error": (("quantity", "setting", "horizon", "member"), stored(error[:, :, ::2])),

@@ -40,8 +40,8 @@ def grid(quick: bool) -> list[Case]:
     timing = {"integrators": names, "rounds": 3 if quick else 9, "batch": 0.001 if quick else 0.004}
     asked = {POPULATION: QUICK if quick else FULL, SCENE: QUICK | {"members": 1} if quick else FULL_SCENE}
     return [
-        *(Case(where, name, {**settings, "seed": SEED}, group=LADDERS)
-          for where, settings in asked.items() for name in names),
+        *(Case(tops, name, {**settings, "seed": SEED}, group=LADDERS)
+          for tops, settings in asked.items() for name in names),
         Case(POPULATION, "together", timing, timed=True, group=PRICES),
     ]  # fmt: skip
 

@@ -41,7 +41,7 @@ class Diagram(NamedTuple):
         )
 
 
-def where(data: xr.DataTree) -> list[str]:
+def tops_run(data: xr.DataTree) -> list[str]:
     """What was run: the population, the scene."""
     return [str(name) for name in data[LADDERS].to_dataset()["scene"].values]
 

@@ -62,7 +62,7 @@ def spots(data: xr.DataTree) -> list[Spot]:
     """The checks."""
     if CHECKS not in data.children:
         return []
-    group, found = data[CHECKS].to_dataset().isel(scene=0), []
+    group, spots_run = data[CHECKS].to_dataset().isel(scene=0), []
     panels = {name: diagram(data, SCENE, name) for name in QUANTITIES}
     for name in group["integrator"].values:
         one = group.sel(integrator=name)
@@ -73,8 +73,8 @@ def spots(data: xr.DataTree) -> list[Spot]:
         costs = [
             1e9 * float(n) * diagrams.price(data, row) for n, row in zip(one["evaluations"].values, rows, strict=True)
         ]
-        found.append(Spot(quantity, target, horizon, rows, foretold, costs))
-    return found
+        spots_run.append(Spot(quantity, target, horizon, rows, foretold, costs))
+    return spots_run
 
 
 def spot_sentence(data: xr.DataTree) -> str:
@@ -99,7 +99,7 @@ def named(name: str) -> str:
 def winners_sentence(data: xr.DataTree, quantity: str) -> str:
     """Which rows own how much of a panel, measured and foretold."""
     said = []
-    for name in diagrams.where(data):
+    for name in diagrams.tops_run(data):
         panel = diagram(data, name, quantity)
         won = panel.winner >= 0
         owners = Counter(panel.names[k] for k in panel.winner[won].tolist())
@@ -114,7 +114,7 @@ def winners_sentence(data: xr.DataTree, quantity: str) -> str:
 
 def message(data: xr.DataTree) -> str:
     """The figure's one message: the row that is cheapest most often, for each of the three errors."""
-    name = diagrams.where(data)[0]
+    name = diagrams.tops_run(data)[0]
     shares: dict[str, list[tuple[float, str]]] = {}
     for quantity in QUANTITIES:
         panel = diagram(data, name, quantity)
@@ -154,7 +154,7 @@ def tables(data: xr.DataTree) -> list[Table]:
 
 def _cells(data: xr.DataTree) -> Table:
     lines = []
-    for name in diagrams.where(data):
+    for name in diagrams.tops_run(data):
         for quantity in QUANTITIES:
             panel = diagram(data, name, quantity)
             for t, h in np.ndindex(panel.winner.shape):
@@ -186,7 +186,7 @@ def _spots(data: xr.DataTree) -> Table:
 
 def _laws(data: xr.DataTree) -> Table:
     lines = []
-    for name in diagrams.where(data):
+    for name in diagrams.tops_run(data):
         for row in map(str, data[LADDERS].to_dataset()["integrator"].values):
             one = diagrams.cell(data, name, row)
             for k, value in enumerate(one["setting_value"].values):

@@ -71,10 +71,11 @@ def slowdowns(data: xr.DataTree, horizon: str) -> str:
     length = over(data, horizon)
     if not winners:
         return f"No method meets a target {length}"
-    (first, where), (last, there) = winners[0], winners[-1]
+    (first, part), (last, last_part) = winners[0], winners[-1]
     if len(winners) < 2:
-        return f"{length.capitalize()} {first} is the cheapest {where}"
-    return f"{length.capitalize()} {first} is the cheapest {where}, {there if last == first else f'{last} {there}'}"
+        return f"{length.capitalize()} {first} is the cheapest {part}"
+    others = last_part if last == first else f"{last} {last_part}"
+    return f"{length.capitalize()} {first} is the cheapest {part}, {others}"
 
 
 def strata(data: xr.DataTree, horizon: str = "short") -> str:
@@ -107,8 +108,8 @@ def silent(data: xr.DataTree) -> str:
 
 def guard(data: xr.DataTree) -> str:
     """What the guard finds of the wrong runs, and how many right ones it suspects, over each horizon."""
-    found, alarms = zip(*(verdicts.caught(data, horizon) for horizon in verdicts.horizons(data)), strict=True)
-    least = min(found, key=lambda share: share.value)
+    caught, alarms = zip(*(verdicts.caught(data, horizon) for horizon in verdicts.horizons(data)), strict=True)
+    least = min(caught, key=lambda share: share.value)
     suspected = [
         f"{percent(share)} {over(data, horizon) if not place else f'over {verdicts.nutations(data, horizon):g}'}"
         for place, (horizon, share) in enumerate(zip(verdicts.horizons(data), alarms, strict=True))

@@ -43,10 +43,8 @@ def opening(data: xr.DataTree) -> Opening:
              words.percent(first.solved), following]
         )  # fmt: skip
         second = f", and {others[0].name} on {words.percent(others[0].won)}" if others else ""
-        where = f"{start[1]} rad over {start[0]}"
-        won_by.append(
-            (first.won.value, f"{where}: {first.name} wins on {words.percent(first.won)} of the tops{second}")
-        )
+        task = f"{start[1]} rad over {start[0]}"
+        won_by.append((first.won.value, f"{task}: {first.name} wins on {words.percent(first.won)} of the tops{second}"))
     (name, count), *_ = [*ahead.most_common(), ("none", 0)]
     lines = "in every line" if count == len(rows) else f"in {count} of the {len(rows)} lines"
     drawn = " and ".join(words.span(data, horizon) for horizon in verdicts.horizons(data))

@@ -80,13 +80,13 @@ def _commonly(one: OutcomeMap) -> str:
     every = "step" if fixed else "tolerance"
     if math.isfinite(failure.setting):
         place = f"h = {failure.setting:.2g} nutation periods" if fixed else f"a tolerance of {failure.setting:.2g}"
-        where = f"at {place} and every larger {every} in at least {failure.least:.0%} of {starts} starts"
+        range_of_failure = f"at {place} and every larger {every} in at least {failure.least:.0%} of {starts} starts"
     else:
         last = f", half of them only at the largest {every}s of the map"
         between = f", but not in half of them at every larger {every}"
         rest = "" if failure.least < COMMON else last if failure.at_end else between
-        where = f"in up to {failure.least:.0%} of {starts} starts{rest}"
-    return f"fails {where} (of these runs {kinds})"
+        range_of_failure = f"in up to {failure.least:.0%} of {starts} starts{rest}"
+    return f"fails {range_of_failure} (of these runs {kinds})"
 
 
 def ends(shown: Mapping[str, OutcomeMap]) -> tuple[str, str]:

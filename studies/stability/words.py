@@ -123,12 +123,12 @@ def unlimited(part: xr.Dataset) -> dict[str, float]:
 
 def resonant(part: xr.Dataset) -> dict[str, float]:
     """The linearly stable steps, as h omega, at which hardly any displacement survives, by row."""
-    found = {}
+    phases = {}
     for name, cell in _rows(part, Column.THIRD_TURN_PHASE).items():
         at, past = float(cell[Column.SURVIVING_AT_THIRD_TURN]), float(cell[Column.SURVIVING_PAST_THIRD_TURN])
         if past > REVIVAL * at and at < BARELY:
-            found[name] = float(cell[Column.THIRD_TURN_PHASE])
-    return found
+            phases[name] = float(cell[Column.THIRD_TURN_PHASE])
+    return phases
 
 
 def resonances(part: xr.Dataset) -> str:

@@ -174,8 +174,8 @@ class _Process(contextlib.AbstractContextManager["_Process"]):
         self.process.join(2.0)
         code, beat = self.process.exitcode, pulse.look()
         if code is not None and code < 0:
-            where = f" in a step of h = {beat.step:.3g}" if beat.inside else ""
-            return f"its process was ended by {signal.Signals(-code).name}{where}"
+            during = f" in a step of h = {beat.step:.3g}" if beat.inside else ""
+            return f"its process was ended by {signal.Signals(-code).name}{during}"
         self.said.seek(0)
         words = " ".join(self.said.read()[-4 * WORDS :].decode(errors="replace").split())[-WORDS:]
         return f"its process ended with code {code}{': ' if words else ''}{words}"

@@ -219,8 +219,8 @@ def search(
         met = tried[setting] = attempt(scene, method, setting, horizon, quantity)
         return met.error, met.evaluations
 
-    found = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience, least=least)
-    return found if isinstance(found, str) else tried[found]
+    setting = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience, least=least)
+    return setting if isinstance(setting, str) else tried[setting]
 
 
 def seconds(scene: Scene, met: Met, quantity: str, horizon: float) -> float:

@@ -23,6 +23,7 @@ Nonlinearity 27 (2014) 1525 (collective integrators).
 """
 
 import functools
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,11 +80,11 @@ def _swept(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
     stages, start = len(rule.b), ORIGIN
     start = set_item(set_item(set_item(start, 5, 2.0 * L[0]), 6, 2.0 * L[1]), 7, 2.0 * L[2])
     unit = 1.0 / (abs(L[0]) + abs(L[1]) + abs(L[2]) + np.sqrt(par.I1 * abs(par.mgl)) + 1e-300)
-    weights, slope = stage_weights(rule, h), _field(par, e, start)
+    slope = _field(par, e, start)
+    stage_weights(rule, h, work[:, 8])
     for i in range(stages):
-        work[i, 8] = weights[i]
         for m in range(8):
-            work[i, m] = weights[i] * slope[m]
+            work[i, m] = work[i, 8] * slope[m]
     last, effort = np.inf, 0
     while effort < SWEEPS:
         gap = 0.0
@@ -130,9 +131,20 @@ def _table(stages: int) -> Collective:
     return Collective(rule.mu, rule.b)
 
 
+@register_jitable
+def _opened(rows: Any) -> Collective:
+    s = rows.shape[1]
+    return Collective(rows[:s], rows[s], (1.0,))
+
+
+def _packed(rule: Collective) -> tuple[Callable[[Any], Collective], Array]:
+    """How a rule travels into compiled code, as `gauss.packed`."""
+    return _opened, np.vstack([rule.mu, rule.b])
+
+
 def collective_gauss(stages: int) -> Integrator:
     """The collective Gauss method with so many stages, named after its order."""
-    rule = Later(functools.partial(_table, stages))
+    rule = Later(functools.partial(_table, stages), _packed)
     return Integrator(
         name=f"collective-gauss-{2 * stages}",
         family="lie-group",

@@ -38,8 +38,8 @@ def swept(  # noqa: C901  (the loops of one step, read in one piece)
 ) -> Lanes:  # fmt: skip
     """A Gauss method in lanes: `mu` and `predict` as `gauss.GaussRule` has them.
 
-    ``weights(rule, h)`` are the h b_i, ``unit(par, state)`` is 1/|L|, and a correction above ``bound(sweeps)`` that
-    does not fall has lost its way. Component `still` of a state never moves.
+    ``weights(rule, h, out)`` fills in the h b_i, ``unit(par, state)`` is 1/|L|, and a correction above
+    ``bound(sweeps)`` that does not fall has lost its way. Component `still` of a state never moves.
     """
     stages, zeros, numbers = len(mu), (0.0,) * dimension, (0.0,) * len(top._fields)
     tops, flag, work, carry_at = len(numbers), 3 * dimension, 3 * dimension + 1, 3 * dimension + 2
@@ -152,12 +152,11 @@ def swept(  # noqa: C901  (the loops of one step, read in one piece)
             finish(block, j)
 
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
-        shares = weights(rule, h)
-        for i in range(stages):
-            numbers[i] = shares[i]
+        weights(rule, h, numbers)
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        shares, slope, values = weights(rule, h), field(par, state), carried
+        shares, slope, values = np.empty(stages), field(par, state), carried
+        weights(rule, h, shares)
         for i in range(stages):
             for m in range(dimension):
                 values = set_item(values, i * dimension + m, shares[i] * slope[m])

@@ -121,7 +121,7 @@ def preparing(lanes: Lanes, begin: Any, enter: Any, kind: Any, numbers: Any, sca
             at = given[m]
             top, start = Body(at[0], at[1], at[2]), Start(at[3], at[4], at[5], at[6], at[7], at[8])
             par, state = numbers(top, start)
-            rule = scale(kind(*coefficients), top, start, h[m])
+            rule = scale(kind(coefficients), top, start, h[m])
             state = enter(par, rule, state, h[m])
             carry = begin(par, rule, state, h[m])
             lay(par, rule, h[m], rules[i])

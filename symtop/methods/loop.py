@@ -202,7 +202,7 @@ def driver(  # noqa: C901  (one loop, read in one piece)
         def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
             top, at = Body(*plain[:3]), Start(*plain[3:])
             par, state = numbers(top, at)
-            rule = scale(kind(*coefficients), top, at, h)
+            rule = scale(kind(coefficients), top, at, h)
             state = enter(par, rule, state, h)
             low = state
             for i in range(len(state)):

@@ -41,19 +41,19 @@ class _Reader:
         self.tokens: list[tuple[str, str, bool]] = []  # kind, text, and whether a space stands before it
         end = 0
         while formula[end:].strip():
-            found = TOKEN.match(formula, end)
-            if found is None:
+            token = TOKEN.match(formula, end)
+            if token is None:
                 raise SymtopError(f"formula {formula!r} has an unknown sign: {formula[end:].strip()!r}")
-            kind = str(found.lastgroup)
-            self.tokens.append((kind, found[kind], bool(found["space"])))
-            end = found.end()
+            kind = str(token.lastgroup)
+            self.tokens.append((kind, token[kind], bool(token["space"])))
+            end = token.end()
 
     def next_is(self, text: str, *, close: bool = False) -> bool:
         """Does that token come next, and, if it must be close, without a space before it?"""
         if self.place >= len(self.tokens):
             return text == ""
-        _, found, spaced = self.tokens[self.place]
-        return found == text and not (close and spaced)
+        _, written, spaced = self.tokens[self.place]
+        return written == text and not (close and spaced)
 
     def took(self, text: str, *, close: bool = False) -> bool:
         """Pass over that token if it comes next."""

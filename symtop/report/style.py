@@ -251,7 +251,7 @@ def headline(figure: Any, message: str) -> None:
     """Write a figure's one message above it, in lines of about the same length."""
     widths = range(round(6.15 * figure.get_figwidth()), round(12.3 * figure.get_figwidth()) + 1)
     wrapped = [textwrap.wrap(message, width, break_on_hyphens=False) for width in widths]
-    lines = next(found for found in wrapped if len(found) == len(wrapped[-1]))  # no last line of a single word
+    lines = next(broken for broken in wrapped if len(broken) == len(wrapped[-1]))  # no last line of a single word
     figure.suptitle("\n".join(lines), x=0.01, ha="left", weight="bold")
 
 

@@ -39,7 +39,7 @@ def is_current(results: Path, *, embed: bool) -> bool:
     """Does the page of a folder stand there as it would be written without plug-ins?"""
     try:
         with (results / PAGE).open(encoding="utf-8") as page:
-            found = MARK.search(page.read(HEAD))
+            mark = MARK.search(page.read(HEAD))
     except (OSError, UnicodeDecodeError):
         return False
-    return found is not None and (results / WORDS).is_file() and found.group(1) == made_of(results, embed=embed)
+    return mark is not None and (results / WORDS).is_file() and mark.group(1) == made_of(results, embed=embed)

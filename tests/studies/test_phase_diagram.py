@@ -105,7 +105,7 @@ def test_step_times_number_is_exact():
 
 
 def test_costs_rise_with_the_horizon_and_with_the_accuracy(data):
-    for name in tables.where(data):
+    for name in tables.tops_run(data):
         for quantity in runs.QUANTITIES:
             panel = diagram(data, name, quantity)
             cheapest = panel.costs.min(axis=0)
@@ -116,7 +116,7 @@ def test_costs_rise_with_the_horizon_and_with_the_accuracy(data):
 
 
 def test_a_row_whose_energy_drifts_loses_the_energy_at_long_horizons(data):
-    for name in tables.where(data):
+    for name in tables.tops_run(data):
         panel = diagram(data, name, "energy")
         late = panel.horizons > 1e8
         assert not DRIFTING & {panel.names[k] for k in panel.winner[:, late].ravel() if k >= 0}
