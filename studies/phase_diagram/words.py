@@ -25,8 +25,8 @@ HOW_TO_READ = (
     "measured time of an evaluation in a run by itself; of the population the median. Errors are measured as far as "
     "the budget of a run goes, to 10^6 nutations at most, and behind that foretold from the growth of the same run: "
     "one power of the horizon or the sum of two, and a walk of rounding whose size is an order of magnitude. A cell is "
-    "hatched if its winner's error is foretold. Pale: another row costs less than "
-    f"{TIE:g} times as much. Energy and shape are asked from 4 steps a nutation on, and not of the Gauss methods, "
+    "hatched if its winner's error is foretold. The table says which row is next; a cell is level if that costs less "
+    f"than {TIE:g} times as much. Energy and shape are asked from 4 steps a nutation on, and not of the Gauss methods, "
     "which keep both at any step in the chart axis. Left out are exact and exact-discrete, closed forms whose cost "
     "does not depend on the horizon or the error."
 )
@@ -112,21 +112,34 @@ def winners_sentence(data: xr.DataTree, quantity: str) -> str:
     return f"Cheapest, {PANELS[quantity]}: {'; '.join(said)}."
 
 
-def message(data: xr.DataTree) -> str:
-    """The figure's one message: the row that is cheapest most often, for each of the three errors."""
-    name = diagrams.where(data)[0]
-    shares: dict[str, list[tuple[float, str]]] = {}
+def leaders(data: xr.DataTree) -> dict[str, tuple[str, float]]:
+    """Of each error the row that is the cheapest in the most cells of the random tops, and its share of them."""
+    name, most = diagrams.where(data)[0], {}
     for quantity in QUANTITIES:
         panel = diagram(data, name, quantity)
         won = panel.winner[panel.winner >= 0]
         if won.size:
             k, count = Counter(won.tolist()).most_common(1)[0]
-            shares.setdefault(panel.names[k], []).append((count / won.size, quantity.replace("axis", "phase")))
-    each = []
-    for row, ((first, quantity), *others) in shares.items():
-        rest = "".join(f", {share:.0%} for {other}" for share, other in others)
-        each.append(f"{row} is the cheapest in {first:.0%} for {quantity}{rest}")
-    return f"On {named(name)}, of the cells that some method reaches, {'; '.join(each)}"
+            most[quantity] = panel.names[k], count / won.size
+    return most
+
+
+def message(data: xr.DataTree) -> str:
+    """The figure's one message: the row that is cheapest most often, for each of the three errors."""
+    shares: dict[str, list[str]] = {}
+    for quantity, (row, share) in leaders(data).items():
+        said = f"{share:.0%}{'' if shares else ' of the cells that any method reaches'} for "
+        shares.setdefault(row, []).append(said + quantity.replace("axis", "phase"))
+    each = "; ".join(f"{row} is the cheapest method in {', '.join(parts)}" for row, parts in shares.items())
+    return f"On {named(diagrams.where(data)[0])} {each}"
+
+
+def level_sentence(data: xr.DataTree) -> str:
+    """How many cells of the picture are level."""
+    panels = [diagram(data, diagrams.where(data)[0], quantity) for quantity in QUANTITIES]
+    ratios = np.concatenate([panel.ratio[panel.winner >= 0] for panel in panels])
+    share = (ratios < TIE).mean() if ratios.size else 0.0
+    return f"In {share:.0%} of the cells that any row reaches another row costs less than {TIE:g} times as much."
 
 
 def population_sentence(data: xr.DataTree) -> str:
