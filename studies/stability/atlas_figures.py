@@ -38,7 +38,7 @@ LINES = {  # over the maps: label and dashes
     "third": ("nutation turns by 1/3 a step", (0, (4, 2))),
     "passage": ("one step passes the pole", (0, (1, 1.5))),
 }
-COLUMNS = (6, 5)  # of small maps; the first of them that leaves the fewest places empty
+COLUMNS = (6, 5)  # of small maps: what takes the fewest rows, and then leaves the fewest places empty
 INSET = 0.06  # of a small map's width: no tick closer to its sides, whose number would touch the neighbour's
 LETTERS = 17  # of a line above a small map
 AXES = {"spin": "spin r", "gap": r"gap $\delta$ (rad)"}  # what grows upwards
@@ -166,7 +166,7 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
     drawn = dict[str, None]()  # outcomes and lines, for the legend
     across, upwards = (_reach([one[k] for one in shown.values()]) for k in (2, 1))
     inner = across[0] + INSET * (across[1] - across[0]), across[1] - INSET * (across[1] - across[0])
-    columns = min(len(names), min(COLUMNS, key=lambda count: -len(names) % count))
+    columns = min(len(names), min(COLUMNS, key=lambda count: (-(-len(names) // count), -len(names) % count)))
     rows = -(-len(names) // columns)
     titles = {name: _title(name, shown[name]) for name in names}
     high = [max(titles[name].count("\n") for name in names[k : k + columns]) + 1 for k in range(0, len(names), columns)]
