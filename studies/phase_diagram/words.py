@@ -19,16 +19,16 @@ PANELS = {
     "shape": "shape: distance to the true orbit",
 }
 HOW_TO_READ = (
-    "A cell is an allowed error and a horizon; its colour is the row, a method in one chart, of the least cost. A cost "
-    "is measured: force evaluations a nutation of the coarsest step or tolerance whose error stays below the target up "
-    "to the horizon, interpolated between settings a factor of 2 in the step or 10 in the tolerance apart, times the "
-    "measured time of an evaluation in a run by itself; of the population the median. Errors are measured as far as "
-    "the budget of a run goes, to 10^6 nutations at most, and behind that foretold from the growth of the same run: "
-    "one power of the horizon or the sum of two, and a walk of rounding whose size is an order of magnitude. A cell is "
-    "hatched if its winner's error is foretold. The table says which row is next; a cell is level if that costs less "
-    f"than {TIE:g} times as much. Energy and shape are asked from 4 steps a nutation on, and not of the Gauss methods, "
-    "which keep both at any step in the chart axis. Left out are exact and exact-discrete, closed forms whose cost "
-    "does not depend on the horizon or the error."
+    "A cell is an allowed error and a horizon; its colour is the row, a method in one chart, of the least cost, or the "
+    "family of that method. A cost is measured: force evaluations a nutation of the coarsest step or tolerance whose "
+    "error stays below the target up to the horizon, interpolated between settings a factor of 2 in the step or 10 in "
+    "the tolerance apart, times the measured time of an evaluation in a run by itself; of the population the median. "
+    "Errors are measured as far as the budget of a run goes, to 10^6 nutations at most, and behind that foretold from "
+    "the growth of the same run: one power of the horizon or the sum of two, and a walk of rounding whose size is an "
+    "order of magnitude. A cell is hatched if its winner's error is foretold. The table says which row is next; a cell "
+    f"is level if that costs less than {TIE:g} times as much. Energy and shape are asked from 4 steps a nutation on, "
+    "and not of the Gauss methods, which keep both at any step in the chart axis. Left out are exact and "
+    "exact-discrete, closed forms whose cost does not depend on the horizon or the error."
 )
 CELLS = ["tops", "quantity", "target", "nutations", "cheapest", "ns a nutation", "next", "ratio", "kind"]
 SPOTS = ["quantity", "target", "nutations", "cheapest, foretold", "ns a nutation, foretold", "measured",
