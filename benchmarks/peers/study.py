@@ -1,75 +1,86 @@
 """The peers as a study of the report: its question, its figure, its words, and where and when it was measured."""
 
-from typing import Any
-
-import numpy as np
 import xarray as xr
 
 from benchmarks.measured import sentence
 from benchmarks.peers import distributions, summary
 from benchmarks.peers.measure import HEYOKA, OURS, PERIODS
 from benchmarks.peers.summary import ENGINES, JUDGED, NAMES
-from symtop.report import figures, style
+from symtop.report import style
 from symtop.runner.study import Picture, Study
 
-THIN = 1.3
-LOOKS = {  # color, marker, line, width
-    OURS: (style.BLUE, "o", "-", 2.6),
-    HEYOKA: (style.BLACK, "*", "-", THIN),
-    "rebound": (style.GREEN, "^", "-", THIN),
-    "arkode-sprk": (style.SKY, "v", "-", THIN),
-    "cvode": (style.ORANGE, "s", "-", THIN),
-    "scikit-sundae": (style.ORANGES[1], "<", ":", THIN),
-    "diffrax": (style.PURPLE, "D", "-", THIN),
-    "scipy-odeint[axis], numba": (style.REDS[1], "P", "-", THIN),
-    "scipy[axis], Python": (style.REDS[2], "o", "--", THIN),
-    "scipy[angles], Python": (style.REDS[2], "h", ":", THIN),
-    "scipy[axis], numba": (style.VERMILLION, "X", "-", THIN),  # over the one in Python, which is as fast
-}
-LEAST_SHOWN = 5e-15  # rad: below all that was measured
-LEFT_OUT = ("scipy[angles], numba", "scipy-odeint[axis], Python", *ENGINES)
+SOLVE_IVP = "scipy["  # how the groups of SciPy's solve_ivp begin: a chart and a language each
+SPOKEN, OTHER = style.VERMILLION, "#888888"  # rows that the title is about, and the others
+WORDS = {"numba": "compiled", "Python": "Python"}  # a right-hand side
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
-    """Axis error against seconds: the front of each group, in both calls."""
-    scenes = [str(name) for name in data["scene"].values]
+    """The time of each library over symtop's at the same error, in both calls."""
     known = summary.groups(data)
-    names = [name for name in dict.fromkeys([*LOOKS, *known]) if name in known and name not in LEFT_OUT]
-    figure, axes = style.panels(len(NAMES), len(scenes), height=2.5, sharey=True, sharex=True)
-    for row, (call, words) in zip(axes, NAMES.items(), strict=True):
-        for axis, scene in zip(row, scenes, strict=True):
-            for name in names:
-                _front(axis, data.sel(call=call, scene=scene, integrator=known[name]), name)
-            for target in JUDGED:
-                axis.axhline(target, color=style.GREY, lw=0.8, ls=(0, (5, 3)), zorder=0)
-            axis.set(xscale="log", yscale="log", title=f"{words}, scene {scene}", ylim=(LEAST_SHOWN, 10.0))
-            axis.label_outer()
-        row[0].set_ylabel(f"largest axis error over\n{PERIODS:g} nutations (rad)")
-    for axis in axes[-1]:
-        axis.set_xlabel("wall time of one call (s)")
+    spans = {name: _spans(data, known, name) for name in known if name not in (OURS, *ENGINES)}
+    names = sorted((name for name in spans if all(spans[name])), key=lambda name: max(spans[name][0]))
+    figure, axes = style.panels(1, len(NAMES), height=0.19 * len(names) + 1.1, sharey=True)
+    for k, (axis, words) in enumerate(zip(axes[0], NAMES.values(), strict=True)):
+        farthest = max((max(spans[name][k]) for name in names), default=1.0)
+        for place, name in enumerate(names):
+            ratios, color = spans[name][k], SPOKEN if name.startswith(SOLVE_IVP) else OTHER
+            axis.plot([min(ratios), max(ratios)], [place, place], color=color, lw=1.2)
+            axis.plot(ratios, [place] * len(ratios), "o", color=color, ms=4.0)
+            said = f"{summary.printed(min(ratios))} to {summary.printed(max(ratios))}"
+            axis.annotate(
+                said, (1.02, place), xycoords=("axes fraction", "data"), va="center", fontsize=style.LEAST_TEXT,
+                color=style.ink(color), annotation_clip=False,
+            )  # fmt: skip
+        axis.axvline(1.0, color=style.BLUE, lw=1.6)
+        axis.set(xscale="log", xlim=(0.8, 1.5 * farthest), ylim=(len(names) - 0.4, -0.6), title=words)
+        axis.set_xlabel("times as long as symtop's own methods")
+        axis.text(1.0, -0.65, " symtop", color=style.BLUE, fontsize=style.LEAST_TEXT, va="bottom", ha="center")
+        axis.title.set_position((0.5, 1.06))
+        axis.grid(visible=False, axis="y")
+        axis.tick_params(axis="y", length=0)
+    axes[0, 0].set_yticks(range(len(names)), [_label(name) for name in names], fontsize=style.LEAST_TEXT)
+    for name, text in zip(names, axes[0, 0].get_yticklabels(), strict=True):
+        text.set_color(SPOKEN if name.startswith(SOLVE_IVP) else "black")
     style.few_ticks(*axes.flat, most=5)
-    style.headline(figure, _message(data, known) or "Axis error against time, the best that each library offers")
-    axes[0, 0].plot([], [], color=style.GREY, lw=0.8, ls=(0, (5, 3)), label="errors that the title is about")
-    style.legend_below(figure, axes)
+    scenes = " and ".join(data["scene"].values.astype(str))
+    errors = " and ".join(style.number(target) for target in JUDGED)
+    figure.supxlabel(
+        f"A dot: the library's fastest run with an error of at most {errors} rad over {PERIODS:g} nutations of "
+        f"{scenes},\nover symtop's fastest. Public call: what a user types. Inner loop: without set-up and samples.",
+        fontsize=7.5, ha="left", x=0.01,
+    )  # fmt: skip
+    style.headline(figure, _message(data, known) or "Time of other libraries over that of symtop at the same error")
     caption = (
-        "Above, the call that a user types; below, the inner loop alone; the same runs at the same settings in both. "
-        f"{_gain(data, known)}Each curve is the best that a library offers: for every accuracy its fastest method and "
-        "setting. Best is towards the lower left; the thick line is symtop's own kernels. Reds: SciPy, on (e, L) "
-        "with a compiled right-hand side (solid) or one in Python (dashed), and in Euler angles in Python (dotted). "
-        f"All others on (e, L), but arkode-sprk in angles. {PERIODS:g} nutations of each scene; dashed grey: the "
-        "accuracies at which the verdict is given."
+        f"{_gain(data, known)}A line is a library, with the chart and the language of its right-hand side where it was "
+        "given several; a dot is one scene and one accuracy, at which its fastest method and setting is divided by "
+        "the fastest of symtop's own kernels. Left, the call that a user types; right, the inner loop alone; the same "
+        f"runs at the same settings in both. All on (e, L), but arkode-sprk and the rows [angles] in Euler angles. "
+        "symtop with heyoka is taylor, heyoka's stepper called by symtop."
     )
-    alt = "Log-log plots of axis error against wall time, a row for each call, a panel a scene, a curve a library."
+    alt = "Dot plots of the time of each library over that of symtop, a panel for each call, a line a library."
     return [Picture("fronts", figure, caption, alt)]
 
 
+def _spans(data: xr.Dataset, known: dict[str, list[str]], name: str) -> list[list[float]]:
+    """The ratios of a group in each call, of all scenes and judged accuracies that both reach."""
+    return [summary.ratios(data, call, known.get(OURS, []), known[name]) for call in NAMES]
+
+
+def _label(name: str) -> str:
+    """A group as the figure names it."""
+    first, mark, language = name.partition(", ")
+    if first.startswith("scipy"):
+        first = "SciPy " + first.replace("scipy-", "").replace(SOLVE_IVP, "solve_ivp[")
+    return f"{first}{mark}{WORDS.get(language, language)}"
+
+
 def _gains(data: xr.Dataset, known: dict[str, list[str]]) -> list[str]:
-    """How many times as long SciPy's solve_ivp takes on the same equations, in both calls; empty if one is missing."""
-    theirs = known.get("scipy[axis], numba", [])
-    spans = [summary.span(data, call, known.get(OURS, []), theirs) for call in NAMES]
-    if not theirs or None in spans:
+    """How many times as long SciPy's solve_ivp takes in both calls, whatever it was given; empty without it."""
+    spans = [_spans(data, known, name) for name in known if name.startswith(SOLVE_IVP)]
+    calls = [[ratio for one in spans for ratio in one[k]] for k in range(len(NAMES))]
+    if not all(calls):
         return []
-    return [f"{summary.printed(low)} to {summary.printed(high)} times" for low, high in spans]  # type: ignore[misc]
+    return [f"{summary.printed(min(each))} to {summary.printed(max(each))} times" for each in calls]
 
 
 def _message(data: xr.Dataset, known: dict[str, list[str]]) -> str:
@@ -78,31 +89,15 @@ def _message(data: xr.Dataset, known: dict[str, list[str]]) -> str:
     if not gains:
         return ""
     return (
-        f"SciPy's solve_ivp, compiled, takes {gains[0]} as long as symtop's methods for this top in a public call, "
-        f"{gains[1]} as an inner loop"
+        f"SciPy's solve_ivp takes {gains[0]} as long as symtop's own methods in a public call, {gains[1]} as long in "
+        "an inner loop"
     )
 
 
 def _gain(data: xr.Dataset, known: dict[str, list[str]]) -> str:
     """The same as a sentence of the caption."""
     gains = _gains(data, known)
-    return (
-        f"SciPy's solve_ivp on the same equations takes {gains[0]} as long above, {gains[1]} below. " if gains else ""
-    )
-
-
-def _front(axis: Any, cell: xr.Dataset, name: str) -> None:
-    """The Pareto front of one group."""
-    seconds, error = cell["seconds"].values.ravel(), cell["axis"].values.ravel()
-    keep = figures.pareto(seconds, error) & np.isfinite(seconds) & np.isfinite(error)
-    order = np.argsort(seconds[keep])
-    color, marker, line, width = LOOKS.get(name, (style.GREY, "x", "-", THIN))
-    size = 8.0 if marker == "*" else 4.5
-    axis.plot(
-        seconds[keep][order], error[keep][order],
-        color=color, marker=marker, ls=line, lw=width, label=name, markersize=size,
-        zorder=4 if name == OURS else 3,
-    )  # fmt: skip
+    return f"SciPy's solve_ivp takes {gains[0]} as long at the left, {gains[1]} at the right. " if gains else ""
 
 
 def measured(data: xr.Dataset) -> str:

@@ -83,15 +83,21 @@ def shown(seconds: float) -> str:
     return f"{seconds * 1e6:.3g} us"
 
 
-def span(data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str]) -> tuple[float, float] | None:
-    """The least and the largest ratio, their time over ours, over scenes and judged accuracies."""
-    ratios = []
+def ratios(data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str]) -> list[float]:
+    """Their time over ours on every scene and at every judged accuracy that both reach."""
+    each = []
     for scene in data["scene"].values.astype(str):
         for target in JUDGED:
             ours, other = (best_of(data, call, scene, rows, target) for rows in (mine, theirs))
             if ours is not None and other is not None:
-                ratios.append(other.timing.best / ours.timing.best)
-    return (min(ratios), max(ratios)) if ratios else None
+                each.append(other.timing.best / ours.timing.best)
+    return each
+
+
+def span(data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str]) -> tuple[float, float] | None:
+    """The least and the largest ratio, their time over ours, over scenes and judged accuracies."""
+    each = ratios(data, call, mine, theirs)
+    return (min(each), max(each)) if each else None
 
 
 def printed(value: float) -> str:
@@ -196,12 +202,12 @@ def tables(data: xr.Dataset) -> list[Table]:
             cells = _cells(data, scene, target, [row], ours)
             if cells[1] != "not reached":
                 by_row.append([scene, f"{target:.0e}", row, cells[1], cells[2], cells[4], cells[5]])
-    ratios = []
+    both = []
     for name, rows in known.items():
         one = data.sel(integrator=rows[0])
         public, inner = (_range(span(data, call, ours, rows)) for call in NAMES)
         if name != OURS:
-            ratios.append([name, str(one["chart"].values), str(one["language"].values), public, inner])
+            both.append([name, str(one["chart"].values), str(one["language"].values), public, inner])
     keys = ("package", "version", "chart", "language", "implementation", "shows", "formulation")
     given = [
         [str(row), *(str(data[key].sel(integrator=row).values) for key in keys)] for row in data["integrator"].values
@@ -210,7 +216,7 @@ def tables(data: xr.Dataset) -> list[Table]:
         Table(
             f"Both ratios: the time over symtop's ({_fixed(data)})",
             ["library", "chart", "right-hand side", NAMES["public"], NAMES["inner"]],
-            ratios,
+            both,
         ),
         Table(
             "Both comparisons, the fastest row of each library", ["scene", "axis error", "library", *heads], by_group

@@ -1,19 +1,21 @@
 """Figures of the study: the five named methods together, what every order costs, error against tolerance."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from symtop.measure.growth import tops
 from symtop.methods.registry import split_name
+from symtop.model.charts import Array
 from symtop.report.figures import SMALLEST, error_band
-from symtop.report.style import FIRM, GREY, few_ticks, grid, headline, legend_below, line, number, panels
+from symtop.report.style import FIRM, LEAST_TEXT, few_ticks, headline, legend_below, line, look, number, panels
 from symtop.runner.study import Picture
 
 from .tables import (
     HISTORY_STEPS,
+    LARGE,
     MAIN,
     NAMED,
     Efficiency,
@@ -30,7 +32,6 @@ from .words import spans
 
 TARGET = 1e-6  # rad, the axis error at which costs are compared
 HORIZON = "over 8 nutations (spheroid: to t = 8)"
-SHOWN_ADAPTIVE = ("rk45[angles]", "dop853[angles]", "lsoda[angles]", "taylor[axis]", "series-adaptive[axis]")
 EQUAL = {
     "color": "#9EC9E8",
     "lw": 5.0,
@@ -218,54 +219,82 @@ def _halves(blocks: list[list[str]]) -> list[list[list[str]]]:
     return [blocks[:cut], blocks[cut:]]
 
 
+class Met(NamedTuple):
+    """The errors of an adaptive row over its tolerances, and the scene of the largest."""
+
+    ratios: Array
+    worst_on: str
+
+    @property
+    def middle(self) -> float:
+        """The median."""
+        return float(np.median(self.ratios))
+
+
+def _met(data: xr.Dataset) -> dict[str, Met]:
+    """Of each adaptive row, where its tolerance rules; the row that errs least first."""
+    fitted, listed = tolerance_fits(data), {}
+    for name in merged(data, MAIN):
+        parts = {}
+        for scene in map(str, data["scene"].values):
+            cell, used = data.sel(scene=scene, integrator=name), fitted[scene, name].used
+            parts[scene] = (cell[MAIN] / cell["tolerance"]).values[used]
+        if sum(part.size for part in parts.values()):
+            worst_on = max(parts, key=lambda scene: parts[scene].max(initial=0.0))
+            listed[name] = Met(np.concatenate(list(parts.values())), worst_on)
+    return dict(sorted(listed.items(), key=lambda item: item[1].middle))
+
+
 def _by_tolerance(data: xr.Dataset) -> Picture:
-    """Error of the adaptive rows against their tolerance, with the line where they are equal."""
-    fitted, labels = tolerance_fits(data), merged(data, MAIN)
-    scenes = [str(name) for name in data["scene"].values]
-    figure, axes = grid(
-        len(scenes), min(2, len(scenes)), ("tolerance asked for", "largest axis error (rad)"), sharey=True
-    )
-    shown = [name for name in labels if name in SHOWN_ADAPTIVE]
-    ratios, worst = [], (0.0, 0.0, 0.0, axes[0])  # ratio, tolerance, error, panel
-    for scene, axis in zip(scenes, axes, strict=True):
-        part = data.sel(scene=scene)
-        floor = error_band(axis, part[f"{MAIN}_bound"].values)
-        for name in labels:
-            cell, used = part.sel(integrator=name), fitted[scene, name].used
-            error, tolerance = np.maximum(cell[MAIN].values, 0.3 * floor), cell["tolerance"].values
-            if name in shown:
-                _line(axis, name, labels[name], tolerance, error)
-            else:
-                axis.plot(tolerance, error, color=GREY, lw=0.6, alpha=0.6, zorder=1)
-            points = [*zip((cell[MAIN].values / tolerance)[used], tolerance[used], error[used], strict=True)]
-            ratios += [ratio for ratio, _, _ in points]
-            worst = max([worst, *((*map(float, point), axis) for point in points)], key=lambda point: point[0])
-        axis.plot([], [], color=GREY, lw=0.8, label="other adaptive methods")
-        axis.set(xscale="log", yscale="log", title=f"scene {scene}")
-    for axis in axes:
-        _equal(axis)
-    legend_below(figure, axes)
-    middle = float(np.median(ratios)) if ratios else np.nan
-    few_ticks(*axes)
-    if ratios:
-        most, tolerance, error, axis = worst
-        axis.plot(tolerance, error, "o", color="black", ms=9, mfc="none", mew=1.2, zorder=4)
-        axis.annotate(
-            f"{number(most)} times", (tolerance, error), (-6, 6), textcoords="offset points", ha="right", fontsize=7.5
-        )
+    """Error over tolerance of every run of the adaptive rows, a line a row, with the line where they are equal."""
+    met = _met(data)
+    figure, axes = panels(1, 1, height=0.155 * max(len(met), 6) + 1.0)
+    axis = axes[0, 0]
+    for place, (name, one) in enumerate(met.items()):
+        color = look(name).color
+        axis.plot(one.ratios, [place] * one.ratios.size, "o", color=color, ms=2.5, alpha=0.45, mew=0)
+        axis.plot([one.middle] * 2, [place - 0.42, place + 0.42], color=color, lw=2.2, solid_capstyle="butt", zorder=3)
+    axis.set(xscale="log", ylim=(len(met) - 0.4, -0.6), yticks=range(len(met)))
+    axis.set_xlabel("largest axis error over the tolerance asked for")
+    axis.set_yticklabels(list(met), fontsize=LEAST_TEXT)
+    axis.grid(visible=False, axis="y")
+    axis.tick_params(axis="y", length=0)
+    axis.axvline(1.0, color=EQUAL["color"], lw=EQUAL["lw"], zorder=0, label=EQUAL["label"])
+    if met:
+        ratios = np.concatenate([one.ratios for one in met.values()])
+        middle, most = float(np.median(ratios)), float(ratios.max())
+        place, (_, one) = max(enumerate(met.items()), key=lambda item: item[1][1].ratios.max())
+        axis.axvline(middle, color="black", lw=0.9, ls=(0, (4, 2)), zorder=2, label="median of all runs")
+        axis.plot(most, place, "o", color="black", ms=8, mfc="none", mew=1.2, zorder=4)
+        said = {"fontsize": 7.5, "weight": "bold", "textcoords": "offset points"}
+        axis.annotate(f"{number(most)} times", (most, place), (7, 0), va="center", **said)
+        axis.annotate(f"{number(middle)} times", (middle, -0.6), (3, 1), va="bottom", **said)
+        axis.set_xlim(0.5 * ratios.min(), 20.0 * most)  # with room for the number
         headline(
             figure,
-            f"Where the tolerance rules, the error of adaptive methods is {number(middle)} times the tolerance in the "
-            f"median, {number(most)} times at most",
+            f"The error of adaptive methods is {number(middle)} times the tolerance in the median, "
+            f"{number(most)} times at most",
         )
-    slopes = {name: [fit.slope for pair, fit in fitted.items() if pair[1] == name and np.isfinite(fit.slope)]
-              for name in labels}  # fmt: skip
+    axis.plot([], [], "o", color="#444444", ms=3.5, mew=0, label="a run")
+    axis.plot([], [], "|", color="#444444", ms=8, mew=2.2, label="median of a method")
+    few_ticks(axis, most=9)
+    legend_below(figure, axes)
+    scenes = ", ".join(map(str, data["scene"].values))
+    figure.legends[0].set_title(
+        f"Runs on {scenes}, one at each tolerance.\nNot counted: errors above {LARGE:g} rad, and those near the "
+        "reference's error bound, which are rounding."
+    )
+    slopes = {name: [fit.slope for pair, fit in tolerance_fits(data).items()
+                     if pair[1] == name and np.isfinite(fit.slope)] for name in merged(data, MAIN)}  # fmt: skip
     listed = ", ".join(f"{name} {min(values):.2f} to {max(values):.2f}" for name, values in slopes.items() if values)
     caption = (
-        f"Largest axis error {HORIZON} of the adaptive methods, method[chart], against the tolerance that was asked "
-        "for; relative and absolute tolerance of the Runge-Kutta methods are equal. Lines above the wide diagonal "
-        f"lose more than they were asked for. Exponents x of error ~ tolerance^x: {listed}. Open markers: Euler "
-        "angles; dotted lines: plain Python."
+        f"Largest axis error {HORIZON} of the adaptive methods, method[chart], over the tolerance that was asked "
+        "for; relative and absolute tolerance of the Runge-Kutta methods are equal. A dot is a run, a mark the median "
+        "of its method; right of the wide line a run loses more than it was asked for. Left out are errors that do "
+        f"not follow the tolerance: above {LARGE:g} rad, and near the error bound of the reference, where they are "
+        f"rounding. Exponents x of error ~ tolerance^x: {listed}."
     )
-    alt = "Log-log plots of axis error against tolerance for the adaptive methods, with the diagonal as a guide."
+    if met:
+        caption += f" The largest ratio is on {one.worst_on}."
+    alt = "A line for each adaptive method with the error of every run over its tolerance, the medians marked."
     return Picture("tolerance", figure, caption, alt)

@@ -1,4 +1,4 @@
-"""The picture: the cheapest row of every allowed error and horizon; three errors wide, population above scene."""
+"""The pictures: the family of the cheapest row for every allowed error and horizon, three errors wide."""
 
 from collections import Counter
 from typing import Any
@@ -6,20 +6,30 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from symtop.methods.registry import integrator, split_name
-from symtop.report.style import headline, look, panels
+from symtop.report.style import LEAST_TEXT, headline, look, panels
 from symtop.runner.study import Picture
 
 from . import words
 from .runs import POPULATION, QUANTITIES
 from .tables import TARGETS, TIE, Diagram, diagram, tops_run
 
-NAMED = 10  # rows with their names on their regions
 HATCH = "///"  # foretold
-LEAST = 8  # cells of a region that bears a name
-PALE = 0.55  # of white in a cell that is level
+LETTER = 0.62  # of a cell: the width of a letter of a name on a region
+PALE = 0.45  # of white in the colour of a family beside that of its row in the title
+MOST_NAMES = 2  # of a family in the key
+UNREACHED = "#F0F0F0"
+LEVEL: dict[str, Any] = {
+    "ls": "none",
+    "marker": "o",
+    "ms": 2.4,
+    "mfc": "white",
+    "mec": "black",
+    "mew": 0.3,
+}  # of cells that are level
 FAMILIES = {
     "splitting": "splitting", "discrete-lagrangian": "discrete Lagrangian", "runge-kutta": "Runge-Kutta and Gauss",
     "taylor": "Taylor series",
@@ -27,99 +37,114 @@ FAMILIES = {
 
 
 def pictures(data: xr.DataTree) -> list[Picture]:
-    """The diagram."""
-    return [draw(data)]
+    """The diagram of the random tops, and that of one scene."""
+    return [draw(data, name) for name in tops_run(data)]
 
 
-def draw(data: xr.DataTree) -> Picture:
-    """Three panels a population or scene."""
-    places = tops_run(data)
-    each = {(name, quantity): diagram(data, name, quantity) for name in places for quantity in QUANTITIES}
+def draw(data: xr.DataTree, name: str) -> Picture:
+    """Three panels, of the random tops or of a scene."""
+    each = {quantity: diagram(data, name, quantity) for quantity in QUANTITIES}
     area: Counter[str] = Counter()
     for panel in each.values():
         area.update(panel.names[k] for k in panel.winner.ravel() if k >= 0)
-    spoken = [name for name, _ in area.most_common(NAMED)]
-    figure, axes = panels(len(places), len(QUANTITIES), height=2.7, sharex=True, sharey=True)
-    for row, name in enumerate(places):
-        for axis, quantity in zip(axes[row], QUANTITIES, strict=True):
-            _panel(axis, each[name, quantity], spoken)
-            axis.set_title(words.PANELS[quantity].replace(": ", "\n", 1) if row == 0 else "")
-        kind = "" if name == POPULATION else "scene "
-        axes[row][0].set_ylabel(f"{kind}{words.named(name)}:\nlargest error allowed")
-    for axis in axes[-1]:
+    leaders = words.leaders(data, name)
+    spoken = {row for row, _ in leaders.values()}  # rows of the title, which have a colour of their own
+    groups: dict[str, list[str]] = {}
+    for row, _ in area.most_common():
+        groups.setdefault(row if row in spoken else integrator(row).family, []).append(row)
+    colors = {name: _color(rows, spoken) for name, rows in groups.items()}
+    figure, axes = panels(1, len(QUANTITIES), height=3.0, sharex=True, sharey=True)
+    for axis, quantity in zip(axes[0], QUANTITIES, strict=True):
+        _panel(axis, each[quantity], groups, colors)
+        title = words.PANELS[quantity].replace(": ", "\n", 1)
+        if quantity in leaders:
+            row, share = leaders[quantity]
+            title += f"\n{split_name(row)[0]} in {share:.0%}"
+        axis.set_title(title)
         axis.set_xlabel("run length (nutations)")
-    families = {integrator(name).family: look(name).color for name, _ in reversed(area.most_common())}
-    keys = [Patch(facecolor=color, label=FAMILIES.get(family, family)) for family, color in families.items()]
+    axes[0][0].set_ylabel("largest error allowed")
+    keys = [Patch(facecolor=colors[name], label=_key(name, rows)) for name, rows in groups.items()]
     keys += [
-        Patch(facecolor="#BBBBBB", label=f"paler, in any colour: another within {TIE:g}"),
-        Patch(facecolor="white", edgecolor="#555555", hatch=HATCH, label="hatched: foretold, not run"),
-        Patch(facecolor="#F2F2F2", edgecolor="#CCCCCC", label="reached by none"),
+        Patch(facecolor="white", edgecolor="#777777", hatch=HATCH, label="hatched: foretold, not run"),
+        Patch(facecolor=UNREACHED, edgecolor="#BBBBBB", label="reached by no method: not counted"),
+        Line2D([], [], **LEVEL, label=f"dot: another costs less than {TIE:g} times as much"),
     ]
-    figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False)
-    headline(figure, words.message(data))
+    figure.legend(handles=keys, loc="outside lower center", ncols=2, frameon=False)
+    headline(figure, words.message(data, name))
+    tops = "random tops (medians)" if name == POPULATION else f"the scene {name}"
     return Picture(
-        "map",
+        "map" if name == POPULATION else name,
         figure,
-        "The cheapest row, method[chart], for an allowed error up to a horizon, on random tops (medians) and on one "
-        "scene: phase is the angle between the axes at the same time; energy is relative to E0 - min V; shape is the "
-        "distance of height and vertical velocity from the true orbit, which a delay does not change. At each cell "
-        "every row has the step or tolerance that suits it. Hatched: the error of the winner is foretold from the "
-        f"measured growth of its own run; pale: another row within {TIE:g}; grey: no row reaches it. "
-        f"{words.spot_sentence(data)} Gauss methods take no part in energy and shape, which they keep at any step. "
-        "Closed forms (exact, exact-discrete) take no part: they cost the same at every horizon.",
-        "Maps of the cheapest method over horizon and allowed error, three panels for random tops, three for a scene.",
-        lead="Cheapest by error and run length",
+        f"The cheapest row, method[chart], or its family, for an allowed error up to a horizon, on {tops}: phase is the angle between the axes at the same time; energy is relative to E0 - min V; shape is "
+        "the distance of height and vertical velocity from the true orbit, which a delay does not change. At each cell "
+        "every row has the step or tolerance that suits it. A name is that of the method with the most cells of a "
+        "region. Hatched: the error of the winner is foretold "
+        f"from the measured growth of its own run. {words.level_sentence(data, name)} {words.spot_sentence(data)} Gauss "
+        "methods take no part in energy and shape, which they keep at any step. Closed forms (exact, exact-discrete) "
+        "take no part: they cost the same at every horizon.",
+        f"Three maps of the cheapest method over horizon and allowed error on {tops}: phase, energy and shape.",
+        lead="Cheapest by error and run length" if name == POPULATION else "",
     )
 
 
-def _panel(axis: Any, panel: Diagram, spoken: list[str]) -> None:
-    """Coloured cells, hatched where foretold, with borders and names."""
+def _color(rows: list[str], spoken: set[str]) -> Any:
+    """That of the row with the most cells; paler if a row of the title is of the same family."""
+    kin = {integrator(row).family for row in spoken.difference(rows)}
+    part = PALE if integrator(rows[0]).family in kin else 0.0
+    return part + (1.0 - part) * np.array(to_rgb(look(rows[0]).color))
+
+
+def _panel(axis: Any, panel: Diagram, groups: dict[str, list[str]], painted: dict[str, Any]) -> None:
+    """Cells in the colours of groups, hatched where foretold, with names."""
     x, y = np.log10(panel.horizons), np.log10(TARGETS)
     dx, dy = 0.5 * (x[1] - x[0]), 0.5 * (y[0] - y[1])
-    colors = np.full((*panel.winner.shape, 3), to_rgb("#F2F2F2"))
-    for k, name in enumerate(panel.names):
-        mine = panel.winner == k
-        colors[mine] = to_rgb(look(name).color)
-    level = (panel.winner >= 0) & (panel.ratio < TIE)
-    colors[level] = PALE + (1.0 - PALE) * colors[level]
+    colors = np.full((*panel.winner.shape, 3), to_rgb(UNREACHED))
+    masks = [np.isin(panel.winner, [k for k, row in enumerate(panel.names) if row in rows]) for rows in groups.values()]
+    for mask, color in zip(masks, painted.values(), strict=True):
+        colors[mask] = color
     axis.imshow(colors, extent=(x[0] - dx, x[-1] + dx, y[-1] - dy, y[0] + dy), aspect="auto", interpolation="none")
-    for t, h in zip(*np.nonzero(panel.foretold), strict=True):
-        axis.add_patch(Rectangle((x[h] - dx, y[t] - dy), 2 * dx, 2 * dy, fill=False, hatch=HATCH, ec="#00000055", lw=0))
-    _borders(axis, panel.winner, (x, y), (dx, dy))
-    for k, name in enumerate(panel.names):
-        if name in spoken:
-            _name(axis, panel.winner == k, name, (x, y))
+    for t, h in np.ndindex(panel.winner.shape):  # thin white edges: cells can be counted
+        marks: dict[str, Any] = {"hatch": HATCH, "ec": "#FFFFFF99"} if panel.foretold[t, h] else {"ec": "none"}
+        axis.add_patch(Rectangle((x[h] - dx, y[t] - dy), 2 * dx, 2 * dy, fill=False, lw=0, **marks))
+    level = np.argwhere((panel.winner >= 0) & (panel.ratio < TIE))
+    axis.plot(x[level[:, 1]], y[level[:, 0]], **LEVEL)
+    axis.vlines(x[1:] - dx, y[-1] - dy, y[0] + dy, color="white", lw=0.3)
+    axis.hlines(y[1:] + dy, x[0] - dx, x[-1] + dx, color="white", lw=0.3)
+    for mask in masks:
+        _names(axis, mask, panel, (x, y))
     axis.grid(visible=False)
     axis.set_xticks(range(1, 10, 2), [f"$10^{{{k}}}$" for k in range(1, 10, 2)])
     axis.set_yticks(range(-12, -1, 2), [f"$10^{{{k}}}$" for k in range(-12, -1, 2)])
 
 
-def _borders(axis: Any, winner: Any, centres: tuple[Any, Any], half: tuple[float, float]) -> None:
-    """Lines between cells of different rows."""
-    (x, y), (dx, dy) = centres, half
-    for t, h in zip(*np.nonzero(winner[:, 1:] != winner[:, :-1]), strict=True):
-        axis.plot([x[h] + dx] * 2, [y[t] - dy, y[t] + dy], color="#222222", lw=0.9)
-    for t, h in zip(*np.nonzero(winner[1:] != winner[:-1]), strict=True):
-        axis.plot([x[h] - dx, x[h] + dx], [y[t] - dy] * 2, color="#222222", lw=0.9)
-
-
-def _name(axis: Any, mine: Any, name: str, centres: tuple[Any, Any]) -> None:
-    """The name on the thickest place of the largest region of a row."""
+def _names(axis: Any, mine: Any, panel: Diagram, centres: tuple[Any, Any]) -> None:
+    """The method with the most cells of each region of a family that has room for its name."""
     from scipy import ndimage  # takes 0.15 s, which a study with nothing to do need not
 
     regions, count = ndimage.label(mine)
-    if not count:
-        return
-    sizes = ndimage.sum_labels(mine, regions, range(1, count + 1))
-    largest = regions == 1 + int(np.argmax(sizes))
-    if largest.sum() < LEAST:
-        return
-    depth = ndimage.distance_transform_edt(np.pad(largest, 1))[1:-1, 1:-1]
-    places = np.argwhere(depth > depth.max() - 0.6)
-    t, h = places[np.argmin(((places - np.argwhere(largest).mean(axis=0)) ** 2).sum(axis=1))]
-    x = min(max(centres[0][h], 3.0), 7.4)
-    axis.text(
-        x, centres[1][t], split_name(name)[0] if name.endswith("[axis]") else name, ha="center", va="center",
-        fontsize=7.5, color="#111111",
-        bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.82},
-    )  # fmt: skip
+    for place in range(1, count + 1):
+        region = regions == place
+        label = _method(panel.names[Counter(panel.winner[region].tolist()).most_common(1)[0][0]])
+        room = ndimage.binary_erosion(region, np.ones((3, 2 * round(LETTER * len(label) / 2) + 1)))
+        if not room.any():
+            continue
+        places = np.argwhere(room)
+        t, h = places[np.argmin(((places - np.argwhere(region).mean(axis=0)) ** 2).sum(axis=1))]
+        axis.text(
+            centres[0][h], centres[1][t], label, ha="center", va="center", fontsize=LEAST_TEXT + 1, color="#111111",
+            bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.9},
+        )  # fmt: skip
+
+
+def _method(row: str) -> str:
+    """A row without its chart, if that is the axis, which most of them have."""
+    return split_name(row)[0] if row.endswith("[axis]") else row
+
+
+def _key(group: str, rows: list[str]) -> str:
+    """A row of the title, or a family with those of its rows that are the cheapest in the most cells."""
+    if group in rows:
+        return group
+    more = len(rows) - MOST_NAMES
+    others = f" and {more} other{'s' * (more > 1)}" if more > 0 else ""
+    return f"{FAMILIES.get(group, group)}: {', '.join(map(_method, rows[:MOST_NAMES]))}{others}"

@@ -19,16 +19,16 @@ PANELS = {
     "shape": "shape: distance to the true orbit",
 }
 HOW_TO_READ = (
-    "A cell is an allowed error and a horizon; its colour is the row, a method in one chart, of the least cost. A cost "
-    "is measured: force evaluations a nutation of the coarsest step or tolerance whose error stays below the target up "
-    "to the horizon, interpolated between settings a factor of 2 in the step or 10 in the tolerance apart, times the "
-    "measured time of an evaluation in a run by itself; of the population the median. Errors are measured as far as "
-    "the budget of a run goes, to 10^6 nutations at most, and behind that foretold from the growth of the same run: "
-    "one power of the horizon or the sum of two, and a walk of rounding whose size is an order of magnitude. A cell is "
-    "hatched if its winner's error is foretold. Pale: another row costs less than "
-    f"{TIE:g} times as much. Energy and shape are asked from 4 steps a nutation on, and not of the Gauss methods, "
-    "which keep both at any step in the chart axis. Left out are exact and exact-discrete, closed forms whose cost "
-    "does not depend on the horizon or the error."
+    "A cell is an allowed error and a horizon; its colour is the row, a method in one chart, of the least cost, or the "
+    "family of that method. A cost is measured: force evaluations a nutation of the coarsest step or tolerance whose "
+    "error stays below the target up to the horizon, interpolated between settings a factor of 2 in the step or 10 in "
+    "the tolerance apart, times the measured time of an evaluation in a run by itself; of the population the median. "
+    "Errors are measured as far as the budget of a run goes, to 10^6 nutations at most, and behind that foretold from "
+    "the growth of the same run: one power of the horizon or the sum of two, and a walk of rounding whose size is an "
+    "order of magnitude. A cell is hatched if its winner's error is foretold. The table says which row is next; a cell "
+    f"is level if that costs less than {TIE:g} times as much. Energy and shape are asked from 4 steps a nutation on, "
+    "and not of the Gauss methods, which keep both at any step in the chart axis. Left out are exact and "
+    "exact-discrete, closed forms whose cost does not depend on the horizon or the error."
 )
 CELLS = ["tops", "quantity", "target", "nutations", "cheapest", "ns a nutation", "next", "ratio", "kind"]
 SPOTS = ["quantity", "target", "nutations", "cheapest, foretold", "ns a nutation, foretold", "measured",
@@ -62,7 +62,7 @@ def spots(data: xr.DataTree) -> list[Spot]:
     """The checks."""
     if CHECKS not in data.children:
         return []
-    group, spots_run = data[CHECKS].to_dataset().isel(scene=0), []
+    group, found = data[CHECKS].to_dataset().isel(scene=0), []
     panels = {name: diagram(data, SCENE, name) for name in QUANTITIES}
     for name in group["integrator"].values:
         one = group.sel(integrator=name)
@@ -73,8 +73,8 @@ def spots(data: xr.DataTree) -> list[Spot]:
         costs = [
             1e9 * float(n) * diagrams.price(data, row) for n, row in zip(one["evaluations"].values, rows, strict=True)
         ]
-        spots_run.append(Spot(quantity, target, horizon, rows, foretold, costs))
-    return spots_run
+        found.append(Spot(quantity, target, horizon, rows, foretold, costs))
+    return found
 
 
 def spot_sentence(data: xr.DataTree) -> str:
@@ -112,21 +112,34 @@ def winners_sentence(data: xr.DataTree, quantity: str) -> str:
     return f"Cheapest, {PANELS[quantity]}: {'; '.join(said)}."
 
 
-def message(data: xr.DataTree) -> str:
-    """The figure's one message: the row that is cheapest most often, for each of the three errors."""
-    name = diagrams.tops_run(data)[0]
-    shares: dict[str, list[tuple[float, str]]] = {}
+def leaders(data: xr.DataTree, name: str) -> dict[str, tuple[str, float]]:
+    """Of each error the row that is the cheapest in the most cells of these tops, and its share of them."""
+    most = {}
     for quantity in QUANTITIES:
         panel = diagram(data, name, quantity)
         won = panel.winner[panel.winner >= 0]
         if won.size:
             k, count = Counter(won.tolist()).most_common(1)[0]
-            shares.setdefault(panel.names[k], []).append((count / won.size, quantity.replace("axis", "phase")))
-    each = []
-    for row, ((first, quantity), *others) in shares.items():
-        rest = "".join(f", {share:.0%} for {other}" for share, other in others)
-        each.append(f"{row} is the cheapest in {first:.0%} for {quantity}{rest}")
-    return f"On {named(name)}, of the cells that some method reaches, {'; '.join(each)}"
+            most[quantity] = panel.names[k], count / won.size
+    return most
+
+
+def message(data: xr.DataTree, name: str) -> str:
+    """The figure's one message of these tops: the row that is cheapest most often, for each of the three errors."""
+    shares: dict[str, list[str]] = {}
+    for quantity, (row, share) in leaders(data, name).items():
+        said = f"{share:.0%}{'' if shares else ' of the cells that any method reaches'} for "
+        shares.setdefault(row, []).append(said + quantity.replace("axis", "phase"))
+    each = "; ".join(f"{row} is the cheapest method in {', '.join(parts)}" for row, parts in shares.items())
+    return f"On {named(name)} {each}"
+
+
+def level_sentence(data: xr.DataTree, name: str) -> str:
+    """How many cells of these tops are level."""
+    panels = [diagram(data, name, quantity) for quantity in QUANTITIES]
+    ratios = np.concatenate([panel.ratio[panel.winner >= 0] for panel in panels])
+    share = (ratios < TIE).mean() if ratios.size else 0.0
+    return f"In {share:.0%} of the cells that any row reaches another row costs less than {TIE:g} times as much."
 
 
 def population_sentence(data: xr.DataTree) -> str:

@@ -1,6 +1,7 @@
 """The figures of the population study: run lengths, slowdowns and wins, strata, silent failures, the guard."""
 
 import textwrap
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -20,14 +21,14 @@ from .verdicts import ALL, UNITS, Cell
 NAMED = 6  # rows with a label; all others are thin and grey
 FAMILIAR = ("rk4[axis]", "strang[axis]", "midpoint[angles]")  # always among them, thin
 MARKS = 9  # on a line
-SHOWN = 12  # rows of a panel of slowdowns
+SHOWN = 6  # rows of a panel of slowdowns
+EVEN = 1e-6  # of a win: what a tie counts between rows with the same wins
 FAR = 1e3  # slowdown at which an axis ends
 LATEST = 0.995  # of a named row's costs lie within the axis of a panel
 RARE = 1e-3  # share of false alarms at which an axis begins
 LEAST = 0.05  # a row that solves less is named in words
 OTHERS = "all other methods"
-MEAN = {"color": "black", "lw": 1.2, "ls": (0, (5, 2)), "zorder": 4}
-PAPER = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+OTHER = "#999999"  # of rows and bars that a title is not about
 
 
 def pictures(data: xr.DataTree) -> list[Picture]:
@@ -126,63 +127,68 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
 
 
 def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
-    """The best rows of each target: median and 10 to 90 % of the slowdown, and the share of tops on which they win."""
+    """The rows with the most wins: median and 10 to 90 % of the slowdown of each, a panel for each target."""
     targets = verdicts.targets(data)
-    labels = ("times the least cost", "")
-    figure, axes = grid(len(targets), 2, labels, height=0.145 * SHOWN + 0.75)
-    for axis, target in zip(axes, targets, strict=True):
-        listed = verdicts.standings(verdicts.costs(data, Cell(horizon, "axis", target), words.UNIT))
-        listed = [one for one in listed if np.isfinite(one.slowdown[1])][:SHOWN]
-        for place, one in enumerate(listed):
-            low, middle, high = one.slowdown
-            mark = look(one.name)
-            axis.plot([low, min(high, FAR)], [place, place], color=mark.color, lw=1.5, solid_capstyle="butt")
-            if not np.isfinite(high):
-                axis.plot(0.8 * FAR, place, ">", color=mark.color, mfc="white", ms=4)
-            axis.plot(middle, place, mark.marker, color=mark.color, ms=5, fillstyle=mark.fill)
-            said = f"{one.won.value:.0%}, {one.level.value:.0%}"
-            axis.annotate(
-                said,
-                (1.06, place),
-                xycoords=("axes fraction", "data"),
-                va="center",
-                fontsize=LEAST_TEXT,
-                annotation_clip=False,
-            )
-        axis.set(xscale="log", xlim=(0.9, FAR), ylim=(SHOWN - 0.4, -0.6), yticks=range(len(listed)))
-        axis.set_yticklabels([one.name for one in listed], fontsize=LEAST_TEXT)
-        axis.set_title(f"to {power(target)} rad")
-        axis.annotate(
-            "wins, wins\nor ties",
-            (1.06, 1.0),
-            xycoords="axes fraction",
-            fontsize=LEAST_TEXT,
-            va="bottom",
-            annotation_clip=False,
-        )
+    cells = [verdicts.standings(verdicts.costs(data, Cell(horizon, "axis", target), words.UNIT)) for target in targets]
+    wins: Counter[str] = Counter()
+    for listed in cells:
+        wins.update({one.name: one.won.value + EVEN * one.level.value for one in listed if one.won.total})
+    names = [name for name, _ in wins.most_common(SHOWN)]
+    spoken = {name for name, _ in messages.first_and_last(data, horizon)}
+    figure, axes = panels(1, len(targets), height=0.19 * len(names) + 1.2, sharey=True)
+    for axis, target, listed in zip(axes[0], targets, cells, strict=True):
+        for one in (one for one in listed if one.name in names and one.won.total):
+            _slowdown(axis, names.index(one.name), one, one.name in spoken)
+        solved = max((one.won.total for one in listed), default=0)
+        axis.set(xscale="log", xlim=(0.6, FAR), ylim=(len(names) - 0.4, -0.6), yticks=range(len(names)))
+        axis.set(xlabel="times the least cost")
+        axis.set_title(f"to {power(target)} rad", pad=24.0)
+        axis.annotate(f"cheapest on,\nof {solved:,} tops", (1.3, -0.6), xycoords=("axes fraction", "data"), va="bottom",
+                      ha="right", fontsize=LEAST_TEXT, annotation_clip=False)  # fmt: skip
         axis.set_xticks([1.0, 10.0, 100.0, 1000.0], ["1", "10", "100", "1000"])
         axis.grid(visible=False, axis="y")
+        axis.tick_params(axis="y", length=0)
+    axes[0, 0].set_yticklabels(names, fontsize=LEAST_TEXT)
+    for name, text in zip(names, axes[0, 0].get_yticklabels(), strict=True):
+        text.set_weight("bold" if name in spoken else "normal")
     dark = {"color": "#444444", "lw": 0.0}
-    axes[0].plot([], [], "D", ms=5, label="median over the tops", **dark)
-    axes[0].plot([], [], color="#444444", lw=1.5, label="10 to 90 % of the tops")
-    axes[0].plot([], [], ">", ms=4, mfc="white", label="not reached on 10 % of the tops", **dark)
+    axes[0, 0].plot([], [], "o", ms=4.5, label="median over the tops", **dark)
+    axes[0, 0].plot([], [], color="#444444", lw=1.5, label="10 to 90 % of the tops")
+    axes[0, 0].plot([], [], ">", ms=4, mfc="white", label="unsolved on 10 % or more", **dark)
     style.legend_below(figure, axes)
+    most = max(map(len, cells))
     figure.legends[0].set_title(
-        f"Sorted by wins: tops on which all others cost at least {TIE:g} times as much, of those that some method "
-        f"solves.\nThe first {SHOWN} of the methods that solve at least half of them."
+        f"Cheapest on: of the tops that any method solves, those on which all others cost at least {TIE:g} times as "
+        f"much.\nShown: the {len(names)} of {most} methods that are the cheapest most often, all accuracies together."
     )
     headline(figure, messages.slowdowns(data, horizon))
     return Picture(
         f"slowdowns-{horizon}",
         figure,
-        f"The {SHOWN} rows, method[chart], with the most wins for each axis error: marker, median of the slowdown "
-        "against the cheapest row on the same top; bar, from the 10 % to the 90 % quantile (arrow: not reached within "
-        f"the budget). Beside it the share of tops on which the row wins beyond ties, and on which it is level with "
-        f"the cheapest or wins. A bar that stays near 1 is a safe choice. {words.span(data, horizon)}, no named scene; "
-        f"cost in {UNITS[words.UNIT]}, each at its own step or tolerance. "
+        f"The {len(names)} rows, method[chart], with the most wins at all accuracies together, in the same order in "
+        "each panel: marker, median of the slowdown against the cheapest row on the same top; bar, from the 10 % to "
+        "the 90 % quantile (arrow: not reached within the budget; no marker: not on half of the tops). Beside it the "
+        f"share of tops on which the row is the cheapest beyond ties. A bar that stays near 1 is a safe choice. "
+        f"{words.span(data, horizon)}, no named scene; cost in {UNITS[words.UNIT]}, each at its own step or tolerance. "
         f"{words.verdict_of(data, horizon, 'axis')}",
         "Dot plots of slowdown with bars from the 10 to the 90 % quantile, one panel for each axis error.",
     )
+
+
+def _slowdown(axis: Any, place: int, one: verdicts.Standing, spoken: bool) -> None:
+    """A line of a panel; the rows that the title is about in their colour, the others grey."""
+    low, middle, high = one.slowdown
+    mark, weight = look(one.name), "bold" if spoken else "normal"
+    color = mark.color if spoken else OTHER
+    axis.plot([min(low, FAR), min(high, FAR)], [place, place], color=color, lw=1.5, solid_capstyle="butt")
+    if not np.isfinite(high):
+        axis.plot(0.75 * FAR, place, ">", color=color, mfc="white", ms=4)
+    if np.isfinite(middle):
+        axis.plot(middle, place, mark.marker, color=color, ms=5, fillstyle=mark.fill)
+    axis.annotate(
+        f"{one.won.value:.0%}", (1.3, place), xycoords=("axes fraction", "data"), va="center", ha="right",
+        fontsize=LEAST_TEXT, weight=weight, annotation_clip=False,
+    )  # fmt: skip
 
 
 def draw_strata(data: xr.DataTree) -> Picture:
@@ -235,49 +241,45 @@ def draw_strata(data: xr.DataTree) -> Picture:
 
 
 def draw_silent(data: xr.DataTree) -> Picture:
-    """Wrong runs, and the part of them that nothing warns of, against the steps a nutation."""
-    rows = named(data, "short", words.UNIT)
-    figure, axes = panels(1, 2, height=2.6, sharex=True)
-    for name in verdicts.judged_rows(data):
-        one = verdicts.health(data, name)
-        if not one.fixed_step:
-            continue
-        enough = one.wrong >= 0.01 * one.runs
-        curves = one.wrong / one.runs, np.where(enough, one.silent / np.maximum(one.wrong, 1.0), np.nan)
-        for axis, values in zip(axes[0], curves, strict=True):
-            if name in rows:
-                axis.plot(one.setting, values, **drawn(name))
-            else:
-                axis.plot(one.setting, values, color=style.GREY, lw=0.6, alpha=0.5, zorder=1)
-    steps = np.array([axes[0, 0].dataLim.x0, axes[0, 0].dataLim.x1])
-    axes[0, 0].plot([], [], color=style.GREY, lw=0.8, label=OTHERS)
-    share = words.hidden(data)
-    axes[0, 1].plot(steps, [share.everywhere] * 2, label="all methods together", **MEAN)
-    axes[0, 1].plot((words.FINE, steps[1]), [share.fine] * 2, **MEAN)
-    for place, value in ((1.1 * steps[0], share.everywhere), (1.05 * words.FINE, share.fine)):
-        axes[0, 1].text(place, value + 0.01, f"{value:.0%}", weight="bold", va="bottom", bbox=PAPER, zorder=5)
-    titles = {f"wrong: axis off by more than {WRONG:g} rad": "runs", "wrong runs that look healthy": "wrong runs"}
-    for axis, (title, of) in zip(axes[0], titles.items(), strict=True):
-        axis.set(xscale="log", ylim=(0.0, 1.03), title=title, xlabel="steps a nutation", ylabel=f"share of {of}")
-        axis.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
-        axis.xaxis.set_major_formatter("{x:g}")
-    few_ticks(*axes.flat, most=4)
-    style.legend_below(figure, axes)
-    figure.legends[0].set_title(
-        f"{words.span(data, 'short')}. Healthy: a run that ends without an error and keeps energy and momenta to "
-        f"{KEPT:.0%}.\nLines end at the most steps tried; right, also where less than 1 % of the runs are wrong."
-    )
+    """The part of the wrong runs that nothing warns of: of all, of those with small steps, and by steps a nutation."""
+    share, steps = words.hidden(data), words.hidden_by_steps(data)
+    lines = [
+        ("all wrong runs", share.everywhere, share.wrong, True),
+        (f"at least {words.FINE:g} steps a nutation", share.fine, share.wrong_fine, True),
+        *((f"{step:.3g} steps a nutation", silent / max(wrong, 1.0), wrong, False) for step, wrong, silent in steps),
+    ]
+    places = [k + 0.6 * (k > 1) for k in range(len(lines))]  # the bars of the title stand apart
+    figure, axes = panels(1, 1, height=0.19 * len(lines) + 1.2)
+    axis = axes[0, 0]
+    for place, (_, value, wrong, spoken) in zip(places, lines, strict=True):
+        style_of = {"fontsize": 8.0 if spoken else LEAST_TEXT, "weight": "bold" if spoken else "normal"}
+        axis.barh(place, value, height=0.75, color=style.VERMILLION if spoken else OTHER)
+        axis.text(value + 0.01, place, f"{value:.0%}", va="center", **style_of)
+        axis.annotate(f"{wrong:,.0f}", (1.12, place), xycoords=("axes fraction", "data"), va="center", ha="right",
+                      annotation_clip=False, **style_of)  # fmt: skip
+    axis.annotate("wrong runs", (1.12, -0.6), xycoords=("axes fraction", "data"), ha="right", va="bottom",
+                  fontsize=LEAST_TEXT, annotation_clip=False)  # fmt: skip
+    axis.set(xlim=(0.0, 1.0), ylim=(places[-1] + 0.6, -0.6), yticks=places, xlabel="share that look healthy")
+    axis.set_yticklabels([label for label, *_ in lines], fontsize=LEAST_TEXT)
+    axis.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
+    axis.grid(visible=False, axis="y")
+    axis.tick_params(axis="y", length=0)
+    figure.supxlabel(
+        f"Wrong: the axis is off by more than {WRONG:g} rad. Healthy: it ends without an error and keeps energy and "
+        f"momenta to {KEPT:.0%}.\n{words.span(data, 'short')}, by every method; those with a tolerance are in the "
+        "first bar only.",
+        fontsize=7.5, ha="left", x=0.01,
+    )  # fmt: skip
     headline(figure, messages.silent(data))
     return Picture(
         "silent",
         figure,
-        f"Left: the share of runs whose axis is off by more than {WRONG:g} rad, against the steps a nutation. "
-        "Right: of these, the share that nothing warns of: they end without an error and keep the energy of the "
-        f"nutation and both momenta to {KEPT:.0%}, drawn where at least 1 % of runs are wrong. Rows, method[chart], "
-        f"with a fixed step; grey: all others. {words.span(data, 'short')}, no named scene. "
-        f"{words.silent_sentence(data)} A conserved "
-        "energy is no sign of a right answer.",
-        "Two panels of shares against steps a nutation: wrong runs, and wrong runs without any sign.",
+        f"Wrong runs, whose axis is off by more than {WRONG:g} rad, and the share of them that nothing warns of: they "
+        f"end without an error and keep the energy of the nutation and both momenta to {KEPT:.0%}. Of all rows, "
+        f"method[chart]; of the rows with a fixed step, below {words.FINE:g} steps a nutation and above, and at each "
+        f"number of them, over the rows that were run there. {words.span(data, 'short')}, no named scene. "
+        f"{words.silent_sentence(data)} A conserved energy is no sign of a right answer.",
+        "Bars of the share of wrong runs that look healthy: of all, of those with small steps, by steps a nutation.",
         lead="How often a run is wrong without a sign",
     )
 

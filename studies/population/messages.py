@@ -61,21 +61,24 @@ def run_lengths(data: xr.DataTree, unit: str, horizon: str) -> str:
     return f"{over(data, horizon).capitalize()} half of the tops are first solved {', '.join(each_by)}"
 
 
-def slowdowns(data: xr.DataTree, horizon: str) -> str:
-    """Who wins on the most tops at the coarsest target and at the finest that anybody meets."""
+def first_and_last(data: xr.DataTree, horizon: str) -> list[tuple[str, str]]:
+    """Who wins on the most tops at the coarsest target and at the finest that anybody meets, and on how many."""
     winners = []
     for target in verdicts.targets(data):
         taken, won = verdicts.best(data, Cell(horizon, "axis", target), UNIT)
         if won is not None:
-            winners.append((taken.names[won.row], f"on {won.share.value:.0%} of the tops to {ten(target)}"))
-    length = over(data, horizon)
-    if not winners:
+            winners.append((taken.names[won.row], f"on {won.share.value:.0%} of the tops at {ten(target)}"))
+    return winners if len(winners) < 2 else [winners[0], winners[-1]]
+
+
+def slowdowns(data: xr.DataTree, horizon: str) -> str:
+    """Who wins on the most tops at the coarsest target and at the finest that anybody meets."""
+    ends, length = first_and_last(data, horizon), over(data, horizon)
+    if not ends:
         return f"No method meets a target {length}"
-    (first, part), (last, last_part) = winners[0], winners[-1]
-    if len(winners) < 2:
-        return f"{length.capitalize()} {first} is the cheapest {part}"
-    others = last_part if last == first else f"{last} {last_part}"
-    return f"{length.capitalize()} {first} is the cheapest {part}, {others}"
+    (first, share), *others = ends
+    rest = [there.replace(" of the tops", "") if last == first else f"{last} {there}" for last, there in others]
+    return f"{', '.join([f'{first} is the cheapest {share}', *rest])}, {length}"
 
 
 def strata(data: xr.DataTree, horizon: str = "short") -> str:
@@ -101,15 +104,15 @@ def silent(data: xr.DataTree) -> str:
     """The share of wrong runs that nothing warns of, and that among small steps."""
     share = hidden(data)
     return (
-        f"{share.everywhere:.0%} of the wrong runs look healthy, and {share.fine:.0%} of those with at least {FINE:g} "
+        f"Wrong runs look healthy: {share.everywhere:.0%} of all, {share.fine:.0%} of those with at least {FINE:g} "
         "steps a nutation"
     )
 
 
 def guard(data: xr.DataTree) -> str:
     """What the guard finds of the wrong runs, and how many right ones it suspects, over each horizon."""
-    caught, alarms = zip(*(verdicts.caught(data, horizon) for horizon in verdicts.horizons(data)), strict=True)
-    least = min(caught, key=lambda share: share.value)
+    found, alarms = zip(*(verdicts.caught(data, horizon) for horizon in verdicts.horizons(data)), strict=True)
+    least = min(found, key=lambda share: share.value)
     suspected = [
         f"{percent(share)} {over(data, horizon) if not place else f'over {verdicts.nutations(data, horizon):g}'}"
         for place, (horizon, share) in enumerate(zip(verdicts.horizons(data), alarms, strict=True))

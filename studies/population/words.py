@@ -146,6 +146,7 @@ class Hidden(NamedTuple):
     wrong: float  # runs
     everywhere: float  # share of all wrong runs that look healthy
     fine: float  # among rows with a fixed step, of at least `FINE` steps a nutation
+    wrong_fine: float  # runs of these
 
 
 def hidden(data: xr.DataTree) -> Hidden:
@@ -155,7 +156,17 @@ def hidden(data: xr.DataTree) -> Hidden:
     small = [one for one in each if one.fixed_step]
     missed = sum(one.wrong[one.setting >= FINE].sum() for one in small)
     unseen = sum(one.silent[one.setting >= FINE].sum() for one in small)
-    return Hidden(float(wrong), float(silent / max(wrong, 1.0)), float(unseen / max(missed, 1.0)))
+    return Hidden(float(wrong), float(silent / max(wrong, 1.0)), float(unseen / max(missed, 1.0)), float(missed))
+
+
+def hidden_by_steps(data: xr.DataTree) -> list[tuple[float, float, float]]:
+    """Steps a nutation, wrong runs with so many, and those of them that nothing warns of; rows with a fixed step."""
+    sums: dict[float, tuple[float, float]] = {}
+    for one in (verdicts.health(data, name) for name in verdicts.judged_rows(data)):
+        for step, wrong, silent in zip(one.setting, one.wrong, one.silent, strict=True) if one.fixed_step else ():
+            before = sums.get(float(f"{step:.3g}"), (0.0, 0.0))
+            sums[float(f"{step:.3g}")] = before[0] + float(wrong), before[1] + float(silent)
+    return [(step, *sums[step]) for step in sorted(sums)]
 
 
 def silent_sentence(data: xr.DataTree) -> str:

@@ -8,7 +8,7 @@ at one step says nothing of the next step, and is not quoted.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -138,6 +138,12 @@ def methods_of(data: xr.Dataset) -> dict[str, Integrator]:
     """The integrators of a dataset that are registered, by the names of their rows."""
     names = map(str, data["integrator"].values)
     return {name: integrator(name) for name in names if split_name(name)[0] in integrators()}
+
+
+def closed_forms(data: xr.Dataset, shown: Iterable[str]) -> list[str]:
+    """Those rows that are exact at any step, which are named apart from the others."""
+    known = methods_of(data)
+    return [name for name in shown if name in known and known[name].exact_steps]
 
 
 def families(data: xr.Dataset) -> list[str]:

@@ -16,7 +16,7 @@ from symtop.measure.verdicts import VERDICTS
 from symtop.methods.registry import split_name
 from symtop.report.style import GREY, LEAST_TEXT, OUTCOME_COLORS, WIDTH, headline, panels
 
-from .atlas import OutcomeMap, common, maps
+from .atlas import OutcomeMap, closed_forms, common, maps
 from .tables import Column
 
 RASTER = {"small": (55, 90), "enlarged": (150, 220)}  # pixels of a map: hatches stay visible
@@ -32,15 +32,13 @@ HATCHES = {  # of the legend, and in the map: which pixels, by row, counted upwa
     "step_too_small": ("....", lambda row, column: (row % 5 == 0) & (column % 5 == 0)),
     "out_of_budget": ("||||", lambda row, column: (column % 6 == 0) & (row >= 0)),
 }
-NOT_TRIED = "not tried: in no share"  # the margin of a map that is smaller than its neighbours
-MARGIN = "#E4E4E4"
-LEAST_MARGIN = 0.02  # of a panel
+SEEN = 0.004  # of a small map: an outcome with less cannot be seen in it and has no entry in the key
 LINES = {  # over the maps: label and dashes
     "limit": ("small nutations grow beyond", "-"),
     "third": ("nutation turns by 1/3 a step", (0, (4, 2))),
     "passage": ("one step passes the pole", (0, (1, 1.5))),
 }
-COLUMNS = 6  # of small maps
+COLUMNS = (6, 5)  # of small maps: what takes the fewest rows, and then leaves the fewest places empty
 INSET = 0.06  # of a small map's width: no tick closer to its sides, whose number would touch the neighbour's
 LETTERS = 17  # of a line above a small map
 AXES = {"spin": "spin r", "gap": r"gap $\delta$ (rad)"}  # what grows upwards
@@ -122,7 +120,6 @@ def draw_map(axis: Any, one: OutcomeMap, size: str = "enlarged") -> None:
     most = 5 if size == "enlarged" else 3
     axis.set_xticks(*(([], []) if one.control == "none" else _ticks(x, most)))
     axis.set_yticks(*_ticks(y, most))
-    axis.set_facecolor(MARGIN)
     if size == "enlarged":
         _name_regions(axis, one.outcome, (*x, *y))
 
@@ -158,31 +155,38 @@ def by_area(shown: Mapping[str, OutcomeMap]) -> list[str]:
 
 
 def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) -> Any:
-    """A page of the maps over a scene's spin or gap, in the given order, each with its name and accurate share."""
-    shown = {name: one for name, one in maps(data, scene).items() if name in names}
-    compared, drawn = common(shown), dict[str, None]()  # the latter: outcomes and lines, for the legend
+    """A page of the maps over a scene's spin or gap, in the given order, each with its name and accurate share.
+
+    Of each map the part is drawn that all of them have, of which the shares are. The names of the rows with the
+    largest and the smallest share are bold, but for closed forms.
+    """
+    shown = common({name: one for name, one in maps(data, scene).items() if name in names})
+    judged = [name for name in names if name not in closed_forms(data, names)] or names
+    ends = [f"{shown[name].shares[0]:.0%}" for name in (judged[0], judged[-1])]
+    drawn = dict[str, None]()  # outcomes and lines, for the legend
     across, upwards = (_reach([one[k] for one in shown.values()]) for k in (2, 1))
     inner = across[0] + INSET * (across[1] - across[0]), across[1] - INSET * (across[1] - across[0])
-    columns = min(COLUMNS, len(names))
+    columns = min(len(names), min(COLUMNS, key=lambda count: (-(-len(names) // count), -len(names) % count)))
     rows = -(-len(names) // columns)
-    titles = {name: _title(name, compared[name]) for name in names}
+    titles = {name: _title(name, shown[name]) for name in names}
     high = [max(titles[name].count("\n") for name in names[k : k + columns]) + 1 for k in range(0, len(names), columns)]
     height = 0.62 + 0.115 * sum(high) / rows + 0.7 / rows
-    figure, axes = panels(rows, columns, width=WIDTH * max(columns, 3) / COLUMNS, height=height)
+    figure, axes = panels(rows, columns, width=WIDTH * max(columns, 3) / max(columns, COLUMNS[-1]), height=height)
     figure.get_layout_engine().set(w_pad=0.02, h_pad=0.015, wspace=0.01, hspace=0.01)
     for axis in axes.flat[len(names) :]:
         axis.set_visible(False)
     for k, (axis, name) in enumerate(zip(axes.flat, names, strict=False)):
         one = shown[name]
-        drawn |= dict.fromkeys(VERDICTS[index] for index in np.unique(sampled(one.outcome, *RASTER["small"])))
+        parts = zip(VERDICTS, one.shares, strict=False)
+        drawn |= dict.fromkeys(word for word, share in parts if share >= SEEN)
         draw_map(axis, one, "small")
         if one.control != "none":
-            drawn |= {} if _fills(one, across, upwards) else {NOT_TRIED: None}
             axis.set(xlim=across, ylim=upwards)
             axis.set_xticks(*_ticks(inner, 3))
             axis.set_yticks(*_ticks(upwards, 3))
         drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, integrator=name), one, over))
-        axis.set_title(titles[name], fontsize=LEAST_TEXT, pad=2.0, linespacing=1.0)
+        weight = "bold" if name in judged and f"{one.shares[0]:.0%}" in ends else "normal"
+        axis.set_title(titles[name], fontsize=LEAST_TEXT, pad=2.0, linespacing=1.0, weight=weight)
         axis.tick_params(length=1.5, pad=1.0, labelsize=LEAST_TEXT)
         if k % columns:
             axis.set_yticklabels([])
@@ -192,10 +196,6 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
             axis.set_xlabel(SHORT[one.control], fontsize=LEAST_TEXT, labelpad=1.0)
     figure.supylabel(AXES[over], fontsize=8.0)
     _key(figure, drawn)
-    if NOT_TRIED in drawn:
-        settings = next(iter(compared.values())).settings
-        told = f"Shares count what was tried with all: {settings[0]:.1g} to {settings[-1]:.1g}"
-        figure.legends[0].set_title(told, {"size": LEAST_TEXT})
     return figure
 
 
@@ -203,13 +203,6 @@ def _title(name: str, one: OutcomeMap) -> str:
     method, chart = split_name(name)
     share = f"{one.shares[0]:.0%}"
     return "\n".join([*textwrap.wrap(method, LETTERS), f"[{chart}] {share}" if chart else share])
-
-
-def _fills(one: OutcomeMap, across: tuple[float, float], upwards: tuple[float, float]) -> bool:
-    """Does a map leave no margin that would be seen?"""
-    own = ((_edges(one.settings), across), (_edges(one.parameter), upwards))
-    gaps = [(part[0] - low, high - part[1], LEAST_MARGIN * (high - low)) for part, (low, high) in own]
-    return all(max(below, above) < least for below, above, least in gaps)
 
 
 def _reach(values: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
@@ -237,7 +230,7 @@ def enlarged(data: xr.Dataset, family: str, name: str, message: str) -> Any:
 
 
 def _key(figure: Any, drawn: Mapping[str, None]) -> None:
-    shown = [name for name in (*VERDICTS, NOT_TRIED, *LINES) if name in drawn]
+    shown = [name for name in (*VERDICTS, *LINES) if name in drawn]
     columns = (4 if set(drawn).isdisjoint(("limit", "third")) else 3) if figure.get_figwidth() > 5.0 else 2
     figure.legend(handles=list(map(_handle, shown)), loc="outside lower center", ncols=columns, frameon=False)
 
@@ -250,5 +243,4 @@ def _handle(name: str) -> Any:
     if name in LINES:
         return Line2D([], [], color="black", lw=1.1, ls=LINES[name][1], label=LINES[name][0])
     hatch = HATCHES[name][0] if name in HATCHES else None
-    color = MARGIN if name == NOT_TRIED else OUTCOME_COLORS[name]
-    return Patch(facecolor=color, label=said(name), hatch=hatch, edgecolor=GREY, lw=0.4)
+    return Patch(facecolor=OUTCOME_COLORS[name], label=said(name), hatch=hatch, edgecolor=GREY, lw=0.4)

@@ -10,7 +10,7 @@ import xarray as xr
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT
 from symtop.methods.registry import split_name
 
-from .atlas import COMMON, NOTABLE, OutcomeMap, common, maps, methods_of, pole_effect
+from .atlas import COMMON, NOTABLE, OutcomeMap, closed_forms, common, maps, pole_effect
 from .tables import PERIODS, Column
 
 FAILURES = {
@@ -108,8 +108,7 @@ def page_message(data: xr.Dataset, scene: str, shown: Mapping[str, OutcomeMap]) 
 
     Methods that are exact at any step are named apart. Past a pole the chart decides, not the method.
     """
-    known = methods_of(data)
-    closed = [name for name in shown if name in known and known[name].exact_steps]
+    closed = closed_forms(data, shown)
     compared = common({name: one for name, one in shown.items() if name not in closed} or shown)
     control = "steps" if next(iter(shown.values())).control == "step_size" else "tolerances"
     if scene == "grazing" and control == "steps":
@@ -121,9 +120,9 @@ def page_message(data: xr.Dataset, scene: str, shown: Mapping[str, OutcomeMap]) 
                 f"methods in other charts in {min(others):.0%} to {max(others):.0%}"
             )
     best, worst = ends(compared)
-    place = "gaps past a pole" if scene == "grazing" else f"spins of {scene}"
+    place = "past a pole" if scene == "grazing" else f"of the scene {scene}"
     apart = f"; {' and '.join(closed)}: exact at any step" if closed and len(closed) < len(shown) else ""
-    return f"Accurate at most {control} and {place}: {best}; at fewest: {worst}{apart}"
+    return f"The most runs {place} are accurate with {best}, the fewest with {worst}{apart}"
 
 
 def caption(data: xr.Dataset, scene: str, names: Sequence[str]) -> str:
@@ -146,18 +145,18 @@ def caption(data: xr.Dataset, scene: str, names: Sequence[str]) -> str:
     control = "step" if shown[names[0]].control == "step_size" else "tolerance"
     return (
         f"Outcome of every run of {len(names)} rows, a map each, named by method and chart, with the share of its map "
-        f"that is accurate: {what}. The {control} grows to the right. "
+        f"that is accurate: {what}. The {control} grows to the right. Bold: the largest share and the smallest. "
         f"{_counted(shown, compared)}Accurate in the largest part of its map: {best}; "
         f"in the smallest: {worst}. {early}{_without_limit(data, scene, shown) if scene != 'grazing' else ''}"
     )
 
 
 def _counted(shown: Mapping[str, OutcomeMap], compared: Mapping[str, OutcomeMap]) -> str:
-    """Of which part of the maps shares are told, if some of them are smaller than others."""
+    """Which part of the maps is drawn, if some of them are smaller than others."""
     if all(compared[name].outcome.shape == one.outcome.shape for name, one in shown.items()):
         return ""
     low, high = (next(iter(compared.values())).settings[k] for k in (0, -1))
-    return f"Shares count what all maps have: {low:.2g} to {high:.2g}. Grey was not tried. "
+    return f"Maps and shares are of what was tried with all: {low:.2g} to {high:.2g}. "
 
 
 def _without_limit(data: xr.Dataset, family: str, shown: Mapping[str, OutcomeMap]) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from symtop_studies.stability import atlas, atlas_figures, atlas_words, figures, messages, outcome_maps, words
@@ -398,8 +399,15 @@ def test_shares_of_a_page_are_of_what_all_its_maps_have_and_panels_share_their_a
     drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-tolerances"]
     seen = [axis for axis in drawn.figure.axes if axis.get_visible()]
     assert seen[0].get_xlim() == pytest.approx(seen[1].get_xlim())
-    assert "Shares count what all maps have: 1e-06 to 0.01." in drawn.caption
-    assert "not tried" in " ".join(text.get_text() for text in drawn.figure.legends[0].get_texts())
+    assert "Maps and shares are of what was tried with all: 1e-06 to 0.01." in drawn.caption
+    for axis in seen:  # the share that is printed is the share that is seen
+        low, high = axis.get_xlim()
+        assert (10.0**low, 10.0**high) == pytest.approx((1e-6, 1e-2))
+        painted = np.isclose(axis.images[0].get_array(), to_rgb(OUTCOME_COLORS["accurate"])).all(axis=-1)
+        assert painted.mean() == pytest.approx(2 / 3, abs=0.02)
+        assert axis.get_title().endswith("67%")
+    key = {text.get_text() for text in drawn.figure.legends[0].get_texts()}
+    assert key == {"accurate", "bounded but wrong"}
 
 
 def test_a_tie_has_no_single_winner():

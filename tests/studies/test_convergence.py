@@ -1,6 +1,7 @@
 """The convergence study: rows are methods in charts, adaptive methods stand beside them, verdicts follow one rule."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from symtop.judging.claims_order import measured_order
 from symtop.judging.ledger import CLAIMS
 from symtop.measure.order import BESIDE, order_verdict
 from symtop.methods.registry import integrator, methods, rows, split_name
-from symtop.report.figures import BELOW
+from symtop.report import style
 from symtop.runner import store
 from symtop.runner.study import Case
 
@@ -101,12 +102,17 @@ def test_the_titles_have_numbers_that_their_figures_show(data):
         assert any(text in title for text in said)
     heads = [text for axis in constants.figure.axes for text in axis.get_yticklabels() if text.get_weight() == "bold"]
     assert {text.get_text() for text in heads} == {"order 2", "order 4"}
-    for axis in tolerance.figure.axes:
-        assert {"error = tolerance", BELOW} <= set(axis.get_legend_handles_labels()[1])
-        (x, y) = next(line.get_data() for line in axis.get_lines() if line.get_label() == "error = tolerance")
-        assert list(x) == list(y)
-        assert x[0] < axis.get_xlim()[0]
-        assert x[-1] > axis.get_xlim()[1]
+    (axis,) = tolerance.figure.axes
+    numbers = re.findall(r"[\d.]+ times", " ".join(tolerance.figure.get_suptitle().split("\n")))
+    assert numbers == [text.get_text() for text in sorted(axis.texts, key=lambda text: text.xy[0])]
+    ratios = np.concatenate([line.get_xdata() for line in axis.get_lines() if line.get_markersize() == 2.5])
+    fitted = tables.tolerance_fits(data)
+    assert ratios.size == sum(
+        int(fit.used.sum()) for fit in fitted.values()
+    )  # every run that counts is drawn, no other
+    assert numbers == [f"{style.number(value)} times" for value in (np.median(ratios), ratios.max())]
+    (equal,) = [line for line in axis.get_lines() if line.get_label() == "error = tolerance"]
+    assert set(equal.get_xdata()) == {1.0}
 
 
 def test_the_energy_over_time_is_that_of_the_run_that_it_names():

@@ -167,14 +167,30 @@ def test_a_check_that_misses_counts_as_wrong():
     assert right.close
 
 
-def test_every_target_has_a_row_of_the_picture(data):
-    picture = figures.draw(data)
+@pytest.mark.parametrize("place", [0, 1])
+def test_every_target_has_a_row_of_the_picture(data, place):
+    name = tables.tops_run(data)[place]
+    picture = figures.draw(data, name)
     axes = picture.figure.axes
-    assert len(axes) == 2 * len(runs.QUANTITIES)
+    assert len(axes) == len(runs.QUANTITIES)
     assert axes[0].images[0].get_array().shape[:2] == (len(TARGETS), runs.horizons()[::2].size)
     said = " ".join(picture.figure.get_suptitle().split("\n"))
-    assert " is the cheapest in " in said
+    assert " is the cheapest method in " in said
+    for axis, (row, share) in zip(
+        axes, words.leaders(data, name).values(), strict=True
+    ):  # what the title says is painted
+        image, unreached = axis.images[0].get_array(), figures.to_rgb(figures.UNREACHED)
+        color = figures.look(row).color
+        mine = np.isclose(image, figures.to_rgb(color)).all(axis=-1).sum()
+        assert mine / (~np.isclose(image, unreached).all(axis=-1)).sum() == pytest.approx(share)
+        assert f"{share:.0%}" in said
+        assert f"in {share:.0%}" in axis.get_title()
+    for axis, quantity in zip(axes, runs.QUANTITIES, strict=True):  # a dot a cell that is level
+        panel = tables.diagram(data, name, quantity)
+        level = ((panel.winner >= 0) & (panel.ratio < tables.TIE)).sum()
+        assert sum(line.get_xdata().size for line in axis.lines if line.get_marker() == "o") == level
     (key,) = picture.figure.legends
-    swatches = {text.get_text(): patch for text, patch in zip(key.get_texts(), key.get_patches(), strict=True)}
-    hatched = {patch.get_hatch() for axis in axes for patch in axis.patches}
+    said = [text.get_text() for text in key.get_texts() if not text.get_text().startswith("dot")]
+    swatches = dict(zip(said, key.get_patches(), strict=True))
+    hatched = {patch.get_hatch() for axis in axes for patch in axis.patches if patch.get_hatch()}
     assert hatched <= {swatches["hatched: foretold, not run"].get_hatch()}

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.population import costs, figures, ladder, study, verdicts
+from symtop_studies.population import costs, figures, ladder, messages, study, verdicts, words
 from symtop_studies.population.costs import Share, cost_to_reach, detection, quantiles, run_lengths, slowdowns, winner
 from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, strata_of
 from symtop_studies.population.verdicts import Cell
@@ -340,9 +340,8 @@ def test_quick_results_hold_every_verdict(quick_results):
     assert alarms.value < 0.2
 
 
-@pytest.mark.parametrize("draw", [lambda data: figures.draw_run_lengths(data, "evaluations"), figures.draw_silent])
-def test_a_row_looks_as_in_every_other_figure(quick_results, draw):
-    drawn = draw(datasets.read_any(quick_results / "population.nc")).figure
+def test_a_row_looks_as_in_every_other_figure(quick_results):
+    drawn = figures.draw_run_lengths(datasets.read_any(quick_results / "population.nc"), "evaluations").figure
     lines = [line for axis in drawn.axes for line in axis.get_lines() if line.get_label().endswith("]")]
     assert {line.get_label() for line in lines} > {"strang[axis]", "midpoint[angles]"}
     for line in lines:
@@ -359,11 +358,33 @@ def test_the_titles_say_what_their_figures_show(quick_results):
     named = re.findall(r" in (\S+)", titles["run-lengths-alone"].replace(style.FIRM, "_").replace(",", ""))
     assert named
     assert all(number.replace("_", " ") in said for number in named)
-    assert titles["slowdowns-short"].startswith("Over 10 nutations ")
-    assert titles["slowdowns-long"].startswith("Over 100 nutations ")
+    for horizon, length in (("short", "10"), ("long", "100")):
+        title = titles[f"slowdowns-{horizon}"]
+        assert title.endswith(f", over {length} nutations")
+        drawn = figures.draw_slowdowns(data, horizon).figure
+        ends = messages.first_and_last(data, horizon)
+        assert len(ends) == 2
+        for (name, share), axis in zip(ends, (drawn.axes[0], drawn.axes[3]), strict=True):  # beside its name
+            place = [text.get_text() for text in drawn.axes[0].get_yticklabels()].index(name)
+            (beside,) = [text.get_text() for text in axis.texts if text.xy == (1.3, place)]
+            assert beside in share
+            assert beside in title
     shares = re.findall(r"\d+%", titles["silent"])
     drawn = figures.draw_silent(data).figure
-    assert shares == [text.get_text() for text in drawn.axes[1].texts]
+    (axis,) = drawn.axes
+    assert shares == [text.get_text() for text in axis.texts if "%" in text.get_text()][:2]
+    for bar, text in zip(axis.patches, shares, strict=False):
+        assert f"{bar.get_width():.0%}" == text
+
+
+def test_the_wrong_runs_by_steps_are_those_of_the_rows_with_a_fixed_step(quick_results):
+    data = datasets.read_any(quick_results / "population.nc")
+    each, share = words.hidden_by_steps(data), words.hidden(data)
+    assert [step for step, _, _ in each] == sorted(step for step, _, _ in each)
+    fine = [(wrong, silent) for step, wrong, silent in each if step >= words.FINE]
+    assert sum(wrong for wrong, _ in fine) == share.wrong_fine
+    assert sum(silent for _, silent in fine) == pytest.approx(share.fine * share.wrong_fine)
+    assert sum(wrong for _, wrong, _ in each) < share.wrong  # adaptive rows have no steps a nutation
 
 
 @pytest.mark.parametrize("quantity", ["axis", "attitude", "energy"])

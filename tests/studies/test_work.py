@@ -3,16 +3,17 @@
 import dataclasses
 import math
 import pickle
+import re
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.legend import Legend
 from symtop_studies.work_precision import (
     energy,
     figures as work_figures,
+    fronts,
     opening,
     rankings,
     timing_rounds as rounds_module,
@@ -258,21 +259,23 @@ def test_a_study_may_have_a_second_round_made_from_the_first(tmp_path, monkeypat
     assert depends.digest(study, alone) == depends.digest(study, dataclasses.replace(alone))
 
 
-def legends_of(axis):
-    found = [one for one in axis.get_children() if isinstance(one, Legend)]
-    return {text.get_text() for one in found for text in one.get_texts()}
-
-
-def test_a_front_names_the_methods_of_its_title_and_all_that_it_draws(quick_results):
+def test_a_front_shows_the_runs_that_its_title_counts(quick_results):
     data = datasets.read(quick_results / "work_precision.nc")
     for picture in work_figures.pictures(data)[:3]:
         title = " ".join(picture.figure.get_suptitle().split("\n"))
-        named = legends_of(picture.figure.axes[0])
         owners = title.partition(" make")[0].split(" and ")
-        assert set(owners) <= named
-        assert {work_figures.FRONT, "other methods", BELOW} <= named
-        colored = {one.get_label() for axis in picture.figure.axes for one in axis.get_lines() if len(one.get_xdata())}
-        assert {label for label in named if label.endswith("]")} <= colored
+        count, whole = map(int, re.search(r"(\d+) of the (\d+) runs", title).groups())
+        drawn = {name: sum(len(line.get_xdata()) for axis in picture.figure.axes for line in axis.get_lines()
+                           if line.get_label() == name) for name in (*owners, fronts.REST)}  # fmt: skip
+        assert all(drawn[name] > 0 for name in owners)
+        assert sum(drawn[name] for name in owners) == count
+        assert sum(drawn.values()) == whole
+        named = {text.get_text() for text in picture.figure.legends[0].get_texts()}
+        assert {*owners, fronts.REST, fronts.OFF, BELOW} <= named
+        beside = [
+            re.search(r"(\d+) of (\d+) runs", axis.get_title()) for axis in picture.figure.axes if axis.get_title()
+        ]
+        assert [sum(int(one[k]) for one in beside) for k in (1, 2)] == [count, whole]
 
 
 def test_the_title_of_slowdowns_names_the_fastest_before_the_one_that_fails_least():

@@ -1,0 +1,133 @@
+"""The fronts: error against cost, a panel a scene, with the runs that no other run beats in both."""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure import ranking
+from symtop.report.figures import bound_of, error_band, pareto
+from symtop.report.style import GREY, few_ticks, grid, headline, legend_below, line, look
+from symtop.runner.study import Picture
+
+from . import words
+
+COSTS = {"seconds": "wall time of one run (s)", "force_evaluations": "force evaluations of one run",
+         "evaluations_a_nutation": "force evaluations a nutation"}  # fmt: skip
+BELOW_AXIS = {"seconds": "time of a run (s)", "force_evaluations": "force evaluations"}  # of a small panel
+BEATEN = {"seconds": "time", "force_evaluations": "evaluations"}  # what a run on the front needs least of
+LEAST = 1e-15  # the lowest error that is drawn, where the reference has no bound
+OTHERS = {"color": GREY, "lw": 0.5, "alpha": 0.5, "zorder": 1}  # a line without a name
+REST = "another method, on the front"
+OFF = "runs that another beats"
+CLOSED = "closed form: takes no steps, not ranked"
+COLUMNS = 4
+
+
+class Front(NamedTuple):
+    """The runs of a scene that no other beats in both cost and error, from the cheapest on."""
+
+    cost: Any
+    error: Any
+    owners: list[str]
+
+    def of(self, rows: Sequence[str]) -> int:
+        """How many belong to some rows."""
+        return sum(owner in rows for owner in self.owners)
+
+
+def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
+    """Every run of every compiled row, one panel a scene, with the front and the two rows that have most of it."""
+    scenes = [str(scene) for scene in data["scene"].values]
+    cells = {scene: data.sel(scene=scene).isel(horizon=far) for scene in scenes}
+    compiled = [row for row in words.of_implementation(data, "compiled") if row in ranking.ranked(data)]
+    floors = {scene: 0.5 * bound_of(cell["axis_bound"].values, LEAST) for scene, cell in cells.items()}
+    fronts = {scene: front(cell.sel(integrator=compiled), cost, floors[scene]) for scene, cell in cells.items()}
+    owners = Counter(owner for one in fronts.values() for owner in one.owners)
+    most = [row for row, _ in owners.most_common(2)]
+    labels = BELOW_AXIS[cost], "largest axis error (rad)"
+    figure, axes = grid(len(scenes), COLUMNS, labels, height=1.75, sharex=True, sharey=True)
+    for axis, (scene, cell) in zip(axes, cells.items(), strict=True):
+        error_band(axis, cell["axis_bound"].values, LEAST)
+        for row in compiled:
+            axis.plot(*curve(cell.sel(integrator=row), "axis", cost, floors[scene]), **OTHERS)
+        if cost == "seconds":
+            _closed_form(axis, cell)
+        _front(axis, fronts[scene], most)
+        axis.set(xscale="log", yscale="log", ylim=(0.03 * LEAST, 10.0))  # the band is seen
+        axis.set_title(f"{scene}\n{fronts[scene].of(most)} of {len(fronts[scene].owners)} runs")
+        axis.tick_params(which="minor", length=0)
+    axes[0].plot([], [], **(OTHERS | {"lw": 0.8, "alpha": 0.8}), label=OFF)
+    few_ticks(*axes, most=4)
+    legend_below(figure, axes)
+    figure.legends[0].set_title(
+        f"The front: runs that no other beats in both {BEATEN[cost]} and error, of all compiled methods on a scene."
+    )
+    whole = sum(owners.values())
+    headline(figure, message(most, sum(owners[row] for row in most), whole, BEATEN[cost], words.spans(data)[far]))
+    timed = (
+        " A run is shown if it was timed, as its row's cheapest for some target or for the comparison of energies; all "
+        "times are measured, of the bare compiled loop. Dotted: the closed form, `exact`, which is not ranked. A call "
+        "takes some ten microseconds by itself, where curves bend."
+        if cost == "seconds"
+        else " A high derivative, a kick and a stage take different times."
+    )
+    return Picture(
+        name,
+        figure,
+        f"Largest axis error {words.spans(data)[far]} against {COSTS[cost]}, one panel a scene; each grey line is a "
+        "compiled row, a method in one chart, whose step or tolerance varies along it. Marks joined by steps are the "
+        "front: no run of a compiled row is below or left of it. Above each panel, how many of its runs belong to "
+        f"{' and '.join(most) or 'a method'}; the most belong to "
+        f"{', '.join(f'{row} ({count})' for row, count in owners.most_common(4)) or 'none'}, of {whole}. "
+        f"Grey band: below the error bound of the reference.{timed}",
+        f"Log-log work-precision plots of the axis error against {COSTS[cost]}, one panel a scene.",
+    )
+
+
+def message(most: Sequence[str], count: int, whole: int, unit: str, span: str) -> str:
+    """How many runs of the fronts belong to the rows that have most of them."""
+    if not most:
+        return f"No method has a run {span}"
+    return (
+        f"{' and '.join(most)} make{'s' * (len(most) < 2)} up {count} of the {whole} runs that no other beats in both "
+        f"{unit} and error, {span}"
+    )
+
+
+def curve(runs: xr.Dataset, quantity: str, cost: str, floor: float) -> tuple[Any, Any]:
+    """The runs of one row from its coarsest setting to its finest."""
+    x, y = runs[cost].values, runs[quantity].values
+    there = np.isfinite(x) & np.isfinite(y)
+    return x[there], np.maximum(y[there], floor)
+
+
+def front(cell: xr.Dataset, cost: str, floor: float) -> Front:
+    """The front of some rows on a scene."""
+    x, y = cell[cost].values, np.maximum(cell["axis"].values, floor)
+    on = pareto(x, y)
+    order = np.argsort(x[on])
+    x, y, owners = (part[on][order] for part in (x, y, np.broadcast_to(cell["integrator"].values[:, None], x.shape)))
+    return Front(x, y, [str(owner) for owner in owners])
+
+
+def _front(axis: Any, one: Front, most: Sequence[str]) -> None:
+    """The steps of a front, and a mark on each of its runs: that of its row if the title names it."""
+    axis.step(one.cost, one.error, where="post", color="#444444", lw=0.8, zorder=2)
+    owners = np.array(one.owners, dtype=object)
+    for row in most:
+        mine = owners == row
+        axis.plot(one.cost[mine], one.error[mine], **(line(row, 1.1) | {"ls": "none"}), label=row, zorder=4)
+    rest = ~np.isin(owners.astype(str), list(most))
+    style = {"ls": "none", "marker": "o", "ms": 3.2, "mfc": "white", "mec": "black", "mew": 0.8}
+    axis.plot(one.cost[rest], one.error[rest], **style, label=REST, zorder=5)  # small: over the others
+
+
+def _closed_form(axis: Any, cell: xr.Dataset) -> None:
+    """The time of what takes no steps, as a dotted line."""
+    for row in (name for name in map(str, cell["integrator"].values) if name not in ranking.ranked(cell)):
+        at = float(cell["seconds"].sel(integrator=row).min())
+        if np.isfinite(at):
+            axis.axvline(at, color=look(row).color, ls=":", lw=1.0, zorder=1, label=CLOSED)
