@@ -26,23 +26,13 @@ from symtop.report.style import (
 )
 from symtop.runner.study import Picture
 
-from . import energy, words
+from . import energy, energy_figures, words
 from .rankings import slowdown, winners
 
 NAMED = (  # rows with a colour and a name in the fronts, below the owners of the front; all others are thin and grey
     "series[axis]", "taylor[axis]", "takahashi-imada[axis]", "srkn-14-6[axis]", "rk4[axis]", "midpoint[angles]",
     "rk45[angles]", "stormer-verlet[angles]",
 )  # fmt: skip
-ENERGY = {
-    "axis": (
-        "rk4[axis]", "rk45-compiled[axis]", "taylor[axis]", "strang[axis]", "takahashi-imada[axis]",
-        "srkn-14-6[axis]", "gauss-4[axis]", "gauss-8[axis]",
-    ),
-    "angles": (
-        "rk4[angles]", "rk45-compiled[angles]", "midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]",
-        "galerkin-simpson[angles]", "stormer-verlet-blanes-moan-6[angles]",
-    ),
-}  # fmt: skip
 PARTS_OF = ("midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]", "rk4[axis]",
             "rk45-compiled[angles]", "gauss-8[axis]")  # fmt: skip
 MOST = 8  # names in a legend
@@ -63,7 +53,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         _fronts(data, "front-evaluations", 0, "force_evaluations"),
         winners(data),
         slowdown(data),
-        *(_energy(data, chart) for chart in energy.CHARTS if all(energy.in_chart(data, chart))),
+        *(energy_figures.draw(data, chart) for chart in energy.CHARTS if all(energy.in_chart(data, chart))),
         _parts(data),
     ]
 
@@ -164,44 +154,6 @@ def _closed_form(axis: Any, cell: xr.Dataset) -> None:
         if np.isfinite(at):
             said = f"closed form: {words.seconds(at).replace('us', 'µs')}"
             axis.axvline(at, color=look(row).color, ls=":", lw=1.0, zorder=1, label=said)
-
-
-def _energy(data: xr.Dataset, chart: str) -> Picture:
-    """Energy error of the rows of one chart against time at the long horizon."""
-    scenes = [str(name) for name in data["scene"].values]
-    figure, axes = lead(len(scenes), (COSTS["seconds"], "largest energy error (relative)"))
-    classic, structured = energy.in_chart(data, chart)
-    shown = [row for row in ENERGY[chart] if row in classic + structured]
-    for axis, scene in zip(axes, scenes, strict=True):
-        cell = data.sel(scene=scene).isel(horizon=-1)
-        floor = 0.5 * error_band(axis, cell["energy_bound"].values)
-        for row in structured:
-            if row not in shown:
-                axis.plot(*_curve(cell.sel(integrator=row), "energy", "seconds", floor), **OTHERS)
-        _draw(axis, cell, shown, "energy", "seconds", floor, 1.0 if axis is axes[0] else 0.6)
-        bad = _ended_badly(cell.sel(integrator=classic + structured))
-        axis.set_title(f"{'scene ' * (axis is axes[0])}{scene}{bad}")
-    axes[0].set_ylim(1e-16, 300.0)
-    same_limits(axes)
-    few_ticks(axes[0])
-    few_ticks(*axes[1:], most=3)
-    headline(figure, energy.message(data, chart))
-    _key(axes[0], shown)
-    return Picture(
-        f"energy-{chart}",
-        figure,
-        f"Largest energy error {words.spans(data)[-1]} against {COSTS['seconds']}, one panel a scene, step or "
-        f"tolerance varying along each line. Every row works in the chart of {energy.CHARTS[chart]}, so that lines "
-        "differ by the method alone; grey: the other structure-preserving rows. A row fails if none of its runs "
-        f"ends well. {energy.sentence(data, chart)}",
-        f"Log-log plots of energy error against time at the long horizon, rows of the chart {chart}, a panel a scene.",
-    )
-
-
-def _ended_badly(cell: xr.Dataset) -> str:
-    """How many methods have no run that ended well on a scene, on a line; empty if all have one."""
-    bad = ~(cell["outcome"] == "ok").any("setting").values
-    return f"\n{bad.sum()} of {bad.size} methods fail{'s' * int(bad.sum() == 1)}" if bad.any() else ""
 
 
 def _parts(data: xr.Dataset) -> Picture:

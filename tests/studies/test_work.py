@@ -175,6 +175,12 @@ def test_energies_are_compared_within_a_chart():
                      ("rk4[angles]", "midpoint[angles]")]  # fmt: skip
     assert "Always less: strang[axis]." in energy.sentence(data, "axis")
     assert "Never less: midpoint[angles]." in energy.sentence(data, "angles")
+    assert energy.tallies(data, "axis") == {"rk4[axis]": (1, 0, 0), "taylor[axis]": (0, 1, 0)}
+    assert energy.tallies(data, "angles") == {"rk4[angles]": (0, 0, 1)}
+    assert energy.message(data, "axis") == (
+        "Structure-preserving methods in the axis chart keep energy better at every run time in at least half of the "
+        "comparisons with rk4 (100%), in less than half of the comparisons with taylor (0%)"
+    )
     error, work = energy.at_steps(data.isel(scene=0, horizon=0).sel(integrator="rk4[axis]"), 118.0)
     assert (error, work) == (pytest.approx(0.1 * 118.0**-4), pytest.approx(4.0))
     assert "strang[axis] (force evaluations a step: 1)" in energy.at_equal_steps(
