@@ -285,11 +285,12 @@ def test_the_title_of_slowdowns_names_the_fastest_before_the_one_that_fails_leas
     table = xr.DataArray([[1.0, 1.0, np.nan], [50.0, 60.0, 70.0]], dims=("integrator", "problem"),
                          coords={"integrator": ["quick", "sure"]})  # fmt: skip
     assert rankings.slowdown_message(table) == (
-        "quick meets 2 of 3 targets that can be met, in the least time in the median; sure meets 3, in 60 times as much"
+        "quick is the fastest in the median and meets 2 of 3 targets; sure meets 3, in 60 times the least time"
     )
     assert rankings.slowdown_message(table.sel(integrator=["sure"])) == (
-        "sure meets 3 of 3 targets that can be met, in 60 times the least time in the median"
+        "sure takes 60 times the least time in the median and meets 3 of 3 targets"
     )
+    assert rankings.middles(table) == (3, [("quick", 2, 1.0), ("sure", 3, 60.0)])
 
 
 def test_the_title_of_the_parts_tells_what_stays_from_what_grows():
