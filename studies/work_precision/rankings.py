@@ -131,9 +131,9 @@ def slowdown(data: xr.Dataset) -> Picture:
         axis.tick_params(axis="y", length=0)
     lengths = " or ".join(f"{span:g}" for span in data["horizon"].values)
     figure.supxlabel(
-        f"A target: an axis error of {number(TARGETS[0])} to {number(TARGETS[-1])} rad, on one of {data.sizes['scene']} "
-        f"tops, over {lengths} nutations.\nIn the median a target that is not met counts as infinite: "
-        f"{len(names) - len(shown)} more methods, which meet\nat most half of the targets, have none.",
+        f"A target: an axis error of {number(TARGETS[0])} to {number(TARGETS[-1])} rad, on one of "
+        f"{data.sizes['scene']} tops, over {lengths} nutations.\nIn the median a target that is not met counts as "
+        f"infinite: {len(names) - len(shown)} more methods, which meet\nat most half of the targets, have none.",
         fontsize=7.5, ha="left", x=0.01,
     )  # fmt: skip
     headline(figure, slowdown_message(merged.sel(integrator=order)))
