@@ -130,10 +130,12 @@ def slowdown(data: xr.Dataset) -> Picture:
         axis.grid(visible=False, axis="y")
         axis.tick_params(axis="y", length=0)
     lengths = " or ".join(f"{span:g}" for span in data["horizon"].values)
+    left_out, slow = merged.isel(integrator=0).size - asked, len(names) - len(shown)
     figure.supxlabel(
         f"A target: an axis error of {number(TARGETS[0])} to {number(TARGETS[-1])} rad, on one of "
-        f"{data.sizes['scene']} tops, over {lengths} nutations.\nIn the median a target that is not met counts as "
-        f"infinite: {len(names) - len(shown)} more methods, which meet\nat most half of the targets, have none.",
+        f"{data.sizes['scene']} tops, over {lengths} nutations;\n{left_out} such targets, "
+        "wider than the nutation or met by no method, are left out. One that a method does not meet\n"
+        f"counts as infinite in its median; {slow} more methods, which meet at most half, have none.",
         fontsize=7.5, ha="left", x=0.01,
     )  # fmt: skip
     headline(figure, slowdown_message(merged.sel(integrator=order)))
