@@ -1,20 +1,20 @@
 """Figures of the study: residuals over a million steps, windows of 10^8, rounding of an ensemble, losses of phase."""
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS
-from symtop.measure.growth import ROUNDED, tops
+from symtop.measure.growth import tops
 from symtop.report import style
 from symtop.report.figures import name_ends
 from symtop.report.style import BLACK, GREY, few_ticks, headline, line, look, number, panels
 from symtop.run.long_run import PER_NUTATION
 from symtop.runner.study import Picture
 
-from . import messages, rows, words
+from . import dot_figures, messages, rows, words
+from .dot_figures import LABELS, NOTE, SMALLEST
 from .keeping import LENGTHS, chosen, keeping
 from .phase_loss import FEWEST, LOST
 from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS, by_integrator, losses
@@ -23,23 +23,17 @@ SHOWN = (
     "midpoint[angles]", "stormer-verlet[angles]", "strang[axis]", "gauss-4[axis]", "rk4[angles]", "rk4[axis]",
     "rk45[angles]", "taylor[axis]",
 )  # fmt: skip
-LABELS = {
-    "energy": "energy", "modified_energy": "modified energy", "p_phi": r"$p_\varphi$", "p_psi": r"$p_\psi$",
-    "phase": "phase",
-}  # fmt: skip
 BANDS = ("energy", "modified_energy", "p_phi", "p_psi")
-LAWS = (0.0, 0.5, 1.0, 2.0)  # exponents that are drawn as lines
-SIZES = (4.5, 2.6, 3.5, 2.0)  # of a marker, by scene
-SMALLEST = 1e-17  # what is smaller is drawn here
-ZERO = 3e-17  # left of it nothing was measured but zeros
-LOSES = "#FBE3CF"  # behind a constant that is neither kept nor bounded
-NOTE = {"fontsize": style.LEAST_TEXT, "color": "#444444"}
 
 
 def pictures(data: xr.DataTree) -> list[Picture]:
     """The figures of every group that was measured, with their captions."""
-    drawn = {HISTORIES: (_residuals, _sizes, _exponents), WINDOWS: (_windows,), ROUNDINGS: (_rounding,),
-             HORIZONS: (_horizons,)}  # fmt: skip
+    drawn = {
+        HISTORIES: (_residuals, dot_figures.sizes, dot_figures.exponents),
+        WINDOWS: (_windows,),
+        ROUNDINGS: (_rounding,),
+        HORIZONS: (_horizons,),
+    }
     return [draw(data[group].to_dataset()) for group, draws in drawn.items() if group in data for draw in draws]
 
 
@@ -90,81 +84,6 @@ def _residuals(histories: xr.Dataset) -> Picture:
     )
     alt = "Log-log plots of residuals over time: level for the discrete methods, rising for adaptive Runge-Kutta."
     return Picture("residuals", figure, caption.rstrip(), alt)
-
-
-def dots(data: xr.Dataset, columns: dict[str, str], *, log: bool) -> Any:
-    """One line a row ``method[chart]``, one column a variable with its label, one dot a scene: tables at a glance.
-
-    On a logarithmic axis zeros are drawn at `SMALLEST`. A variable ``NAME`` with a companion ``NAME_interval`` gets a
-    bar.
-    """
-    names, scenes = ([str(name) for name in data[dim].values] for dim in ("integrator", "scene"))
-    figure, axes = panels(1, len(columns), height=0.4 + 0.128 * len(names), sharex=True, sharey=True)
-    shift = np.linspace(-0.22, 0.22, len(scenes)) if len(scenes) > 1 else np.zeros(1)
-    for axis, (variable, label) in zip(axes[0], columns.items(), strict=True):
-        for scene, offset, size in zip(scenes, shift, SIZES * 3, strict=False):
-            axis.plot([], [], "o", color=GREY, ms=size, label=f"scene {scene}")
-            for row, name in enumerate(names):
-                cell, mark = data.sel(scene=scene, integrator=name), look(name)
-                value, bar = float(cell[variable]), float(cell.get(f"{variable}_interval", 0.0))
-                if np.isfinite(value):
-                    axis.errorbar(max(value, SMALLEST) if log else value, row + offset, xerr=bar, fmt=mark.marker,
-                                  fillstyle=mark.fill, color=mark.color, ms=size, elinewidth=0.6)  # fmt: skip
-        axis.set(xlabel=label, yticks=range(len(names)), yticklabels=names, ylim=(len(names) - 0.5, -0.5))
-        axis.set_xscale("log" if log else "linear")
-        axis.tick_params(axis="y", labelsize=7.0, length=0)
-    few_ticks(*axes.flat, most=3)
-    return figure
-
-
-def _sizes(histories: xr.Dataset) -> Picture:
-    data = rows.without_repeats(histories)
-    columns = {f"{name}_largest": f"largest relative change\nof {LABELS[name]}" for name in CONSTANTS}
-    figure = dots(data, columns, log=True)
-    for axis, constant in zip(figure.axes, CONSTANTS, strict=True):
-        for row, name in enumerate(data["integrator"].values):
-            if not messages.holds(data.sel(integrator=name), constant):
-                axis.axhspan(row - 0.5, row + 0.5, color=LOSES, lw=0, zorder=0)
-        axis.axvline(ZERO, color=GREY, lw=0.8, ls=":", zorder=1)
-        axis.set_title("zero", loc="left", pad=2.0, **NOTE)  # above the column of exact zeros
-    figure.axes[0].fill_between([], [], [], color=LOSES, lw=0, label="shaded: neither kept nor bounded")
-    style.legend_below(figure, figure.axes)
-    headline(figure, messages.sizes(data))
-    caption = (
-        "Largest relative residual of every row over the whole run, energies relative to E0 - min V; an exact zero "
-        f"is drawn at 1e-17. {rows.setting(data)} {rows.charts_apart(data)} A million steps of rounding explain "
-        f"changes up to {ROUNDED:.0e} of a momentum or of |E|: what a method conserves lies below. What it does not "
-        "conserve shows the truncation error of a step, or, farthest to the right, a drift. "
-        f"{words.shortened(data)}"
-    )
-    alt = "Dot plot of the largest residuals of energy and momenta for every integrator."
-    return Picture("sizes", figure, caption.rstrip(), alt)
-
-
-def _exponents(histories: xr.Dataset) -> Picture:
-    columns = {f"{name}_exponent": f"growth of the error\nof {LABELS[name]}" for name in (*CONSTANTS, "phase")}
-    data = rows.without_repeats(histories)
-    figure = dots(data, columns, log=False)
-    headline(figure, messages.exponents(data))
-    for axis in figure.axes:
-        axis.set(xlim=(-0.35, 2.5), xticks=(0.0, 0.5, 1.0, 2.0), xticklabels=("0", "½", "1", "2"))
-        for law in LAWS:
-            axis.axvline(law, color=GREY, lw=0.8, zorder=1)
-    told = (
-        "power of time: 0 bounded, ½ random walk, 1 steady drift, 2 as its square",
-        "bars: 95 %; no marker: no change",
-    )
-    for text in told:
-        figure.axes[0].plot([], [], " ", label=text)
-    style.legend_below(figure, figure.axes)
-    caption = (
-        "Growth exponents of the largest residual of energy and momenta, over the last two decades of time, and of the "
-        "phase error of the nutation, over the last one, with 95 % intervals. 0 is a bounded error, 1/2 the random "
-        "walk of rounding, 1 a steady drift, 2 the phase error under a drifting energy. "
-        f"{rows.setting(data)} {words.quoted(data)} {words.shortened(data)}"
-    )
-    alt = "Dot plots of the growth exponents of energy, momenta and phase for every integrator."
-    return Picture("exponents", figure, caption.rstrip(), alt)
 
 
 def _windows(data: xr.Dataset) -> Picture:

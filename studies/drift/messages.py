@@ -5,11 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from symtop.measure.conservation import CONSTANTS
 from symtop.report.style import number
 
-from .tables import worst_behaviour
+from .tables import FAILED, worst_behaviour
 
-P_PHI, P_PSI = "p\N{GREEK SMALL LETTER PHI}", "p\N{GREEK SMALL LETTER PSI}"  # of titles
 HELD = ("kept", "bounded")
 AS_TIME = 0.1  # of an exponent
 
@@ -33,26 +33,62 @@ def residuals(data: xr.Dataset) -> str:
     return f"{text}; {lost[0]} changes it steadily, by {number(largest[lost[0]])} of the energy of the nutation"
 
 
+def lost(data: xr.Dataset) -> dict[tuple[str, ...], list[str]]:
+    """The rows by the constants that they neither keep nor bound on every scene: those that lose none first, then most.
+
+    Within a group those with the largest change of energy come last.
+    """
+    groups: dict[tuple[str, ...], list[str]] = {}
+    energies = data["energy_largest"].max("scene")
+    for name in map(str, data["integrator"].values[np.argsort(energies.values, kind="stable")]):
+        cell = data.sel(integrator=name)
+        groups.setdefault(tuple(one for one in CONSTANTS if not holds(cell, one)), []).append(name)
+    return dict(sorted(groups.items(), key=lambda one: (bool(one[0]), -len(one[0]), one[0])))
+
+
 def sizes(data: xr.Dataset) -> str:
-    """How many rows keep what."""
-    names = list(map(str, data["integrator"].values))
-    kept = {
-        constant: sum(holds(data.sel(integrator=name), constant) for name in names)
-        for constant in ("energy", "p_phi", "p_psi")
-    }
-    return (
-        f"Of {len(names)} methods {kept['energy']} hold the energy, {kept['p_phi']} the momentum {P_PHI} and "
-        f"{kept['p_psi']} {P_PSI}: at rounding, or with a bounded error"
+    """How many rows hold all three constants."""
+    names, held = data.sizes["integrator"], len(lost(data).get((), []))
+    rest = names - held
+    return f"{held} of {names} methods hold the energy and both momenta, at rounding or with a bounded error" + (
+        f"; {rest} lose{'s' * (rest == 1)} at least one" if rest else ""
     )
 
 
+ENERGIES = {"bounded": "a bounded energy error", "lost": "an energy that drifts or grows", "kept": "energy at rounding"}
+
+
+def by_energy(data: xr.Dataset) -> dict[str, np.ndarray]:
+    """Growth exponents of the phase error of all runs, by what the row's energy does: a key of `ENERGIES`."""
+    groups: dict[str, list[float]] = {word: [] for word in ENERGIES}
+    for name in data["integrator"].values:
+        cell = data.sel(integrator=name)
+        word = worst_behaviour(cell, "energy")
+        slopes = cell["phase_exponent"].values.ravel()
+        if word != FAILED:
+            groups[word if word in HELD else "lost"].extend(slopes[np.isfinite(slopes)])
+    return {word: np.array(slopes) for word, slopes in groups.items()}
+
+
+def as_time(slopes: np.ndarray) -> np.ndarray:
+    """Which errors grow as t, to `AS_TIME` of the exponent."""
+    return np.abs(slopes - 1.0) <= AS_TIME
+
+
+def faster(slopes: np.ndarray) -> np.ndarray:
+    """Which errors grow faster."""
+    return slopes > 1.0 + AS_TIME
+
+
 def exponents(data: xr.Dataset) -> str:
-    """How the phase error of most rows grows."""
-    slopes = data["phase_exponent"].values.ravel()
-    slopes = slopes[np.isfinite(slopes)]
-    steady = float(np.mean(np.abs(slopes - 1.0) <= AS_TIME))
-    faster = float(np.mean(slopes > 1.0 + AS_TIME))
-    return f"The phase error (last column) grows as t in {steady:.0%} of the runs, and faster in {faster:.0%}"
+    """How the phase error grows where the energy error is bounded, and where it is not."""
+    groups = by_energy(data)
+    said = [
+        f"{how} with {ENERGIES[word]} ({rule(groups[word]).sum()} of {groups[word].size} runs)"
+        for how, word, rule in (("as t", "bounded", as_time), ("faster", "lost", faster))
+        if groups[word].size
+    ]
+    return f"The phase error grows {' and '.join(said)}" if said else "Growth of the phase error"
 
 
 def windows(data: xr.Dataset) -> str:

@@ -1,25 +1,24 @@
-"""Figures of the factors study: the waterfall, and methods by chart at equal accuracy."""
+"""Figures of the factors study: the waterfall, and what a chart costs each method at equal accuracy."""
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import LogLocator, NullLocator
 
 from symtop.report import style
 from symtop.runner.study import Picture
 
 from . import words
-from .cells import COMPILED, KERNEL, SAMPLES, SCIPY_PYTHON
-from .tables import Bar, Timed, goals_of, times
+from .cells import COMPILED, FAMILIES, SAMPLES, cells
+from .tables import Bar, chart_ratio, goals_of, times
 
 COLORS = {"": style.GREY, "call": style.PURPLE, "chart": style.GREEN, "language": style.ORANGE, "method": style.BLUE}
-NAMES = {  # whose colour and marker a scheme has
-    "Dormand-Prince 5(4)": "rk45-compiled", "DOP853": "dop853", "rk4": "rk4", "Strang": "strang",
-    "Takahashi-Imada": "takahashi-imada", "Blanes-Moan 11-6": "srkn-11-6", "Blanes-Moan 14-6": "srkn-14-6",
-    "implicit midpoint": "gauss-2", "Gauss 6": "gauss-6", "Taylor": "taylor",
-}  # fmt: skip
-DODGE = {"angles": -0.14, "axis": 0.0, "attitude": 0.14}  # of a row's height, so that level charts are all seen
+BESIDE = {"angles": "in Euler angles", "attitude": "with the whole attitude (quaternion)"}  # charts beside the axis
+SCHEMES = [scheme for schemes in FAMILIES.values() for scheme in schemes]
+DODGE = 0.2  # of a row's height, so that near dots are all seen
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
@@ -92,62 +91,90 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
     )
 
 
-def _kernels(rows: list[Timed]) -> dict[tuple[str, str], Timed]:
-    """Kernel times by scheme and chart: of the compiled loop, or SciPy's where there is none."""
-    kernels: dict[tuple[str, str], Timed] = {}
-    for language in (SCIPY_PYTHON, COMPILED):
-        kernels |= {(one.method, one.chart): one for one in rows if (one.language, one.call) == (language, KERNEL)}
-    return kernels
-
-
 def draw_charts(data: xr.Dataset) -> Picture:
-    """Time and force evaluations of each method in each chart, at equal error of the axis."""
-    goals = [(scene, span, target, _kernels(times(part))) for scene, span, target, part in goals_of(data)]
-    first = goals[0][0]
-    goals = [goal for goal in goals if goal[0] == first]
-    schemes = [scheme for scheme in NAMES if any(scheme == method for *_, cells in goals for method, _ in cells)]
-    figure, axes = style.panels(2, len(goals), height=0.55 + 0.15 * len(schemes), sharey=True)
-    for column, (_, span, target, cells) in enumerate(goals):
-        for (scheme, chart), one in cells.items():
-            look = style.look(f"{NAMES[scheme]}[{chart}]")
-            marks = {"color": look.color, "marker": look.marker, "fillstyle": look.fill, "ls": "none", "ms": 5.0}
-            for axis, value in ((axes[0, column], 1e6 * one.seconds), (axes[1, column], one.forces)):
-                axis.plot(value, schemes.index(scheme) + DODGE[chart], **marks)
-        for scheme in schemes:
-            values = [one for (method, _), one in cells.items() if method == scheme]
-            for axis, sizes in (
-                (axes[0, column], [1e6 * one.seconds for one in values]),
-                (axes[1, column], [one.forces for one in values]),
-            ):
-                if sizes:
-                    place = schemes.index(scheme)
-                    axis.plot([min(sizes), max(sizes)], [place, place], color=style.GREY, lw=0.8, zorder=1)
-        axes[0, column].set(title=f"{span:g} nutations,\naxis error {style.number(target)} rad")
-        axes[0, column].set(xlabel=f"time of a bare run ({words.MICRO})")
-        axes[1, column].set(xlabel="force evaluations")
-    for axis in axes.flat:
-        _finish(axis, schemes)
-    for chart, fill in style.FILLS.items():
-        axes[0, 0].plot([], [], "o", color="#444444", fillstyle=fill, ms=5.0, label=chart)
+    """Time of a run in each larger chart over that on the axis, at equal error: a dot a pair, a row a method."""
+    shown = {chart: _ratios(data, chart) for chart in BESIDE}
+    heads, places = _places([scheme for ratios in shown.values() for scheme in ratios])
+    first = next(iter(heads), "")
+    height = 0.5 + 0.2 * (len(heads) + len(places))
+    figure, axes = style.panels(1, len(BESIDE), height=height, sharex=True, sharey=True)
+    for axis, (chart, ratios) in zip(axes[0], shown.items(), strict=True):
+        axis.axvline(1.0, color="#444444", lw=0.9, zorder=1)
+        for scheme, place in places.items():
+            values, told = sorted(ratios.get(scheme, [])), scheme in FAMILIES.get(first, ())
+            heights = place + DODGE * (np.arange(len(values)) % 3 - 1.0)  # neighbours are level with each other
+            axis.plot(values, heights, "o", color=style.GREEN if told else "#999999", ms=4.0, mew=0.4, mec="white")
+            if not values:
+                axis.annotate(_absent(scheme, chart), (1.0, place), (5, 0), textcoords="offset points", va="center",
+                              color="#666666", fontsize=style.LEAST_TEXT)  # fmt: skip
+        if pairs := words.family_ratios(data, first, chart) if first else []:
+            inside = [places[scheme] for scheme in FAMILIES[first] if scheme in places]
+            middle = float(np.median(pairs))
+            axis.plot([middle] * 2, [min(inside) - 0.5, max(inside) + 0.5], color=style.GREENS[1], lw=2.5, zorder=1.5)
+            axis.annotate(f"median {middle:.2f}", (middle, min(inside) - 0.95), (4, 0), textcoords="offset points",
+                          color=style.ink(style.GREEN), fontsize=8.0, weight="bold", va="center",
+                          bbox={"color": "white", "pad": 0.5})  # fmt: skip
+        axis.set_title(BESIDE[chart])
+        axis.grid(visible=False, axis="y")
+        axis.tick_params(axis="y", length=0)
+    _finish(axes[0], heads, places)
+    axes[0, 0].plot([], [], "o", color="#444444", ms=4.0, label="a dot: one top, run length and error of the axis")
+    axes[0, 0].plot([], [], color="#444444", lw=0.9, label="as long as on the axis alone")
     style.legend_below(figure, axes)
-    sentences = " ".join(words.family_sentences(data))
     style.headline(figure, words.charts_message(data))
+    sentences = " ".join(words.family_sentences(data))
+    scenes = words.joined([str(name) for name in data["scene"].values])
     return Picture(
         "charts",
         figure,
-        f"Methods by chart on {first}, each at the coarsest step or tolerance found that meets the axis error in the "
-        "title; bare kernels, compiled but for DOP853, which is SciPy's. Further left is better; the line joins "
-        f"the charts of one method. A method that is missing needs more than the study's budget. {sentences}",
-        "Dot plots, a row for each method, open, full and half-full markers for angles, axis and attitude.",
+        "Time of a run in Euler angles, and with the whole attitude, over that of the same method on the axis alone "
+        f"(the axis e and the angular momentum L): a dot a pair, on {scenes}, each horizon and target. Every run has "
+        "the coarsest step or tolerance found that meets the target; bare compiled kernels. A pair is missing if one "
+        f"of its runs needs more than the study's budget. {sentences} The tables have every time and its force "
+        "evaluations.",
+        "Two dot plots of ratios of time, a row a method: splitting methods above all others, a line at ratio one.",
     )
 
 
-def _finish(axis: Any, schemes: list[str]) -> None:
-    labels = [f"{scheme} (SciPy)" if scheme == "DOP853" else scheme for scheme in schemes]
-    axis.set(xscale="log", yticks=np.arange(len(schemes)), yticklabels=labels, ylim=(len(schemes) - 0.5, -0.5))
-    low, high = axis.get_xlim()
-    ratio = high / low
-    subs = (1.0,) if ratio > 100.0 else (1.0, 3.0) if ratio > 12.0 else (1.0, 2.0)
-    axis.xaxis.set_major_locator(LogLocator(subs=subs, numticks=5))
-    axis.xaxis.set_major_formatter(lambda value, _: f"{value:g}" if value < 1e4 else style.number(value))
-    axis.xaxis.set_minor_formatter("")
+def _ratios(data: xr.Dataset, chart: str) -> dict[str, list[float]]:
+    """Kernel time in a chart over that on the axis, by method, for every scene, horizon and target with both."""
+    every = [times(part) for *_, part in goals_of(data)]
+    known = {scheme: [chart_ratio(rows, scheme, chart) for rows in every] for scheme in SCHEMES}
+    return {scheme: good for scheme, values in known.items() if (good := [one for one in values if math.isfinite(one)])}
+
+
+def _places(drawn: Sequence[str]) -> tuple[dict[str, float], dict[str, float]]:
+    """Heights of the two headings and of the methods: the family that the title speaks of, and below it all others."""
+    told = next((family for family, schemes in FAMILIES.items() if any(scheme in drawn for scheme in schemes)), "")
+    groups = {told: [scheme for scheme in FAMILIES.get(told, ()) if scheme in drawn]}
+    groups["other"] = [scheme for scheme in SCHEMES if scheme in drawn and scheme not in groups[told]]
+    heads: dict[str, float] = {}
+    places: dict[str, float] = {}
+    for family, schemes in groups.items():
+        if schemes:
+            heads[family] = float(len(heads) + len(places))
+            for scheme in schemes:
+                places[scheme] = float(len(heads) + len(places))
+    return heads, places
+
+
+def _absent(scheme: str, chart: str) -> str:
+    """Why a method has no dot in a chart."""
+    return "over the budget" if (scheme, chart, COMPILED) in {cell.key for cell in cells()} else "not in this chart"
+
+
+def _finish(axes: Any, heads: dict[str, float], places: dict[str, float]) -> None:
+    """Names of methods under the headings of their groups, and an axis of ratios."""
+    left, rows = axes[0], sorted([*heads.items(), *places.items()], key=lambda row: row[1])
+    left.set(yticks=[place for _, place in rows], ylim=(len(rows) - 0.4, -0.7))
+    left.set_yticklabels([f"{name} methods" if name in heads else name for name, _ in rows])
+    for label, (name, _) in zip(left.get_yticklabels(), rows, strict=True):
+        label.set_weight("bold" if name in heads else "normal")
+    left.set_xscale("log")
+    low, high = left.get_xlim()
+    left.set_xlim(min(low, 0.7), max(high, 1.5))
+    for axis in axes:
+        axis.set_xlabel("time of a run / its time on the axis alone")
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0)))
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.xaxis.set_minor_locator(NullLocator())

@@ -12,6 +12,7 @@ from symtop.runner.study import Table
 from .cells import COMPILED, FAMILIES, KERNEL, SAMPLES, SCIPY_PYTHON, SCIPYS, SIMULATE, SOLVE_IVP
 from .tables import (
     LEAST,
+    TIE,
     Bar,
     Change,
     Column,
@@ -142,13 +143,21 @@ def family_sentences(data: xr.Dataset) -> list[str]:
 
 
 def charts_message(data: xr.Dataset) -> str:
-    """What a chart costs the first family that was timed in several, as a title."""
+    """What the larger charts cost the first family that was timed in several, as a title."""
+    told = {"angles": "in Euler angles", "attitude": "with the whole attitude"}
     for family in FAMILIES:
-        ratios_in = {chart: family_ratios(data, family, chart) for chart in ("attitude", "angles")}
-        parts = [f"{np.median(ratios):.2f} times as long in {chart}" for chart, ratios in ratios_in.items() if ratios]
+        known = {chart: family_ratios(data, family, chart) for chart in told}
+        middles = {chart: float(np.median(ratios)) for chart, ratios in known.items() if ratios}
+        parts = [f"{more(middle)} time {told[chart]} ({middle:.2f} times)" for chart, middle in middles.items()]
         if parts:
-            return f"At equal error {family} methods run {joined(parts)} as on the axis, in the median"
+            subject = f"{family[0].upper()}{family[1:]} methods"
+            return f"{subject} take {joined(parts)} compared with the axis alone, at equal error in the median"
     return "No method was timed in several charts"
+
+
+def more(ratio: float) -> str:
+    """A ratio of times in words; those that differ by less than `TIE` are level."""
+    return "more" if ratio > 1.0 + TIE else "less" if ratio < 1.0 - TIE else "the same"
 
 
 def waterfall_message(shown: Sequence[tuple[str, float, float, list[Bar]]]) -> str:

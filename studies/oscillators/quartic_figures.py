@@ -7,10 +7,11 @@ from symtop.report import style
 from symtop.runner.study import Picture
 
 from . import quartic_tables as quartic
-from .quartic_tables import GAPS, MAPS, QUARTICS
+from .quartic_tables import MAPS, QUARTICS
 
 LOOKS = {name: style.Look(style.ORANGE, "v") if name == "mcmillan" else style.look(name) for name in MAPS}
 SMALLEST = 1e-17
+STABLE = (-1.0, 1.0)  # of A, as of the cosine that it is for a harmonic oscillator
 DRAWN = ("planar-softening", *quartic.CHI)  # discrete orbits
 
 
@@ -110,40 +111,42 @@ def _outside(orbits: xr.Dataset, low: float, high: float) -> str:
 
 
 def draw_constants(data: xr.Dataset) -> Picture:
-    """A, B and delta against the step, and how their distances from the neighbours' vanish."""
-    figure, axes = style.panels(1, 3, height=2.4)
-    true = data.sel(scene=quartic.CHI[0], integrator=MAPS[0])
-    steps = true[quartic.STEP].values
+    """A of the exact map against the step, and that of stormer-verlet, its limit of small steps."""
+    figure, axes = style.panels(1, 1, height=2.5)
+    axis, true = axes[0, 0], data.sel(scene=quartic.CHI[0], integrator=MAPS[0])
+    steps, A = true[quartic.STEP].values, true[quartic.A].values
     limit = quartic.oscillator_of(quartic.CHI[0])
+    leaves = 2.0 / (np.sqrt(-3.0 * limit.b) * limit.period)  # where 1 + 3 b h^2/2 = -1, in periods
+    axis.axhspan(*STABLE, color="#E4E4E4", lw=0, zorder=0)
+    axis.axhline(STABLE[0], color="#444444", lw=0.9, zorder=1)
     fine = np.linspace(0.0, 0.5, 200)
-    axes[0, 0].plot(fine, 1.0 + 1.5 * limit.b * (fine * limit.period) ** 2, color=style.ORANGE)
-    axes[0, 0].annotate("$1 + 3bh^2/2$", (0.22, -0.6), color=style.ink(style.ORANGE), ha="right")
-    axes[0, 0].axhline(-1.0, color=style.GREY, lw=0.9, ls=":")
-    axes[0, 0].plot(steps, true[quartic.A], "D-", color=LOOKS[MAPS[0]].color, ms=4)
-    axes[0, 0].annotate("$A$", (0.31, 0.55), color=LOOKS[MAPS[0]].color)
-    axes[0, 0].axhline(0.0, color=style.GREY, lw=0.9)
-    axes[0, 0].set(ylim=(-1.3, 1.1), xlabel="step size over T", title="A")
-    axes[0, 1].axhline(1.0, color=style.ORANGE)
-    axes[0, 1].plot(steps, true[quartic.B_OVER], "D-", color=LOOKS[MAPS[0]].color, ms=4)
-    axes[0, 1].annotate("limit of small steps", (0.48, 0.96), color=style.ink(style.ORANGE), ha="right", va="top")
-    axes[0, 1].set(xlabel="step size over T", title=r"$-B\,/\,(\sigma h^2)$")
-    shades = (style.BLUE, style.VERMILLION, style.GREEN)
-    labels = (("A", 4, 1.6), ("B", 4, 0.5), (r"\delta", 3, 1.0))  # the last: how far above its line's end
-    for gap, (symbol, power, above), shade in zip(GAPS, labels, shades, strict=True):
-        values = true[gap].where(true[gap] > quartic.ROUNDING)
-        axes[0, 2].plot(steps, values, "o-", color=shade, ms=4)
-        place = 0.004, above * float(values[-1])
-        axes[0, 2].annotate(f"${symbol}$, $h^{power}$", place, color=shade, va="center", ha="right")
-    axes[0, 2].set(xscale="log", yscale="log", xlim=(1e-3, 0.7), ylim=(1e-7, 20.0), xlabel="step size over T")
-    axes[0, 2].set_title("distance from the limit")
-    style.few_ticks(axes[0, 2], most=4)
-    style.headline(figure, "The constant A of the exact map stays above -1 (dotted) at long steps, where its "
-                           "limit of small steps, a parabola, does not")  # fmt: skip
+    shade, exact = LOOKS["stormer-verlet"].color, LOOKS[MAPS[0]]
+    axis.plot(fine, 1.0 + 1.5 * limit.b * (fine * limit.period) ** 2, color=shade, lw=1.6)
+    axis.plot(steps, A, marker=exact.marker, color=exact.color, ms=4.5, lw=1.6)
+    axis.plot(leaves, STABLE[0], "o", color=shade, ms=6.0, mfc="white", mew=1.4)
+    said = {"textcoords": "offset points", "va": "center"}
+    middle = len(steps) // 3
+    axis.annotate("exact map", (steps[middle], A[middle]), (8, 10), color=exact.color, weight="bold", **said)
+    parabola, beside = "stormer-verlet,\nthe limit of small steps", (0.65 * leaves, -0.25)
+    axis.annotate(parabola, beside, (0, 0), color=style.ink(shade), weight="bold", ha="right", **said)
+    crossing = f"leaves the stable band\nat a step of {leaves:.2f} T"
+    axis.annotate(crossing, (leaves, STABLE[0]), (12, 13), color=style.ink(shade), **said)
+    axis.annotate("stable: $-1 \\leq A \\leq 1$", (0.495, STABLE[0]), (0, 9), color="#444444", ha="right", **said)
+    axis.annotate("unstable", (0.495, STABLE[0]), (0, -9), color="#444444", ha="right", **said)
+    axis.set(xlim=(0.0, 0.5), ylim=(-1.45, 1.1), yticks=(-1.0, -0.5, 0.0, 0.5, 1.0))
+    axis.set_xlabel("step size h over T, the period of the oscillator's distance from its centre")
+    axis.set_ylabel("A in $Z_{n+1} + Z_{n-1} = 2 A Z_n/(1 + B|Z_n|^2)$")
+    kept = STABLE[0] <= A.min() and A.max() <= STABLE[1]
+    stays = f"{'stays' if kept else 'does not stay'} in the stable band at all steps, to {steps.max():.2f} T"
+    other = f"that of stormer-verlet leaves it at {leaves:.2f} T"
+    style.headline(figure, f"The coefficient A of the exact map {stays}; {other}")
     return Picture(
         "quartic-constants",
         figure,
-        f"The numbers of the exact map of {quartic.CHI[0]} (no chart) against the step. To order h^2 they are those of "
-        "stormer-verlet and McMillan: A = 1 + 3 b h^2/2, B = -sigma h^2, no turn delta. Beyond, A stays a cosine-like "
-        "function of the step, zero at half a nutation, where a parabola would leave [-1, 1] and the step be unstable.",
-        "Three panels: A and its parabola, B over its limit, and gaps of A, B and delta with slopes 4, 4 and 3.",
+        "The coefficient A of the maps Z+ + Z- = 2 A Z/(1 + B |Z|^2) of the oscillator x'' = (2 sigma |x|^2 + 3 b) x, "
+        f"against the step h, here for {quartic.CHI[0]} (no chart). Near the centre a step is stable if A is in "
+        "[-1, 1]. To order h^2 the constants of the exact map are those of stormer-verlet and McMillan: A = 1 + 3 b "
+        "h^2/2, B = -sigma h^2, no turn delta. Beyond, A stays a cosine-like function of the step, zero at T/2, where "
+        f"the parabola has long left the band; -B/(sigma h^2) falls to {float(true[quartic.B_OVER].min()):.2f}.",
+        "Two curves against the step: A of the exact map stays in the band from -1 to 1, a parabola leaves it.",
     )

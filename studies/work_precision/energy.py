@@ -159,19 +159,49 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names[:MOST_NAMES]) + more
 
 
-def message(data: xr.Dataset, chart: str) -> str:
-    """In what share of pairs the energy error of a structure-preserving row is smaller at all run times, as a title."""
-    parts = []
+class Tally(NamedTuple):
+    """Comparisons with one classical row: where a structure-preserving row has less energy error, and how many."""
+
+    always: int  # at every run time that both have
+    partly: int
+    never: int
+
+    @property
+    def compared(self) -> int:
+        """All comparisons."""
+        return sum(self)
+
+    @property
+    def share(self) -> float:
+        """That of the comparisons which are won at every run time."""
+        return self.always / self.compared
+
+
+def tallies(data: xr.Dataset, chart: str) -> dict[str, Tally]:
+    """The comparisons of a chart, by the classical row; rows without any are left out."""
+    counted = {}
     for classic, compared in crossings(data, chart).items():
-        pairs = [one for listed in compared.values() for one in listed]
-        if pairs:
-            parts.append(f"{classic} in {sum(one.share == 1.0 for one in pairs) / len(pairs):.0%}")
+        shares = [one.share for listed in compared.values() for one in listed]
+        if shares:
+            always, never = shares.count(1.0), shares.count(0.0)
+            counted[classic] = Tally(always, len(shares) - always - never, never)
+    return counted
+
+
+def message(data: xr.Dataset, chart: str) -> str:
+    """Against which classical rows those that preserve structure mostly win at all run times, as a title."""
+    counts = sorted(tallies(data, chart).items(), key=lambda one: -one[1].share)
+    named = [(f"{split_name(name)[0]} ({tally.share:.0%})", tally.share) for name, tally in counts]
+    most, few = [name for name, share in named if share >= 0.5], [name for name, share in named if share < 0.5]
+    parts = [
+        f"in {size} half of the comparisons with {' and '.join(names)}"
+        for size, names in (("at least", most), ("less than", few))
+        if names
+    ]
     if not parts:
         return "Energy errors at equal run time"
-    return (
-        "At every run time that both have, structure-preserving methods keep energy better than "
-        f"{', than '.join(parts)} of the pairs of a method and a scene"
-    )
+    place = {"axis": "in the axis chart", "angles": "in Euler angles"}[chart]
+    return f"Structure-preserving methods {place} keep energy better at every run time {', '.join(parts)}"
 
 
 def at_equal_steps(data: xr.Dataset, names: Sequence[str], scene: str) -> str:

@@ -1,7 +1,9 @@
-"""Two pictures of who is the fastest: the winner of every cell, and how much slower every row is."""
+"""Two pictures of who is the fastest: the winner of every cell, and how sure and how slow every row is."""
 
 import textwrap
 from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -9,14 +11,13 @@ import xarray as xr
 from symtop.measure import ranking
 from symtop.measure.work import TARGETS
 from symtop.methods.registry import split_name
-from symtop.report.style import GREY, headline, look, number, panels
+from symtop.report.style import GREY, LEAST_TEXT, headline, look, number, panels
 from symtop.runner.study import Picture
 
 from . import words
 
 POWERS = [f"$10^{{{np.log10(target):.0f}}}$" for target in TARGETS]
 LEVEL = 1.05  # times the least time: no more than it
-SLOWEST = 100.0  # times the fastest: the darkest cell
 
 
 def winners(data: xr.Dataset) -> Picture:
@@ -79,91 +80,93 @@ def winners(data: xr.Dataset) -> Picture:
     )
 
 
+class Middle(NamedTuple):
+    """How one row fares over all targets that some row meets."""
+
+    name: str
+    met: int
+    ratio: float  # median time over the fastest row's, a target that is not met counting as infinite
+
+
+def middles(merged: xr.DataArray) -> tuple[int, list[Middle]]:
+    """How many targets some row meets, and every row's share of them and median slowdown, in the order of `merged`."""
+    table = merged.transpose("integrator", ...).values.reshape(merged.sizes["integrator"], -1)
+    table = table[:, np.isfinite(table).any(axis=0)]
+    ratios = np.median(np.where(np.isfinite(table), table, np.inf), axis=1)
+    met, names = np.isfinite(table).sum(axis=1), map(str, merged["integrator"].values)
+    return table.shape[1], [Middle(name, int(n), float(r)) for name, n, r in zip(names, met, ratios, strict=True)]
+
+
 def slowdown(data: xr.Dataset) -> Picture:
-    """Every compiled row's time over the fastest one's, the median over the scenes, a column a horizon and target."""
+    """How many targets every compiled row meets, and its time over the fastest one's, the median over all targets."""
     compiled = words.of_implementation(data, "compiled")
     names = [name for name in ranking.ranked(data) if name in compiled]
     costs = [ranking.relative_costs(data.isel(horizon=[far]), names) for far in range(data.sizes["horizon"])]
     merged = xr.concat(costs, "problem").sel(integrator=names)
     order = ranking.leaders(merged, len(names))
-    order += [name for name in names if name not in order]
-    figure, axes = panels(1, len(costs), height=0.5 + 0.133 * len(order), sharey=True)
-    for far, (axis, table) in enumerate(zip(axes[0], costs, strict=True)):
-        for column, target in enumerate(TARGETS):
-            for line, name in enumerate(order):
-                ratios = table.sel(target=target, integrator=name).dropna("problem").values
-                text, shade = _cell(data.isel(horizon=far), name, target, ratios)
-                color = "white" if np.dot(_heat(shade)[:3], [0.3, 0.59, 0.11]) < 0.5 else "black"
-                axis.fill_between(
-                    [column - 0.49, column + 0.49], line - 0.47, line + 0.47, color=_heat(shade), lw=0, zorder=1
-                )
-                axis.text(column, line, text, ha="center", va="center", fontsize=7.0, color=color, zorder=2)
-        axis.set(
-            xlim=(-0.5, len(TARGETS) - 0.5), ylim=(len(order) - 0.5, -0.5), yticks=range(len(order)),
-            yticklabels=order, xticks=range(len(TARGETS)), title=words.spans(data)[far], xticklabels=POWERS,
-            xlabel="largest axis error allowed (rad)",
-        )  # fmt: skip
-        axis.grid(visible=False)
-        axis.tick_params(length=0)
+    asked, rows = middles(merged.sel(integrator=order))
+    shown = [row for row in rows if np.isfinite(row.ratio)]
+    told = _told(rows)
+    figure, axes = panels(1, 2, height=0.9 + 0.135 * len(shown), sharey=True)
+    for place, row in enumerate(shown):
+        named = row in told
+        color, said = look(row.name).color if named else "#C4C4C4", {"weight": "bold" if named else "normal"}
+        axes[0, 0].barh(place, row.met, height=0.7, color=color)
+        axes[0, 0].text(row.met, place, f"{row.met} ", va="center", ha="right", fontsize=LEAST_TEXT,
+                        color="white" if named else "black", **said)  # fmt: skip
+        axes[0, 1].plot([1.0, row.ratio], [place, place], color=color, lw=0.8, zorder=1)
+        axes[0, 1].plot(row.ratio, place, "o", color=color if named else GREY, ms=4.5)
+        axes[0, 1].annotate(number(row.ratio), (row.ratio, place), (5, 0), textcoords="offset points", va="center",
+                            fontsize=LEAST_TEXT, **said)  # fmt: skip
+    axes[0, 0].set(xlim=(0, asked), ylim=(len(shown) - 0.4, -0.6), yticks=range(len(shown)))
+    axes[0, 0].set_yticklabels([row.name for row in shown], fontsize=LEAST_TEXT)
+    for label, row in zip(axes[0, 0].get_yticklabels(), shown, strict=True):
+        label.set_weight("bold" if row in told else "normal")
+    axes[0, 0].set(title="how often it is accurate enough", xlabel=f"targets met, of {asked}")
+    axes[0, 1].set(title="how slow it is", xlabel="time / that of the fastest method, median", xscale="log")
+    axes[0, 1].set_xlim(0.8, 3.0 * max((row.ratio for row in shown), default=10.0))
+    axes[0, 1].xaxis.set_major_formatter("{x:g}")
+    for axis in axes.flat:
+        axis.grid(visible=False, axis="y")
+        axis.tick_params(axis="y", length=0)
+    lengths = " or ".join(f"{span:g}" for span in data["horizon"].values)
+    left_out, slow = merged.isel(integrator=0).size - asked, len(names) - len(shown)
     figure.supxlabel(
-        "In a cell: times the fastest method's time, the median over the scenes; after the stroke, on how many scenes\n"
-        "the method fails; uncoloured if on half of them or more. A word: why on all. First: those that fail least.",
+        f"A target: an axis error of {number(TARGETS[0])} to {number(TARGETS[-1])} rad, on one of "
+        f"{data.sizes['scene']} tops, over {lengths} nutations;\n{left_out} such targets, "
+        "wider than the nutation or met by no method, are left out. One that a method does not meet\n"
+        f"counts as infinite in its median; {slow} more methods, which meet at most half, have none.",
         fontsize=7.5, ha="left", x=0.01,
     )  # fmt: skip
     headline(figure, slowdown_message(merged.sel(integrator=order)))
-    for axis in axes.flat:
-        axis.tick_params(axis="y", labelsize=7.0)
     return Picture(
         "slowdown",
         figure,
-        "Times the fastest compiled row's time that each compiled row, method[chart], takes to an axis error, the "
-        "median over the scenes on which it meets it; behind the stroke on how many scenes it does not. White with a "
-        "word: it does on none, because of the budget of a million force evaluations, the least tolerance or rounding. "
-        f"Rows that meet most come first: {', '.join(order[:3])}. Darker is slower; a row that "
-        "misses half of the scenes or more has no colour. All times are measured.",
-        "A table of slowdowns, a line a row and a column a horizon and accuracy, darker for slower.",
+        f"Of {asked} targets, each an axis error on a scene over a horizon, how many every compiled row, "
+        "method[chart], meets with some step or tolerance within a million force evaluations; and its time over that "
+        "of the fastest row, the median over all targets. Rows that meet most come first, and those that meet as many "
+        "by how close they come to the fastest. A row that misses half of the targets or more has no median and is "
+        f"left out: {', '.join(row.name for row in rows if row not in shown) or 'none'}. All times are measured; the "
+        "tables have every one of them.",
+        "Bars of targets met and dots of the median slowdown, a line a row, the fastest and the surest in bold.",
     )
+
+
+def _told(rows: Sequence[Middle]) -> list[Middle]:
+    """The rows of the title: the fastest in the median, and the one that meets most if that is another."""
+    best, surest = min(rows, key=lambda row: row.ratio), max(rows, key=lambda row: row.met)
+    if not np.isfinite(best.ratio):
+        return []
+    return [best] if surest.met <= best.met or not np.isfinite(surest.ratio) else [best, surest]
 
 
 def slowdown_message(merged: xr.DataArray) -> str:
     """Who is the fastest in the median over all targets, and who fails least, if that is another one."""
-    asked = int(np.isfinite(merged).any("integrator").sum())
-    table = merged.transpose("integrator", ...).values.reshape(merged.sizes["integrator"], -1)
-    table = table[:, np.isfinite(table).any(axis=0)]
-    middle = np.median(np.where(np.isfinite(table), table, np.inf), axis=1)
-    met, names = np.isfinite(table).sum(axis=1), [str(name) for name in merged["integrator"].values]
-
-    best, surest = int(np.argmin(middle)), int(np.argmax(met))
-    if not np.isfinite(middle[best]):
+    asked, rows = middles(merged)
+    told = _told(rows)
+    if not told:
         return "No method meets half of the targets"
-    times = "" if middle[best] < LEVEL else f"{number(float(middle[best]))} times "
-    first = (
-        f"{names[best]} meets {met[best]} of {asked} targets that can be met, in {times}the least time in the median"
-    )
-    if met[surest] <= met[best] or not np.isfinite(middle[surest]):
-        return first
-    return f"{first}; {names[surest]} meets {met[surest]}, in {number(float(middle[surest]))} times as much"
-
-
-def _cell(data: xr.Dataset, name: str, target: float, ratios: np.ndarray) -> tuple[str, float]:
-    """What a cell of the slowdown table says, and how dark it is, from 0 to 1."""
-    met = ratios[np.isfinite(ratios)]
-    if not met.size:
-        why = Counter(map(str, data["reached"].sel(integrator=name, target=target).values.ravel()))
-        return why.most_common(1)[0][0], 0.0
-    missed = f" / {ratios.size - met.size}" if met.size < ratios.size else ""
-    middle = float(np.median(met))
-    shade = _darkness(middle) if 2 * met.size > ratios.size else 0.0  # most of the scenes are not in the median
-    return f"{middle:.2g}{missed}" if middle < 100.0 else f"{middle:.0f}{missed}", shade
-
-
-def _darkness(ratio: float) -> float:
-    return 0.06 + 0.94 * min(np.log(max(ratio, 1.0)) / np.log(SLOWEST), 1.0)
-
-
-def _heat(shade: float) -> tuple[float, float, float, float]:
-    """A colour from white to dark blue, of one hue, so that it reads in grey as well."""
-    from matplotlib import colormaps
-
-    red, green, blue, alpha = colormaps["Blues"](shade)
-    return (1.0, 1.0, 1.0, 1.0) if shade == 0.0 else (red, green, blue, alpha)
+    best, *surest = told
+    pace = "is the fastest" if best.ratio < LEVEL else f"takes {number(best.ratio)} times the least time"
+    more = "".join(f"; {row.name} meets {row.met}, in {number(row.ratio)} times the least time" for row in surest)
+    return f"{best.name} {pace} in the median and meets {best.met} of {asked} targets{more}"
