@@ -106,12 +106,15 @@ def one_by_one(runs: RowPlan, chart: str, scene: Scene) -> Made:
     return Made(states, momenta, outcome)
 
 
-def together(runs: RowPlan, solver: FixedStep, columns: slice, family: Sequence[Scene]) -> Made:
-    """The runs of all rows at settings that are sampled equally often, in one call, to the same bits."""
+def together(runs: RowPlan, solver: FixedStep, columns: slice, tops: Array, periods: Array) -> Made:
+    """The runs of all rows at settings that are sampled equally often, in one call, to the same bits.
+
+    `tops` (rows, 9) as `flat` has them, `periods` (rows,) of their nutations: two bisections each, which are not
+    repeated for every group of settings.
+    """
     marks, settings = np.array(runs.marks[columns]), runs.settings[columns]
-    numbers = np.repeat([flat(scene.top, scene.start) for scene in family], len(settings), axis=0)
-    h = np.outer([scene.nutation_period for scene in family], settings)
-    done = solver.many(numbers, h.ravel(), np.tile(marks, (len(family), 1)))
+    h = np.outer(periods, settings)
+    done = solver.many(np.repeat(tops, len(settings), axis=0), h.ravel(), np.tile(marks, (len(tops), 1)))
     return Made(*(values.reshape(*h.shape, *values.shape[1:]) for values in (done.states, done.momenta, done.outcome)))
 
 
@@ -143,7 +146,8 @@ def outcome_map(
     solver = method.solvers[chart]
     if isinstance(solver, FixedStep) and not solver.in_python:
         pieces = [(slice(None), columns) for columns in columns_together(runs, len(family_scenes))]
-        made = (together(runs, solver, columns, family_scenes) for _, columns in pieces)
+        tops = np.array([flat(scene.top, scene.start) for scene in family_scenes])
+        made = (together(runs, solver, columns, tops, truth.periods) for _, columns in pieces)
     else:
         pieces = [(slice(i, i + 1), slice(None)) for i in range(len(family_scenes))]
         made = (one_by_one(runs, chart, scene) for scene in family_scenes)

@@ -46,6 +46,11 @@ class Truths(NamedTuple):
     constants: Array  # (m, constants of a closed form)
     scenes: Array  # (m, 11): I1, I3, mgl, nutation period, `Barriers`, energy scale, p_phi -+ p_psi where it has a sign
 
+    @property
+    def periods(self) -> Array:
+        """Nutation periods (m,)."""
+        return self.scenes[:, 3]
+
     def part(self, scenes: slice) -> "Truths":
         """The same for some of the scenes."""
         return Truths(self.constants[scenes], self.scenes[scenes])

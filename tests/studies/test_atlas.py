@@ -20,6 +20,7 @@ from symtop.measure.errors import errors_against
 from symtop.measure.verdicts import JUDGED, VERDICTS, verdict
 from symtop.methods.registry import integrator, methods
 from symtop.model.scenes import closed_form, scene
+from symtop.model.top import flat
 from symtop.report import style
 from symtop.report.style import OUTCOME_COLORS
 from symtop.run.reference import reference
@@ -60,8 +61,10 @@ def test_columns_that_are_run_together_have_the_bits_of_runs_one_by_one(name, mo
     plan, tops = row_plan(method, steps, 2.0), [family("cusp")(spin) for spin in spins]
     whole, chart = outcome_map("cusp", spins, method, steps, 2.0), method.chart_for("axis")
     alone = [outcome_maps.one_by_one(plan, chart, scene_) for scene_ in tops]
+    numbers = np.array([flat(scene_.top, scene_.start) for scene_ in tops])
+    periods = np.array([scene_.nutation_period for scene_ in tops])
     for columns in outcome_maps.columns_together(plan, len(tops)):
-        made = outcome_maps.together(plan, method.solvers[chart], columns, tops)
+        made = outcome_maps.together(plan, method.solvers[chart], columns, numbers, periods)
         for one, part in zip(alone, zip(made.states, made.momenta, made.outcome, strict=True), strict=True):
             for values, others in zip(one, part, strict=True):
                 seen = values[0, columns][:, : made.states.shape[2]] if others.ndim > 1 else values[0, columns]
