@@ -15,6 +15,7 @@ import xarray as xr
 
 from symtop.measure import ranking
 from symtop.methods.registry import split_name
+from symtop.runner.study import Table
 
 CHARTS = {"axis": "the axis and the angular momentum (e, L)", "angles": "Euler angles"}
 CLASSIC = ("rk4", "rk45-compiled", "taylor")  # compared in each chart that they have
@@ -119,44 +120,53 @@ def growth_at_equal_settings(runs: xr.Dataset, quantity: str) -> float:
     return float(np.median(good)) if good else np.nan
 
 
+def table(data: xr.Dataset) -> Table:
+    """Of every classical row: its comparisons by how they end, and the rows that are ahead or behind in all."""
+    rows = []
+    for chart in CHARTS:
+        for classic, compared in crossings(data, chart).items():
+            pairs = [one for listed in compared.values() for one in listed]
+            kinds = Counter(_kind(one) for one in pairs)
+            ends = [
+                _listed(
+                    [name for name, listed in compared.items() if listed and all(one.share == end for one in listed)]
+                )
+                for end in (1.0, 0.0)
+            ]
+            if pairs:
+                rows.append([classic, str(len(pairs)), *(str(kinds[kind]) for kind in KINDS), *ends])
+    return Table(
+        f"Energy over {float(data['horizon'].values[-1]):g} nutation periods at equal run times that both rows have: "
+        "pairs of a scene and a structure-preserving row of the same chart, by the times at which this has less error",
+        ["against", "pairs", *KINDS, "always less", "never less"],
+        rows,
+    )
+
+
+def _kind(one: Crossing) -> str:
+    """The run times at which the first row of a pair has less error."""
+    if one.share in (0.0, 1.0):
+        return KINDS[0] if one.share else KINDS[-1]
+    return "in turns" if one.at_least == one.at_most else KINDS[1] if one.at_least else KINDS[2]
+
+
 def sentence(data: xr.Dataset, chart: str) -> str:
     """How often structure-preserving rows have less energy error than the classical ones of their chart."""
-    said = []
-    for classic, compared in crossings(data, chart).items():
-        pairs = [one for listed in compared.values() for one in listed]
-        if not pairs:
-            continue
-        always = [name for name, listed in compared.items() if listed and all(one.share == 1.0 for one in listed)]
-        never = [name for name, listed in compared.items() if listed and all(one.share == 0.0 for one in listed)]
-        counts = Counter(
-            "at every run time" if one.share == 1.0
-            else "at none" if one.share == 0.0
-            else "at short run times only" if one.at_least and not one.at_most
-            else "at long run times only" if one.at_most and not one.at_least
-            else "in turns"
-            for one in pairs
-        )  # fmt: skip
-        text = (
-            f"Structure-preserving rows have less energy error than {classic} "
-            + ", ".join(f"{kind} in {counts[kind]}" for kind in KINDS)
-            + f" of {len(pairs)} pairs of a row and a scene."
-        )
-        text += f" Always less: {_listed(always)}." if always else ""
-        text += f" Never less: {_listed(never)}." if never else ""
-        said.append(text)
-    horizon = f"{float(data['horizon'].values[-1]):g}"
-    if not said:
+    counted = tallies(data, chart)
+    if not counted:
         return ""
+    said = [f"{classic} {tally.share:.0%} of {tally.compared}" for classic, tally in counted.items()]
     return (
-        f"Energy over {horizon} nutation periods in {CHARTS[chart]}, at equal run times that both rows have: "
-        f"{' '.join(said)}"
+        f"Energy over {float(data['horizon'].values[-1]):g} nutation periods in {CHARTS[chart]}: structure-preserving "
+        "rows have less error than a classical row, at every run time that both have, in these shares of the pairs of "
+        f"a row and a scene: against {', '.join(said)}."
     )
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Names in a sentence; of a long list the first, and how many more there are."""
+    """Names in a cell; of a long list the first, and how many more there are."""
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
+    return ", ".join(names[:MOST_NAMES]) + more or "none"
 
 
 class Tally(NamedTuple):

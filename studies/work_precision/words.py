@@ -218,6 +218,7 @@ def tables(data: xr.Dataset) -> list[Table]:
         ]
     return [
         *shown, worth.table(data), against_taylor.table(data, spans(data)), closed_form.table(data, spans(data)),
+        energy.table(data),
     ]  # fmt: skip
 
 
