@@ -4,7 +4,8 @@ The cost of a target is that of a row's cheapest timed run that meets it: the sm
 only adds. A lead is sure if it would be found again. The last `MOST_ROUNDS` rounds that both rows took part in are
 dealt to two halves, and in each half the ratio of the smallest samples is at least a margin (`margin`), which comes
 from the noise of the scene's own times. Each row has met its smallest sample again (`timing.met_again`). And if a time
-misses its forecast by more than `MISSED`, the forecast leads too. Otherwise the two are level.
+misses its forecast by more than `MISSED`, the forecast leads too. Otherwise the two are level, unless they are `FAR`
+apart: every sample of the one is that many times every sample of the other, whatever rounds they were taken in.
 
 Only rows that take steps are ranked. The closed form is what errors are measured by, and its cost is that of its
 constants, whatever the horizon: it stands beside the rankings. A target that is wider than the nutation is not asked.
@@ -21,6 +22,7 @@ from symtop.measure.work import TARGETS
 MARGIN = 1.1  # the least: the same code in another process, elsewhere in memory, differs by some per cent
 NEEDS = ("control", "nutation_width", "outcome", "implementation", "seconds", "seconds_samples", "seconds_forecast")
 LEAST_ROUNDS, MOST_ROUNDS = 3, 8
+FAR = 3.0  # no spell of a machine that is shared by seven processes made a time 2.4 times as long
 
 
 class Place(NamedTuple):
@@ -102,10 +104,14 @@ def margin(cell: xr.Dataset) -> float:
 def lead(first: Place, second: Place, least: float = MARGIN) -> Lead:
     """By how much the first place is ahead of the second, and whether that is sure.
 
-    It is not if a ratio is less than `least` or there are fewer than `LEAST_ROUNDS` common rounds.
+    It is not if a ratio is less than `least` or there are fewer than `LEAST_ROUNDS` common rounds, but for two that are
+    `FAR` apart in every sample.
     """
     both = np.flatnonzero(np.isfinite(first.samples) & np.isfinite(second.samples))[-MOST_ROUNDS:]
     ratio = second.cost / first.cost
+    slow, fast = (place.samples[np.isfinite(place.samples)] for place in (second, first))
+    if fast.size >= LEAST_ROUNDS and slow.size > 1 and slow.min() >= max(FAR, least) * fast.max():
+        return Lead(ratio, True)
     if both.size < LEAST_ROUNDS:
         return Lead(ratio, False)
     slowest = max(first.cost, first.forecast) if first.doubtful else first.cost

@@ -114,14 +114,14 @@ def timings(
 def forecasts(seconds: ArrayLike, evaluations: ArrayLike, steps: ArrayLike, *, fixed_step: bool) -> NDArray[np.float64]:
     """The time of each run of a method as its other runs foretell it: (n,), NaN with fewer than two others.
 
-    A run costs a call, its force evaluations, and as much for every step, or, of an adaptive method, for every
-    evaluation in proportion to the evaluations of a step: a Taylor derivative is the dearer the higher it is. The three
-    costs are those of the least relative squares over the other runs. Nothing is shown that comes from here: a time
-    that misses its forecast is taken again. On a quiet machine 1 in 90 misses it by a quarter, and half by 1 %.
+    A run costs a call, its force evaluations and its steps, and, of an adaptive method, as much for every evaluation in
+    proportion to the evaluations of a step: a Taylor derivative is the dearer the higher it is. The costs are those of
+    the least relative squares over the other runs. Nothing is shown that comes from here: a time that misses its
+    forecast is taken again. On a quiet machine 1 in 90 misses it by a quarter, and half by 1 %.
     """
     times, work, count = (np.asarray(values, dtype=float) for values in (seconds, evaluations, steps))
-    third = count if fixed_step else work**2 / np.maximum(count, 1.0)
-    columns = np.stack([work, np.ones_like(work), third], axis=1)
+    costs = [work, np.ones_like(work), count]
+    columns = np.stack(costs if fixed_step else [*costs, work**2 / np.maximum(count, 1.0)], axis=1)
     expected = np.full(times.size, np.nan)
     for k in range(times.size):
         others = np.arange(times.size) != k

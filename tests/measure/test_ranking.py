@@ -19,6 +19,8 @@ def test_times_are_foretold_by_the_other_runs_of_a_method():
     assert forecasts(exact, work, steps, fixed_step=True) == pytest.approx(exact, rel=1e-9)
     derivatives = 1e-5 + 1e-9 * work**2 / steps
     assert forecasts(derivatives, work, steps, fixed_step=False) == pytest.approx(derivatives, rel=1e-9)
+    terms = derivatives + 8e-8 * steps  # a step that prepares itself, whatever its order
+    assert forecasts(terms, work, steps, fixed_step=False) == pytest.approx(terms, rel=1e-6)
     glitch = exact.copy()
     glitch[3] *= 2.8  # as one winner of 72 once
     assert glitch[3] / forecasts(glitch, work, steps, fixed_step=True)[3] == pytest.approx(2.8, rel=1e-9)
@@ -182,6 +184,11 @@ def test_samples_are_pairs_only_within_a_round_and_the_last_common_rounds_count(
     no = math.nan
     apart = ranking.win(cell([[1.0, 1.0, 1.0, no, no, no], [no, no, no, 2.0, 2.0, 2.0]]), 1e-6)
     assert apart.level == ("b",)
+    far = [[1.0, 1.3, 1.0, no, no, no], [no, no, no, 4.0, 9.0, no]]
+    assert ranking.win(cell(far), 1e-6).level == ()
+    assert ranking.win(cell([[1.0, 1.4, 1.0, no, no, no], far[1]]), 1e-6).level == ("b",)  # one sample of each is near
+    assert ranking.win(cell([far[0], [no, no, no, 4.0, no, no]]), 1e-6).level == ("b",)  # a single one
+    assert ranking.win(cell([[1.0, 1.3, no, no, no, no], far[1]]), 1e-6).level == ("b",)  # too few of the first
     base, later = [1.0, 3.0, 1.0], [1.0] * 5
     assert ranking.win(cell([[*base, *later], [2.0, 2.0, 2.0, *[1.3] * 5]]), 1e-6).ratio == pytest.approx(1.3)
     assert ranking.win(cell([[*base, *later], [2.0, 4.0, 2.0, *[no] * 5]]), 1e-6).ratio == pytest.approx(2.0)
