@@ -11,6 +11,7 @@ from typing import NamedTuple
 import symtop
 from benchmarks import twin
 from symtop.measure.timing import Timing, timings
+from symtop.methods.fixed_step import inside
 from symtop.methods.registry import methods
 
 SCENE = "spheroid"
@@ -47,32 +48,41 @@ def ratio(ours: Timing, theirs: Timing) -> tuple[float, float, float]:
     return whole, min(whole, *parts), max(whole, *parts)
 
 
-def kernels() -> dict[tuple[str, str], twin.Kernel]:
-    """Every compiled fixed-step kernel that has a twin, by integrator and chart."""
-    scene = symtop.scene(SCENE)
-    h = scene.nutation_period / PER_NUTATION
-    found = {
-        (method.name, chart): twin.kernel_of(method, chart, scene, h)
+def keys() -> list[tuple[str, str]]:
+    """Integrator and chart of every compiled fixed-step kernel; none of them is compiled for it."""
+    return [
+        (method.name, chart)
         for method in methods().values()
         if method.fixed_step and method.implementation == "compiled"
-        for chart in method.solvers
-    }
-    return {key: kernel for key, kernel in found.items() if kernel is not None}
+        for chart, solver in method.solvers.items()
+        if inside(solver) is not None
+    ]
+
+
+def kernel(key: tuple[str, str]) -> twin.Kernel:
+    """The kernel of an integrator in a chart, and the numbers that it runs on."""
+    scene, (name, chart) = symtop.scene(SCENE), key
+    return twin.kernel_of(methods()[name], chart, scene, scene.nutation_period / PER_NUTATION)
+
+
+def kernels() -> dict[tuple[str, str], twin.Kernel]:
+    """Every compiled fixed-step kernel, by integrator and chart."""
+    return {key: kernel(key) for key in keys()}
 
 
 def measure() -> list[Row]:
     """Check that every twin is a twin, then time all of them."""
-    found = {key: kernel for key, kernel in kernels().items() if kernel.march in twin.FAMILIES}
-    gaps = {key: twin.difference(kernel, CHECKED) for key, kernel in found.items()}
+    twins = {key: one for key, one in kernels().items() if one.march in twin.FAMILIES}
+    gaps = {key: twin.difference(one, CHECKED) for key, one in twins.items()}
     calls, counts = [], []
-    for kernel in found.values():
-        other = twin.Twin(kernel)
+    for one in twins.values():
+        other = twin.Twin(one)
         probe = timings([lambda other=other: other(CHECKED)], batches=3, batch=BATCH)[0]
         steps = max(CHECKED, int(CALL / probe.best * CHECKED))
         counts.append(steps)
-        calls += [lambda kernel=kernel, steps=steps: twin.ours(kernel, steps), lambda o=other, n=steps: o(n)]
+        calls += [lambda one=one, steps=steps: twin.ours(one, steps), lambda o=other, n=steps: o(n)]
     timed = timings(calls, batches=BATCHES, batch=BATCH)
-    pairs = list(zip(found, counts, timed[::2], timed[1::2], strict=True))
+    pairs = list(zip(twins, counts, timed[::2], timed[1::2], strict=True))
     verlet = next(ours.best / steps for key, steps, ours, _ in pairs if key == ("stormer-verlet", "angles"))
     return [
         Row(

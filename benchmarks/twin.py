@@ -57,10 +57,12 @@ class Kernel(NamedTuple):
     h: float
 
 
-def kernel_of(method: Integrator, chart: str, scene: Scene, h: float) -> Kernel | None:
-    """The loop behind a solver and the numbers it would run on; None if it is no fixed-step loop of ours."""
-    found = inside(method.solvers[chart])
-    return None if found is None else Kernel(found.loop, *found.setup(scene.top, scene.start, h), h)
+def kernel_of(method: Integrator, chart: str, scene: Scene, h: float) -> Kernel:
+    """The loop behind a solver and the numbers it would run on; ValueError if it is no fixed-step loop of ours."""
+    solver = inside(method.solvers[chart])
+    if solver is None:
+        raise ValueError(f"{method.name}[{chart}] is no compiled loop")
+    return Kernel(solver.loop, *solver.setup(scene.top, scene.start, h), h)
 
 
 def _macros(rule: Any, chart: str = "") -> dict[str, int]:

@@ -6,13 +6,15 @@ import pytest
 from benchmarks import bench, ensemble, kernels, lanes, measured, targets, truth, twin, whole_run
 from symtop.measure.timing import Timing, timings
 from symtop.methods import loop as loops
+from symtop.methods.fixed_step import inside
 from symtop.methods.many import Many
+from symtop.methods.registry import methods
 from symtop.model import charts
 from symtop.model.closed_forms import ClosedForms
 from symtop.report import page
 from symtop.runner import store
 
-KERNELS = kernels.kernels()
+KEYS = kernels.keys()
 STEPS = 500
 needs_gcc = pytest.mark.skipif(twin.compiler() is None, reason="the twins are built with gcc")
 
@@ -21,26 +23,27 @@ needs_gcc = pytest.mark.skipif(twin.compiler() is None, reason="the twins are bu
 
 
 def test_every_compiled_fixed_step_kernel_has_a_twin():
-    assert {kernel.march for kernel in KERNELS.values()} <= set(twin.FAMILIES)
-    assert {kernel.march for kernel in KERNELS.values()} == set(twin.FAMILIES), "a twin of nothing"
+    marches = {inside(methods()[name].solvers[chart]).loop for name, chart in KEYS}
+    assert marches <= set(twin.FAMILIES)
+    assert marches == set(twin.FAMILIES), "a twin of nothing"
 
 
 @needs_gcc
 @pytest.mark.parametrize("key", [("stormer-verlet", "angles"), ("takahashi-imada", "attitude"), ("rk4", "axis")])
 def test_a_twin_returns_the_same_bits(key):
-    assert twin.difference(KERNELS[key], STEPS) == 0.0
+    assert twin.difference(kernels.kernel(key), STEPS) == 0.0
 
 
 @needs_gcc
 @pytest.mark.slow
-@pytest.mark.parametrize("key", KERNELS, ids="-".join)
+@pytest.mark.parametrize("key", KEYS, ids="-".join)
 def test_every_twin_returns_the_same_bits(key):
-    assert twin.difference(KERNELS[key], STEPS) == 0.0
+    assert twin.difference(kernels.kernel(key), STEPS) == 0.0
 
 
 @needs_gcc
 def test_the_comparison_sees_one_wrong_rounding():
-    kernel = KERNELS["stormer-verlet", "angles"]
+    kernel = kernels.kernel(("stormer-verlet", "angles"))
     nudged = np.nextafter(kernel.rule.drift[0], 1.0)
     other = twin.Twin(kernel._replace(rule=kernel.rule._replace(drift=(nudged,))), twin.EXACT)
     assert np.any(other.shown(STEPS)[0] != twin.ours(kernel, STEPS)[0])
@@ -48,7 +51,7 @@ def test_the_comparison_sees_one_wrong_rounding():
 
 @needs_gcc
 def test_a_twin_that_leaves_the_chart_says_so():
-    kernel = KERNELS["stormer-verlet", "angles"]
+    kernel = kernels.kernel(("stormer-verlet", "angles"))
     with pytest.raises(RuntimeError, match="stopped after"):
         twin.Twin(kernel._replace(state=(0.01, -9.0, 0.0, 0.0)), twin.EXACT)(STEPS)
 
@@ -68,7 +71,7 @@ def test_a_twin_that_leaves_the_chart_says_so():
     ids="-".join,
 )
 def test_a_kernel_takes_at_most_a_quarter_more_than_its_twin(key):
-    kernel, steps = KERNELS[key], 8000
+    kernel, steps = kernels.kernel(key), 8000
     other = twin.Twin(kernel)
     ours, theirs = timings([lambda: twin.ours(kernel, steps), lambda: other(steps)], batches=60, batch=1e-3)
     assert ours.best / theirs.best < kernels.LIMIT
