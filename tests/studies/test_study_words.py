@@ -8,9 +8,6 @@ import xarray as xr
 from symtop_studies.drift import messages, rows, tables, words
 from symtop_studies.drift.histories import run_history
 from symtop_studies.drift.study import TOLERANCE, cases
-from symtop_studies.notebook import words as notebook_words
-from symtop_studies.notebook.long_energy import better_from
-from symtop_studies.notebook.tables import SOLVER, Column
 from symtop_studies.stability import words as stability_words
 from symtop_studies.truth import tables as truth_tables, words as truth_words
 
@@ -248,34 +245,6 @@ def test_the_notebook_study_says_how_many_discrete_methods_have_a_smaller_error_
     sentence = notebook_words.energy(data)
     assert "1 of 2 have a smaller one than the solver (1e-06)" in sentence
     assert "40-fold" in sentence
-
-
-def long_runs(level, slope):
-    """A discrete method of a level energy error beside a solver whose error grows with time, to t = 1000."""
-    time = np.geomspace(1.0, 1000.0, 301)
-    coords = {"scene": ["spheroid"], "integrator": ["midpoint[angles]", SOLVER]}
-    return xr.Dataset({
-        Column.LONG_TIME: (("scene", "integrator", "long"), [[time, time]]),
-        Column.LONG_ENERGY: (("scene", "integrator", "long"), [[np.full(301, level), slope * time]]),
-        "energy_largest": (("scene", "integrator"), [[level, slope * 8.0]]),
-        Column.SAMPLE_TIME: (("scene", "integrator", "sample"), np.full((1, 2, 1), 8.0)),
-    }, coords=coords)  # fmt: skip
-
-
-def test_the_notebooks_question_is_answered_and_the_time_from_which_its_hope_is_true_is_measured():
-    late = long_runs(3e-5, 1e-7)
-    assert better_from(late, "spheroid", "midpoint[angles]") == pytest.approx(300.0, rel=0.03)
-    (said,) = notebook_words.hopes(late)
-    assert (
-        "at the notebook's t = 8, it is kept worse with midpoint[angles] (3e-05), against 8e-07 of lsoda[angles]"
-        in said
-    )
-    assert "their error is the smaller one from t = 302 (midpoint[angles]) on" in said
-    never, always = long_runs(3e-5, 1e-9), long_runs(1e-9, 1e-7)
-    assert better_from(never, "spheroid", "midpoint[angles]") == math.inf
-    assert "with midpoint[angles] it never is" in notebook_words.hopes(never)[0]
-    assert better_from(always, "spheroid", "midpoint[angles]") == 0.0
-    assert "better with midpoint[angles]" in notebook_words.hopes(always)[0]
 
 
 @pytest.mark.parametrize(
