@@ -10,6 +10,28 @@ from symtop_studies.notebook.long_energy import better_from
 from symtop_studies.notebook.tables import SOLVER, Column
 
 
+def test_the_notebook_study_names_discrete_methods_that_lose_their_momenta():
+    sizes = np.array([[1e-15, 1e-15, 1e-6]])
+    coords = {"scene": ["spheroid"], "integrator": ["midpoint[angles]", "strang[axis]", SOLVER]}
+    data = xr.Dataset(dict.fromkeys(notebook_words.MOMENTA, (("scene", "integrator"), sizes)), coords=coords)
+    assert "With all 2 discrete methods" in notebook_words.momenta(data)
+    lost = data.assign({"p_phi_largest": (("scene", "integrator"), [[1e-15, 1e-9, 1e-6]])})
+    assert "With 1 of 2 discrete methods" in notebook_words.momenta(lost)
+    assert "not with strang[axis]" in notebook_words.momenta(lost)
+
+
+def test_the_notebook_study_says_how_many_discrete_methods_have_a_smaller_error_than_the_solver():
+    coords = {"scene": ["spheroid"], "integrator": ["midpoint[angles]", "stormer-verlet[angles]", SOLVER]}
+    data = xr.Dataset(coords=coords).assign({
+        "energy_largest": (("scene", "integrator"), [[3e-5, 1e-9, 1e-6]]),
+        Column.ENERGY_CHANGE: ("shadow_setting", [4e-4]),
+        Column.MODIFIED_CHANGE: ("shadow_setting", [1e-5]),
+    })  # fmt: skip
+    sentence = notebook_words.energy(data)
+    assert "1 of 2 have a smaller one than the solver (1e-06)" in sentence
+    assert "40-fold" in sentence
+
+
 def long_runs(level, slope):
     """A discrete method of a level energy error beside a solver whose error grows with time, to t = 1000."""
     time = np.geomspace(1.0, 1000.0, 301)
