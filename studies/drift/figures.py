@@ -25,6 +25,7 @@ SHOWN = (
     "rk45[angles]", "taylor[axis]",
 )  # fmt: skip
 BANDS = ("energy", "modified_energy")
+ROUNDED = 1e-12  # relative: smaller changes of the modified energy are called rounding
 
 
 def pictures(data: xr.DataTree) -> list[Picture]:
@@ -99,7 +100,7 @@ def _windows(data: xr.Dataset) -> Picture:
             low, middle, high = (run[f"{quantity}_{part}"].values / scale for part in ("least", "mean", "largest"))
             axis.fill_between(steps, low, high, step="pre", color=mark.color, alpha=0.3, lw=0)
             axis.step(steps, middle, where="pre", color=mark.color, lw=2.0)
-            axis.axhline(middle[0], color=BLACK, lw=0.8, ls=(0, (4, 3)), zorder=3)
+            axis.axhline(next(iter(middle), np.nan), color=BLACK, lw=0.8, ls=(0, (4, 3)), zorder=3)
             axis.set_xscale("log")
             if quantity == BANDS[0]:
                 moved = f"{100.0 * float(moves.sel(integrator=name)):+.1g}".replace("-", "\N{MINUS SIGN}")
@@ -107,7 +108,8 @@ def _windows(data: xr.Dataset) -> Picture:
         row[0].set_ylabel(f"{LABELS[quantity]}\nchange / {number(scale)}")
     for axis in axes[-1]:
         axis.set_xlabel("steps")
-    axes[1, 0].annotate("rounding only", (0.04, 0.05), xycoords="axes fraction", **NOTE)
+    if size < ROUNDED:  # of the last quantity, the modified energy
+        axes[1, 0].annotate("rounding only", (0.04, 0.05), xycoords="axes fraction", **NOTE)
     few_ticks(*axes.flat, most=4)
     figure.align_ylabels(axes[:, 0])
     axes[0, 0].plot([], [], color=GREY, lw=2.0, label="mean of a window of steps")

@@ -115,22 +115,23 @@ def windows(data: xr.Dataset) -> str:
     """How far the mean energy of the last window is from that of the first, at most over the methods."""
     steps, end = number(float(data["steps"].max())), number(100.0 * strayed(data)[0], 1)
     return (
-        f"The mean energy does not drift in {steps} steps: the last window's is that of the first to {end}% of the "
-        "oscillation's width or better (first row)"
+        f"The mean energy moves by at most {end}% of the width of its oscillation in {steps} steps, from the first "
+        "window to the last (first row)"
     )
 
 
 def walk(cell: xr.Dataset) -> str:
     """The exponents of both sums, for the panel of a method."""
     plain, compensated = float(cell["plain_exponent"]), float(cell["exponent"])
-    return f"plain: $n^{{{plain:.2f}}}$\ncompensated: $n^{{{compensated:.2f}}}$"
+    return f"plain: power {plain:.2f}\ncompensated: power {compensated:.2f}"
 
 
 def rounding(ensembles: Mapping[str, xr.Dataset]) -> str:
     """What compensated sums gain, and with what power the drift grows with them."""
     powers = [float(cell["exponent"]) for cell in ensembles.values()]
+    walks = all(abs(float(cell["exponent"]) - 0.5) <= float(cell["exponent_interval"]) for cell in ensembles.values())
     gains = [float(cell["plain_late"] / cell["late"]) for cell in ensembles.values()]
     return (
         f"Compensated sums lower the drift by rounding {number(min(gains))} to {number(max(gains))} times; it grows as "
-        f"n to the power {min(powers):.2f} to {max(powers):.2f} then, as a random walk does (0.5)"
+        f"n to the power {min(powers):.2f} to {max(powers):.2f} then{', as a random walk does (0.5)' * walks}"
     )

@@ -188,7 +188,7 @@ def test_the_shift_of_the_mean_energy_is_relative_to_its_band():
     there_and_back = cells.assign(energy_mean=means.copy(data=[[0.0, 4e-5, 1e-6, np.nan]]))
     assert messages.strayed(there_and_back) == pytest.approx((0.01, 0.4))
     said = messages.windows(there_and_back.assign(steps=means * 0.0 + 1e8))
-    assert "in 10⁸ steps: the last window's is that of the first to 1% of the oscillation's width" in said
+    assert "moves by at most 1% of the width of its oscillation in 10⁸ steps, from the first window to the last" in said
     assert "(first row)" in said
 
 
