@@ -50,6 +50,15 @@ def cost(data: xr.Dataset) -> str:
     )
 
 
+def orders_message(data: xr.Dataset) -> str:
+    """To which order each method has the rate of decay at critical damping, as a title."""
+    powers = {m: order(data, "damping-2", m, Column.EXPONENT_ERROR).slope for m in (*RULES, ONE_SIDED)}
+    return (
+        f"At critical damping the rate of decay has order {powers['trapezoidal']:.1f} only with trapezoidal and "
+        f"{powers[ONE_SIDED]:.1f} with the force at one end; midpoint keeps {powers['midpoint']:.1f}"
+    )
+
+
 def decay_message(data: xr.Dataset) -> str:
     """Which method keeps the energy best at equal cost, for each damping, as a title."""
     largest, parts = np.abs(data[Column.ENERGY_ERROR]).max("sample"), []
