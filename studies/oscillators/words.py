@@ -120,7 +120,7 @@ def tables(data: xr.Dataset) -> list[Table]:
         for name, oscillator in OSCILLATORS.items()
         for method in (*RULES, ONE_SIDED)
     ]  # fmt: skip
-    orders = ["order of x", "order of the slow exponent"]
+    orders = ["order of x", "order of the rate of decay"]
     header = ["b", "regime", "rule", *orders, f"relative energy error to T = {LONG:g}"]
     damped = Table(f"Damped oscillator against the analytic solution, T = {HORIZON:g}; no chart", header, rows)
     return [damped, *quartic_tables.tables(data)]
