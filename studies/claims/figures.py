@@ -110,7 +110,7 @@ def bracket_message(falling: list[str], level: list[str]) -> str:
     if not falling or not level:
         return f"{'No' if level else 'Each'} defect of the Poisson bracket falls with the width of the differences"
     named = f"{', '.join(falling[:-1])} and {falling[-1]} are" if len(falling) > 1 else f"{falling[0]} is"
-    return f"{named} symplectic: the defect falls with the width; that of {len(level)} other methods levels off"
+    return f"{named} symplectic: the defect falls with the difference width; that of {len(level)} others levels off"
 
 
 def _bracket(data: xr.Dataset) -> Picture:
@@ -123,7 +123,11 @@ def _bracket(data: xr.Dataset) -> Picture:
         axis.plot(width, defect, **look, mec="white", mew=0.5)  # so that one marker shows within another
         least = int(np.argmin(width))
         ends[name] = float(width[least]), float(defect[least]), str(look["color"])
-    axis.set(xscale="log", yscale="log", xlabel="width of the differences, finer to the right")
+    axis.set(
+        xscale="log",
+        yscale="log",
+        xlabel="width of the finite differences that measure the defect (not the step), finer to the right",
+    )
     axis.invert_xaxis()
     ticks = sorted({float(value) for width, _ in measured.values() for value in width})
     axis.set_xticks(ticks, [f"{tick:.2g}" for tick in ticks])
@@ -134,12 +138,19 @@ def _bracket(data: xr.Dataset) -> Picture:
     falling = [name for name, (_, defect) in measured.items() if defect[-1] < defect[0] / REFINED]
     level = [name for name in measured if name not in falling]
     style.headline(figure, bracket_message(falling, level))
+    if gauss := [name for name in level if name.startswith("gauss-")]:
+        why = "symplectic for canonical\nequations; these are Lie-Poisson\n(the bracket depends on the state)"
+        told = f"{' and '.join(gauss)}: {why}"
+        axis.text(0.985, 0.68, told, transform=axis.transAxes, ha="right", va="top", fontsize=7.5,
+                  color=style.ink(style.ORANGE))  # fmt: skip
     name_ends(axis, ends)
     caption = (
         f"How far one step is from preserving the Poisson bracket, which a symplectic step does, on {SCENE} in the "
         "chart where it is farthest, against the width of the central differences that measure it. For a symplectic "
         "step the defect is an error of the differencing and falls with the square of the width: "
-        f"{', '.join(falling) or 'none'}. For the others it is real and levels off: {', '.join(level) or 'none'}."
+        f"{', '.join(falling) or 'none'}. For the others it is real and levels off: {', '.join(level) or 'none'}. "
+        "Gauss methods are symplectic for canonical equations; in the variables (e, L) those of the top are "
+        "Lie-Poisson, with a bracket that depends on the state, and no Gauss method preserves it."
     )
     alt = (
         "Log-log plot of the defect against the differencing width: lines of slope two for symplectic methods, level "

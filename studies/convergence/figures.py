@@ -169,10 +169,10 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
             for name in block:
                 values = [one.work for one in sizes[name]]
                 open_ = sum(one.foreseen for one in sizes[name]) * 2 > len(values)
-                marks = line(name, 1.1)
+                marks = line(name)
                 axis.plot([min(values), max(values)], [place, place], color=marks["color"], lw=1.2)
                 face = "white" if open_ else marks["color"]
-                axis.plot(middle[name], place, marks["marker"], color=marks["color"], mfc=face, ms=marks["ms"])
+                axis.plot(middle[name], place, "o", color=marks["color"], mfc=face, ms=5.0)
                 if name in (best, low):
                     axis.annotate(number(middle[name]), (max(values), place), (6, 0), textcoords="offset points",
                                   va="center", fontsize=7.5, weight="bold")  # fmt: skip
@@ -186,12 +186,13 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
                 tick.set(weight="bold", fontsize=8.0)
         axis.grid(visible=False, axis="y")
     dark = {"color": "#444444", "lw": 0.0}
-    axes[0, 0].plot([], [], "s", ms=4.5, label=f"median over {len(scenes)} scenes", **dark)
+    axes[0, 0].plot([], [], "o", ms=5.0, label=f"median over {len(scenes)} scenes", **dark)
     axes[0, 0].plot([], [], color="#444444", lw=1.2, label="least to largest of the scenes")
-    axes[0, 0].plot([], [], "s", ms=4.5, mfc="white", label="open: beyond the errors that were measured", **dark)
+    axes[0, 0].plot([], [], "o", ms=5.0, mfc="white", label="open: extrapolated on most scenes", **dark)
     for axis in axes[0]:
         axis.set_xlabel("force evaluations\na nutation")
     legend_below(figure, axes)
+    figure.legends[0].set_title("in brackets: the variables that are stepped, angles, axis alone or whole attitude")
     most, times = number(middle[best]), number(middle[low] / middle[best])
     headline(
         figure,
@@ -203,8 +204,8 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
         f"foretells for an axis error of {TARGET:g} rad {HORIZON}; p is the declared order, C the median of error / "
         f"h^p over the steps of the fit. Bar: from the least to the largest of the scenes {', '.join(scenes)}; marker: "
         f"their median, open if {TARGET:g} rad lies outside the errors that were fitted on most of them, so that it is "
-        "foreseen. Charts of a method with the same errors share a line. Rows without an order to be trusted are in "
-        f"the table only. {spans(fits(data, MAIN))}"
+        "extrapolated. Charts of a method with the same errors share a line. Rows without an order to be trusted are "
+        f"in the table only. {spans(fits(data, MAIN))}"
     )
     alt = "Dot plot of the work for one accuracy, a line a row, grouped by order."
     return Picture("constants", figure, caption, alt)

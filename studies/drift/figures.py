@@ -1,6 +1,7 @@
 """Figures of the study: residuals over a million steps, windows of 10^8, rounding of an ensemble, losses of phase."""
 
 import math
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -23,7 +24,8 @@ SHOWN = (
     "midpoint[angles]", "stormer-verlet[angles]", "strang[axis]", "gauss-4[axis]", "rk4[angles]", "rk4[axis]",
     "rk45[angles]", "taylor[axis]",
 )  # fmt: skip
-BANDS = ("energy", "modified_energy", "p_phi", "p_psi")
+BANDS = ("energy", "modified_energy")
+ROUNDED = 1e-12  # relative: smaller changes of the modified energy are called rounding
 
 
 def pictures(data: xr.DataTree) -> list[Picture]:
@@ -87,7 +89,8 @@ def _residuals(histories: xr.Dataset) -> Picture:
 
 
 def _windows(data: xr.Dataset) -> Picture:
-    figure, axes = panels(len(BANDS), data.sizes["integrator"], height=1.35, sharex=True, sharey="row")
+    figure, axes = panels(len(BANDS), data.sizes["integrator"], height=2.0, sharex=True, sharey="row")
+    moves = messages.shifts(data.isel(scene=0)).isel(window=-1)
     for row, quantity in zip(axes, BANDS, strict=True):
         size = float(np.abs(data[f"{quantity}_largest"]).max()) or 1.0  # what every method keeps exactly has none
         scale = 10.0 ** np.floor(np.log10(size))
@@ -96,59 +99,84 @@ def _windows(data: xr.Dataset) -> Picture:
             steps = run["steps"].values
             low, middle, high = (run[f"{quantity}_{part}"].values / scale for part in ("least", "mean", "largest"))
             axis.fill_between(steps, low, high, step="pre", color=mark.color, alpha=0.3, lw=0)
-            axis.step(steps, middle, where="pre", color=mark.color, lw=1.3)
-            if not np.any(low) and not np.any(high):
-                axis.annotate("exactly 0", (0.5, 0.0), (0, 4), xycoords=axis.get_yaxis_transform(), ha="center",
-                              textcoords="offset points", **NOTE)  # fmt: skip
+            axis.step(steps, middle, where="pre", color=mark.color, lw=2.0)
+            axis.axhline(next(iter(middle), np.nan), color=BLACK, lw=0.8, ls=(0, (4, 3)), zorder=3)
             axis.set_xscale("log")
-            axis.set_title(name if quantity == BANDS[0] else "", fontsize=7.5)
+            if quantity == BANDS[0]:
+                moved = f"{100.0 * float(moves.sel(integrator=name)):+.1g}".replace("-", "\N{MINUS SIGN}")
+                axis.set_title(f"{name}\nlast \N{MINUS SIGN} first: {moved}%", fontsize=7.5)
         row[0].set_ylabel(f"{LABELS[quantity]}\nchange / {number(scale)}")
     for axis in axes[-1]:
         axis.set_xlabel("steps")
+    if size < ROUNDED:  # of the last quantity, the modified energy
+        axes[1, 0].annotate("rounding only", (0.04, 0.05), xycoords="axes fraction", **NOTE)
     few_ticks(*axes.flat, most=4)
     figure.align_ylabels(axes[:, 0])
-    axes[0, 0].plot([], [], color=GREY, lw=1.3, label="mean of a window of steps")
-    axes[0, 0].fill_between([], [], [], color=GREY, alpha=0.3, lw=0, label="least to largest in it")
+    axes[0, 0].plot([], [], color=GREY, lw=2.0, label="mean of a window of steps")
+    axes[0, 0].plot([], [], color=BLACK, lw=0.8, ls=(0, (4, 3)), label="mean of the first window")
+    axes[0, 0].fill_between([], [], [], color=GREY, alpha=0.3, lw=0, label="least to largest in a window")
     style.legend_below(figure, axes[0, 0])
     headline(figure, messages.windows(data))
     momenta = [np.abs(data[f"{name}_{part}"]).max() for name in ("p_phi", "p_psi") for part in ("least", "largest")]
     caption = (
         f"{float(data['steps'].max()):.0e} steps of rows in angles and in the axis chart on {data['scene'].values[0]}, "
         f"all with {PER_NUTATION:.0f} steps a nutation: the band "
-        "reaches from the least to the largest relative change in each window, the line is its mean. The modified "
+        "reaches from the least to the largest relative change in each window of steps, equally wide on the "
+        "logarithmic axis, the line is its mean, the dashed line the mean of the first window. The percentages are the "
+        "mean energy of the last window less that of the first, over the width of the band. The modified "
         "energy is the energy with the h^2 term of the discrete motion, less the oscillation of order h^4 that "
-        f"remains. {words.moved(data).capitalize()} The momenta, recomputed inside the "
+        f"remains. {words.moved(data).capitalize()} The momenta, not drawn and recomputed inside the "
         f"step, stay within {max(map(float, momenta)):.0e}."
     )
-    alt = "Bands of energy, modified energy and momenta over the logarithm of the steps, a column for each method."
+    alt = (
+        "Bands of energy and modified energy over the logarithm of the steps, a column for each method: the means of "
+        "the energy stay on a dashed line, those of the modified energy leave it late, by rounding."
+    )
     return Picture("windows", figure, caption, alt)
 
 
 def _rounding(data: xr.Dataset) -> Picture:
     ensembles = by_integrator(data)
-    figure, axes = panels(1, len(ensembles), height=2.4, sharex=True, sharey=True)
+    figure, axes = panels(1, len(ensembles), height=2.6, sharex=True, sharey=True)
+    bold: dict[str, Any] = {"fontsize": 7.5, "weight": "bold", "va": "center", "ha": "center", "zorder": 5}
+    bold |= {"bbox": {"color": "white", "pad": 0.8}}
     for axis, (name, cell) in zip(axes[0], ensembles.items(), strict=True):
         mark, ensemble = look(name), cell.dropna("window", subset=["elapsed"])
-        steps = ensemble["elapsed"].values
+        steps, last = ensemble["elapsed"].values, float(ensemble["elapsed"].max())
         for drift in ensemble["drift"].values:
-            axis.plot(steps, np.abs(drift), color=mark.color, lw=0.5, alpha=0.45)
-        axis.plot(
-            steps, ensemble["rms"], **line(name, 0.8), label="compensated sums: root mean square (thin: each start)",
-        )  # fmt: skip
-        axis.plot(steps, ensemble["plain_rms"], "x--", color=BLACK, ms=3, lw=0.9, label="plain sums: root mean square")
+            axis.plot(steps, np.abs(drift), color=mark.color, lw=0.4, alpha=0.3, zorder=1)
+        plain, compensated = ensemble["plain_rms"].values, ensemble["rms"].values
+        axis.plot(steps, plain, color=BLACK, lw=1.6, ls=(0, (3, 1)), zorder=3)
+        axis.plot(steps, compensated, color=mark.color, lw=2.2, zorder=3)
+        axis.axvspan(0.1 * last, last, color="#EEEEEE", lw=0, zorder=0)
+        gain, middle = number(float(cell["gain"])), math.sqrt(0.1) * last
+        ends = float(cell["late"]), float(cell["plain_late"])
+        axis.annotate("", (middle, ends[0]), (middle, ends[1]), zorder=4,
+                      arrowprops={"arrowstyle": "<->", "shrinkA": 2, "shrinkB": 2, "lw": 0.9})  # fmt: skip
+        axis.text(middle, math.sqrt(ends[0] * ends[1]), f"{gain}\N{MULTIPLICATION SIGN}", **bold)
         axis.set(xscale="log", yscale="log", xlabel="steps n")
-        axis.set_title(name, fontsize=7.5)
-        style.slope_guide(axis, 0.5, (steps[0] * 3.0, steps[-1]), 2e-18, r"$n^{1/2}$")
-    axes[0, 0].set_ylim(bottom=1e-18)
+        axis.set_title(f"{name}\n{messages.walk(cell)}", fontsize=7.5)
+        style.slope_guide(axis, 0.5, (steps[0] * 3.0, steps[-1]), 1e-18, r"$n^{1/2}$")
+    axes[0, 0].set_ylim(bottom=2e-19)
     axes[0, 0].set_ylabel("drift of modified energy (relative)")
     few_ticks(*axes.flat, most=5)
+    members = data.sizes["member"], data.sizes["plain_member"]
+    lines = (
+        (BLACK, 1.6, (0, (3, 1)), f"plain sums: root mean square of {members[1]} starts"),
+        (GREY, 2.2, "-", f"compensated sums: root mean square of {members[0]} starts (thin: each)"),
+    )
+    for color, width, dash, label in lines:
+        axes[0, 0].plot([], [], color=color, lw=width, ls=dash, label=label)
+    axes[0, 0].fill_between([], [], [], color="#EEEEEE", lw=0, label=f"last decade of n, over which both are averaged "
+                            f"(first {members[1]} starts) for the ratio")  # fmt: skip
     style.legend_below(figure, axes)
     headline(figure, messages.rounding(ensembles))
     caption = (
         f"Drift of the modified energy by rounding near {data['scene'].values[0]}, {PER_NUTATION:.0f} steps a "
-        f"nutation, over {float(data['elapsed'].max()):.0e} steps: each of {data.sizes['member']} starts "
-        "as a thin line, their root mean square with markers, and dashed that of the first "
-        f"{data.sizes['plain_member']} with the same kernels and plain sums; the chart is in the row's name. "
+        f"nutation, over {float(data['elapsed'].max()):.0e} steps: each of {members[0]} starts "
+        f"as a thin line, their root mean square as a thick one, and dashed that of the first {members[1]} "
+        "with the same kernels and plain sums; the chart is in the row's name. Above a panel: the fitted exponents of "
+        "both; in it the ratio of the root mean squares over the last decade of steps. "
         f"{' '.join(words.walk(name, ensemble) for name, ensemble in ensembles.items())}"
     )
     alt = "Log-log plots of the drift by rounding against steps for each method, with compensated and plain sums."
@@ -174,23 +202,29 @@ def _horizons(data: xr.Dataset) -> Picture:
             continue
         mark = line(name)
         axis.plot(LENGTHS, work, color=mark["color"], ls=mark["ls"], lw=1.1)
-        axis.plot(law.length, law.paid, mark["marker"], color=mark["color"], ms=1.2 * mark["ms"], zorder=4)
+        axis.plot(law.length, law.paid, "o", color=mark["color"], ms=5.5, mec="white", mew=0.6, zorder=4)
+        if np.isnan(work).any():
+            begins = int(np.flatnonzero(np.isfinite(work))[0])
+            note = f"begins at {number(FEWEST)} a nutation:\nfewer were not tried "
+            axis.annotate(note, (LENGTHS[begins], work[begins]), (-4, 0), textcoords="offset points", va="center",
+                          ha="right", **NOTE)  # fmt: skip
         ends[f"{name}, order {law.order}"] = float(LENGTHS[-1]), float(work[-1]), str(mark["color"])
     axis.set(xscale="log", yscale="log", xlim=(LENGTHS[0], LENGTHS[-1]))
     axis.set_xlabel(f"nutations N over which the phase error stays below {LOST:g} rad")
     axis.set_ylabel("force evaluations a nutation")
     few_ticks(axis)
     axis.plot([], [], "o", color=BLACK, ms=4.5, label=f"measured: where its run reached {LOST:g} rad")
-    axis.plot([], [], color=BLACK, lw=1.1, label="law: as N to the power of the measured growth over the order")
-    axis.plot([], [], color=GREY, lw=0.5, alpha=0.5, label="the laws of all other methods")
+    axis.plot([], [], color=BLACK, lw=1.1, label="extrapolated: as N to the power (growth of its error) / order")
+    axis.plot([], [], color=GREY, lw=0.5, alpha=0.5, label="all other methods, extrapolated")
     style.legend_below(figure, axis)
+    figure.legends[0].set_title("in brackets: the variables that are stepped, all three angles or the axis alone")
     if named:
         cheapest, dearest = (pick(named, key=lambda name: laws[name].work(LENGTHS[-1])) for pick in (min, max))
         works = [number(float(laws[name].work(LENGTHS[-1]))) for name in (cheapest, dearest)]
         headline(
             figure,
-            f"By their laws, a phase to {LOST:g} rad over {number(LENGTHS[-1])} nutations takes {works[0]} force "
-            f"evaluations a nutation with {cheapest}, {works[1]} with {dearest}",
+            f"{cheapest} holds the phase over {number(LENGTHS[-1])} nutations (extrapolated) with {works[0]} force "
+            f"evaluations a nutation, {dearest} with {works[1]}",
         )
         name_ends(axis, ends)
     caption = (

@@ -91,32 +91,47 @@ def exponents(data: xr.Dataset) -> str:
     return f"The phase error grows {' and '.join(said)}" if said else "Growth of the phase error"
 
 
-def windows(data: xr.Dataset) -> str:
-    """How far the mean energy of a window ends from where it began, and how far it strays between."""
-    last, most = strayed(data)
-    steps, end = number(float(data["steps"].max())), number(100.0 * last, 1)
-    return (
-        f"After {steps} steps the mean energy is within {end}% of the width of its oscillation from where it began; no "
-        f"window before strays by more than {number(100.0 * most, 1)}%"
-    )
+def shifts(data: xr.Dataset) -> xr.DataArray:
+    """The mean energy of each window less that of the first window, over the width of its oscillation there.
+
+    The means scatter: short windows hold no whole number of oscillations, and the samples of a longer one may beat
+    with them.
+    """
+    full = data.dropna("window", how="all", subset=["energy_mean"])
+    first = full.isel(window=0)
+    return (full["energy_mean"] - first["energy_mean"]) / (first["energy_largest"] - first["energy_least"])
 
 
 def strayed(data: xr.Dataset) -> tuple[float, float]:
     """By what share of its oscillation the mean energy moves from the first window to the last, and to any window.
 
-    The largest over the methods. Short windows hold no whole number of oscillations, so that their means scatter.
+    The largest over the methods.
     """
-    full = data.dropna("window", how="all", subset=["energy_mean"])
-    first = full.isel(window=0)
-    moves = np.abs(full["energy_mean"] - first["energy_mean"]) / (first["energy_largest"] - first["energy_least"])
+    moves = np.abs(shifts(data))
     return float(moves.isel(window=-1).max()), float(moves.max())
 
 
+def windows(data: xr.Dataset) -> str:
+    """How far the mean energy of the last window is from that of the first, at most over the methods."""
+    steps, end = number(float(data["steps"].max())), number(100.0 * strayed(data)[0], 1)
+    return (
+        f"The mean energy moves by at most {end}% of the width of its oscillation in {steps} steps, from the first "
+        "window to the last (first row)"
+    )
+
+
+def walk(cell: xr.Dataset) -> str:
+    """The exponents of both sums, for the panel of a method."""
+    plain, compensated = float(cell["plain_exponent"]), float(cell["exponent"])
+    return f"plain: power {plain:.2f}\ncompensated: power {compensated:.2f}"
+
+
 def rounding(ensembles: Mapping[str, xr.Dataset]) -> str:
-    """With what power rounding drifts, and what compensated sums gain."""
+    """What compensated sums gain, and with what power the drift grows with them."""
     powers = [float(cell["exponent"]) for cell in ensembles.values()]
+    walks = all(abs(float(cell["exponent"]) - 0.5) <= float(cell["exponent_interval"]) for cell in ensembles.values())
     gains = [float(cell["plain_late"] / cell["late"]) for cell in ensembles.values()]
     return (
-        f"Rounding makes the modified energy drift as n to the power {min(powers):.2f} to {max(powers):.2f} (a random "
-        f"walk: 0.5); compensated sums lower it {number(min(gains))} to {number(max(gains))} times"
+        f"Compensated sums lower the drift by rounding {number(min(gains))} to {number(max(gains))} times; it grows as "
+        f"n to the power {min(powers):.2f} to {max(powers):.2f} then{', as a random walk does (0.5)' * walks}"
     )

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS
-from symtop.run.long_run import PER_NUTATION
+from symtop.run.long_run import PER_NUTATION, SAMPLES
 from symtop.runner.study import Table
 
 from .long_runs import PLAIN_MEMBERS
@@ -177,9 +177,9 @@ def moved(windows: xr.Dataset) -> str:
     end, most = strayed(windows)
     return (
         f"the mean energy moves by at most {end:.0e} of the width of its oscillation from the first window to the "
-        f"last, and by at most {most:.0e} to any other, short windows holding no whole number of oscillations; the "
-        f"mean modified energy moves from the first window to the last by at most {float(modified.max()):.0e} of the "
-        "energy of the nutation."
+        f"last, and by at most {most:.0e} to any other, because short windows hold no whole number of oscillations and "
+        f"the {SAMPLES} samples of a longer one may beat with them; the mean modified energy moves from the first "
+        f"window to the last by at most {float(modified.max()):.0e} of the energy of the nutation."
     )
 
 

@@ -165,12 +165,10 @@ def waterfall_message(shown: Sequence[tuple[str, float, float, list[Bar]]]) -> s
     bars = shown[0][-1]
     factor = max(bars[1:], key=lambda bar: bar.ratio).factor
     gains = [max(bar.ratio for bar in part[1:] if bar.factor == factor) for *_, part in shown]
-    orders = ["last" if part[-1].factor == "call" else "first" for *_, part in shown]
-    said = ", ".join(
-        f"{times_faster(gain)} times if the call is made bare {at}" for gain, at in zip(gains, orders, strict=True)
-    )
+    ways = ["through simulate" if part[-1].factor == "call" else "with the solver alone" for *_, part in shown]
+    said = ", ".join(f"{times_faster(gain)} times {way}" for gain, way in zip(gains, ways, strict=True))
     whole = times_faster(bars[0].time.seconds / bars[-1].time.seconds)
-    return f"The largest step of the gain of {whole} times is the {factor}: {said}"
+    return f"The {factor} makes the largest part of the gain of {whole} times: {said}"
 
 
 def factors_sentence(data: xr.Dataset) -> str:

@@ -7,19 +7,22 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS
-from symtop.model.charts import axis_distance, axis_from_angles
+from symtop.model.charts import axis_distance
 from symtop.model.scenes import scene
 from symtop.report import style
 from symtop.report.figures import SMALLEST, largest_so_far
 from symtop.runner.study import Picture
 
 from . import solid, words
-from .long_energy import better_from
+from .long_energy import better_from, energy_until, notebook_end
 from .tables import ALPHA, FILMED, MIDPOINT, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION, Column
 from .words import PARTS
 
 NAMED = (SOLVER, *words.DRAWN)  # the others are thin grey lines
-LABELS = {"energy": "energy (J)", "p_phi": r"$p_\varphi$ (J s)", "p_psi": r"$p_\psi$ (J s)"}
+LABELS = {"energy": "energy", "p_phi": r"$p_\varphi$", "p_psi": r"$p_\psi$"}
+UNITS = {"energy": "J", "p_phi": "J s", "p_psi": "J s"}
+REFERENCES = {"energy": "mean", "p_phi": "start", "p_psi": "start"}  # of the notebook's own residuals
+NUTATIONS = 2  # of a path that are drawn
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
@@ -90,40 +93,58 @@ def draw_derivations(data: xr.Dataset) -> Picture:
 
 def draw_residuals(data: xr.Dataset) -> Picture:
     """Energy and momenta: the solver's as the notebook drew them, and those of every discrete method."""
-    figure, axes = style.panels(3, 3, height=1.55, sharex="col")
+    figure, axes = style.panels(3, 3, height=1.6, sharex="col")
     solver = data.sel(scene="spheroid", integrator=SOLVER)
     for line, name in zip(axes, CONSTANTS, strict=True):
         values = solver[name] - (solver[name].mean() if name == "energy" else solver[name][0])
-        line[0].plot(solver[Column.SAMPLE_TIME], values, color=style.look(SOLVER).color, lw=1.0)
-        line[0].set_ylabel(f"change of {LABELS[name]}")
-        line[0].ticklabel_format(axis="y", scilimits=(-2, 2))
+        power = math.floor(math.log10(float(np.abs(values).max()) or 1.0))
+        line[0].plot(solver[Column.SAMPLE_TIME], values / 10.0**power, color=style.look(SOLVER).color, lw=1.2)
+        line[0].axhline(0.0, color="#444444", lw=0.8, zorder=1)
+        unit = f"10{str(power).translate(style.RAISED)} {UNITS[name]}"
+        line[0].set_ylabel(f"{LABELS[name]} \N{MINUS SIGN} its {REFERENCES[name]}\n({unit})")
         for axis, part in zip(line[1:], PARTS, strict=True):
             for method in data["integrator"].values:
                 _residual_line(axis, data.sel(scene=part, integrator=method), name)
             axis.set(yscale="log")
-    titles = ("the solver's, as the\nnotebook drew it", *(f"{part}:\nlargest relative so far" for part in PARTS))
+    titles = ("lsoda on spheroid, as\nthe notebook drew it",
+              *(f"{part}: largest\nrelative change so far" for part in PARTS))  # fmt: skip
     for column, title in zip(axes.T, titles, strict=True):
         column[0].set_title(title)
         column[-1].set_xlabel("time (s)")
     style.few_ticks(*axes[:, 1:].flat, most=4)
     style.legend_below(figure, axes)
-    for axis in axes[1:, 1:].flat:
-        axis.set_ylim(bottom=1e-4 * SMALLEST)
-        axis.annotate("exact zeros", (0.98, SMALLEST), (0, -3), xycoords=axis.get_yaxis_transform(), ha="right",
-                      va="top", textcoords="offset points", fontsize=style.LEAST_TEXT, color="#444444")  # fmt: skip
+    note: dict[str, Any] = {"fontsize": style.LEAST_TEXT, "color": "#444444", "ha": "right"}
+    for axis in axes[:, 1:].flat:
+        axis.set_ylim(bottom=1e-3 * SMALLEST)
+    for axis, constant, part in ((axes[k, m], CONSTANTS[k], part) for k in (1, 2) for m, part in enumerate(PARTS, 1)):
+        most = float(data[f"{constant}_largest"].sel(scene=part).drop_sel(integrator=SOLVER).max())
+        axis.annotate("drawn here: exactly 0", (0.98, SMALLEST), (0, -4), xycoords=axis.get_yaxis_transform(),
+                      va="top", textcoords="offset points", **note)  # fmt: skip
+        axis.text(
+            0.98,
+            0.62,
+            f"all discrete methods:\nat most {style.number(most)}",
+            transform=axis.transAxes,
+            va="center",
+            **note,
+        )
+    for axis, part in zip(axes[0, 1:], PARTS, strict=True):
+        worse, count = words.worse_energies(data, part)
+        axis.set_ylim(1e-18, 10.0)
+        axis.text(0.98, 0.98, f"{worse} of {count} above lsoda", transform=axis.transAxes, va="top",
+                  **(note | {"weight": "bold"}))  # fmt: skip
     largest = max(words.largest_momenta(data).values())
-    lost = float(data[list(words.MOMENTA)].sel(integrator=SOLVER).to_dataarray().max())
-    style.headline(figure, f"Discrete methods keep both momenta to {style.number(largest)}; the notebook's solver, "
-                           f"{SOLVER}, changes them by {style.number(lost)}")  # fmt: skip
+    style.headline(figure, words.residuals_message(data))
     return Picture(
         "residuals",
         figure,
-        f"Energy and both momenta on spheroid and goldstein. Left: the solver's residuals. {words.MATCHED} Corrected: "
+        "Energy and both momenta on spheroid and goldstein. Left: the solver's residuals, of the energy from its mean "
+        f"and of the momenta from their start. {words.MATCHED} Corrected: "
         "the notebook takes the "
         "mean of its momenta over a table with a single entry, so that its residuals of momenta count from the start. "
-        f"Right: {SOLVER} beside every discrete Lagrangian (in angles) and splitting (in angles or the axis chart) at "
-        f"{STEPS_A_NUTATION:.0f} steps a nutation, over the notebook's horizons, {len(NAMED) - 1} of "
-        f"them named; the momenta of all discrete methods stay within {largest:.0e}.",
+        f"Right, all relative to the start: {SOLVER} beside every discrete Lagrangian (in angles) and splitting (in "
+        f"angles or the axis chart) at {STEPS_A_NUTATION:.0f} steps a nutation, over the notebook's horizons, "
+        f"{len(NAMED) - 1} of them named; the momenta of all discrete methods stay within {largest:.0e}.",
         "Left, residuals of the library solver; right, on logarithmic scales, momenta of the discrete methods at "
         "rounding and their bounded energy errors, below or above the solver's.",
     )
@@ -134,27 +155,34 @@ def _residual_line(axis: Any, run: xr.Dataset, constant: str) -> None:
     good = np.isfinite(values)
     time, values = run[Column.SAMPLE_TIME].values[good][1:], values[good][1:]  # all are zero at the start
     grey = {"color": "#BBBBBB", "lw": 0.7, "zorder": 2, "label": "other discrete methods"}
-    bold = style.line(method, 0.7) | {"markevery": 0.12, "zorder": 3, "label": method}
-    axis.plot(time, values, **(bold if method in NAMED else grey))
+    bold = style.line(method, 0.7) | {"markevery": 0.2, "zorder": 3, "label": method}
+    wide = bold | {"marker": "", "lw": 2.4, "ls": "-", "zorder": 4}
+    axis.plot(time, values, **(wide if method == SOLVER else bold if method in NAMED else grey))
 
 
 def draw_hope(data: xr.Dataset) -> Picture:
     """The largest energy error so far of the solver and of the discrete methods, far beyond the notebook's horizon."""
-    figure, axes = style.grid(2, 2, ("time (s)", "largest relative\nenergy error so far"), height=2.5, sharey=True)
+    figure, axes = style.grid(2, 2, ("time (s)", "largest relative\nenergy error so far"), height=2.7, sharey=True)
+    ring = {"color": style.BLACK, "mfc": "none", "ms": 8.0, "mew": 1.3, "lw": 0.0, "zorder": 5}
     for axis, (name, part) in zip(axes, PARTS.items(), strict=True):
         for method in (row for row in NAMED if row in data["integrator"].values):
-            run, look = data.sel(scene=name, integrator=method), style.look(method)
-            line = style.line(method, 0.8) | {"markevery": 0.1, "label": method}
-            axis.plot(run[Column.LONG_TIME], run[Column.LONG_ENERGY], **line)
+            run = data.sel(scene=name, integrator=method)
+            line = style.line(method, 0.8) | {"markevery": 0.12, "label": method}
+            wide = line | {"marker": "", "lw": 2.4, "ls": "-"}
+            axis.plot(run[Column.LONG_TIME], run[Column.LONG_ENERGY], **(wide if method == SOLVER else line))
             since = better_from(data, name, method) if method != SOLVER else math.inf
             if 0.0 < since < math.inf:
-                axis.axvline(since, color=look.color, lw=0.8, ls=":", zorder=1)
+                axis.plot(since, energy_until(data, name, method, since), "o", **ring)
         axis.set(xscale="log", yscale="log", title=f"scene {name} (notebook, {part})")
-        end = float(data[Column.SAMPLE_TIME].sel(scene=name).max())
-        axis.axvline(end, color=style.GREY, lw=1.0, zorder=1, label="end of the notebook")
-    axes[0].plot([], [], ":", color=style.GREY, label="from here on better than lsoda (in its colour)")
+        end = notebook_end(data, name)
+        axis.axvline(end, color=style.GREY, lw=1.4, zorder=1)
+        axis.annotate(f"end of the\nnotebook, {end:g} s", (end, 0.02), (4, 0), xycoords=axis.get_xaxis_transform(),
+                      textcoords="offset points", fontsize=7.5, color="#444444", va="bottom")  # fmt: skip
+    axes[0].plot([], [], "o", label="from here on better than lsoda", **ring)
     style.few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
+    figure.legends[0].set_title(f"lsoda at tolerance {style.number(SOLVER_TOLERANCE)}, all others at "
+                                f"{STEPS_A_NUTATION:.0f} steps a nutation")  # fmt: skip
     style.headline(figure, words.hope_message(data))
     return Picture(
         "hope",
@@ -167,34 +195,42 @@ def draw_hope(data: xr.Dataset) -> Picture:
 
 
 def draw_spheres(data: xr.Dataset) -> Picture:
-    """The path that the notebook drew and the path of the axis, a quarter turn apart."""
-    figure, axes = style.panels(1, 2, height=3.2, subplot_kw={"projection": "3d"})
+    """The path that the notebook drew and the path of the axis, seen from above, a quarter turn apart."""
+    figure, axes = style.panels(1, 2, height=3.3, sharex=True, sharey=True)
+    turn = np.linspace(0.0, 2.0 * math.pi, 181)
     for axis, name in zip(axes.flat, PARTS, strict=True):
-        run = data.sel(scene=name, integrator=SOLVER)
-        drawn = axis_from_angles(run[Column.SOLVER_THETA].values, run[Column.SOLVER_PHI].values + 0.5 * math.pi)
-        true = axis_from_angles(run[Column.TRUE_THETA].values, run[Column.TRUE_PHI].values)
-        early = run[Column.PATH_TIME].values <= 2.0 * scene(name).nutation_period
-        solid.sphere(axis, name)
-        lines = ((drawn, style.VERMILLION, "as the notebook drew it"), (true, style.BLACK, "where the axis is"))
-        for path, color, label in lines:
-            axis.plot(*path.T, color=color, lw=0.6, alpha=0.35)
-            axis.plot(*path[early].T, color=color, lw=1.6, label=f"{label}, from its dot on")
-            axis.plot(*path[:1].T, "o", color=color, ms=4.5)
-        for letter, place in zip("xyz", 1.15 * np.eye(3), strict=True):
-            axis.text(*place, letter, ha="center", va="center")
+        drawn, true = words.paths(data, name)
+        early = data[Column.PATH_TIME].sel(scene=name, integrator=SOLVER).values <= NUTATIONS * scene(
+            name).nutation_period  # fmt: skip
+        axis.plot(np.cos(turn), np.sin(turn), color="#BBBBBB", lw=0.8, zorder=0)
+        for path, color, label in ((drawn, style.look(SOLVER).color, "as the notebook drew it"),
+                                   (true, style.BLACK, "where the axis is")):  # fmt: skip
+            axis.plot(*path[early, :2].T, color=color, lw=1.8, label=f"{label}, from its dot on")
+            axis.plot(*path[0, :2], "o", color=color, ms=7.0, mec="white", zorder=4)
+            axis.plot([0.0, path[0, 0]], [0.0, path[0, 1]], color=color, lw=0.9, ls=(0, (4, 2)), zorder=1)
+        begins, turned = math.atan2(true[0, 1], true[0, 0]), words.turned(data, name)
+        arc = begins + np.linspace(0.0, math.radians(turned), 40)
+        axis.plot(0.27 * np.cos(arc), 0.27 * np.sin(arc), color=style.BLUE, lw=1.6, zorder=3)
+        middle = 0.14 * np.array([math.cos(arc[20]), math.sin(arc[20])])
+        axis.text(*middle, f"{turned:.0f}°", color=style.BLUE, weight="bold", ha="center", va="center", fontsize=9.0)
+        axis.set(aspect="equal", title=f"{name}, seen from above", xlabel="x", xticks=(-1, 0, 1), yticks=(-1, 0, 1))
+    axes[0, 0].set_ylabel("y")
+    axes[0, 0].plot([], [], color="#BBBBBB", lw=0.8, label="equator of the unit sphere")
     style.legend_below(figure, axes)
-    style.headline(figure, "The curve that the notebook drew is the path of the axis, turned by 90° about the "
-                           "vertical z")  # fmt: skip
+    turns = sorted({f"{words.turned(data, name):.0f}" for name in PARTS})
+    style.headline(figure, f"The notebook's curve is the path of the axis turned by {' and '.join(turns)}° about the "
+                           "vertical")  # fmt: skip
     return Picture(
         "spheres",
         figure,
-        "Path of the axis on the unit sphere with its coordinate discs, spheroid and goldstein, by the solver in "
-        f"angles at tolerance {SOLVER_TOLERANCE:g}. Reproduced, red: the notebook's "
+        f"Path of the axis on the unit sphere over the first {NUTATIONS} nutations, seen along the vertical z, "
+        f"spheroid and goldstein, by the solver in angles at tolerance {SOLVER_TOLERANCE:g}. Reproduced, orange: the "
+        "notebook's "
         "curve, which takes phi for the azimuth. Corrected, black: its own rotations (phi about z, theta about the "
         "line of nodes) carry the axis to (sin theta sin phi, -sin theta cos phi, cos theta), a quarter turn away, so "
-        "that its animated triad and its curve do not meet. Bold: the first two nutations, from the dot on.",
-        "Two unit spheres, each with two looping paths of the same shape; one is the other turned by 90 degrees about "
-        "z.",
+        "that its animated triad and its curve do not meet. Dashed: from the vertical to the start of each.",
+        "Two views of the sphere from above, each with two paths of the same shape; an arc of 90 degrees joins the "
+        "directions of their starts.",
     )
 
 

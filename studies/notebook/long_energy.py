@@ -50,12 +50,12 @@ def better_from(data: xr.Dataset, scene: str, name: str) -> float:
     return float(times[worse[-1] + 1]) if worse[-1] + 1 < times.size else math.inf
 
 
-def _end(data: xr.Dataset, scene: str) -> float:
+def notebook_end(data: xr.Dataset, scene: str) -> float:
     """The notebook's own horizon (s)."""
     return float(data[Column.SAMPLE_TIME].sel(scene=scene).max())
 
 
-def _at(data: xr.Dataset, scene: str, name: str, time: float) -> float:
+def energy_until(data: xr.Dataset, scene: str, name: str, time: float) -> float:
     """The largest energy error of a row up to a time."""
     cell = data.sel(scene=scene, integrator=name)
     return float(cell[Column.LONG_ENERGY].values[np.searchsorted(cell[Column.LONG_TIME].values, time)])
@@ -67,7 +67,7 @@ def answer(data: xr.Dataset, named: tuple[str, ...]) -> list[str]:
     for scene in map(str, data["scene"].values):
         shown = [name for name in named if name in data["integrator"].values]
         largest = data["energy_largest"].sel(scene=scene)
-        end = _end(data, scene)
+        end = notebook_end(data, scene)
         limit = float(largest.sel(integrator=SOLVER))
         values = {name: float(largest.sel(integrator=name)) for name in shown}
         worse, better = ([n for n in shown if (values[n] < limit) is wanted] for wanted in (False, True))
@@ -83,15 +83,15 @@ def answer(data: xr.Dataset, named: tuple[str, ...]) -> list[str]:
 
 def _later(data: xr.Dataset, scene: str, names: list[str]) -> str:
     """From when on the rows that are worse at first are better."""
-    last, end = float(data[Column.LONG_TIME].sel(scene=scene).max()), _end(data, scene)
+    last, end = float(data[Column.LONG_TIME].sel(scene=scene).max()), notebook_end(data, scene)
     since = {name: better_from(data, scene, name) for name in names}
     true = [f"{time:.3g} ({name})" for name, time in sorted(since.items(), key=lambda one: one[1])
             if math.isfinite(time)]  # fmt: skip
     never = [name for name, time in since.items() if math.isinf(time)]
-    grown = [_at(data, scene, name, last) / _at(data, scene, name, end) - 1.0 for name in names]
+    grown = [energy_until(data, scene, name, last) / energy_until(data, scene, name, end) - 1.0 for name in names]
     level = (
         f"Up to t = {last:g} their largest error grows by {max(grown, default=0.0):.0%}, and that of "
-        f"{split_name(SOLVER)[0]} to {_at(data, scene, SOLVER, last):.0e}"
+        f"{split_name(SOLVER)[0]} to {energy_until(data, scene, SOLVER, last):.0e}"
     )
     parts = [f"their error is the smaller one from t = {', '.join(true)} on"] if true else []
     parts += [f"with {', '.join(never)} it never is"] if never else []

@@ -1,11 +1,15 @@
 """Sentences and tables of the notebook study, from its dataset."""
 
+import cmath
 import math
 
+import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS
 from symtop.measure.order import power_law
+from symtop.model.charts import Array, axis_from_angles
+from symtop.report.style import number
 from symtop.runner.study import Table
 
 from .derivations import notebook_top
@@ -60,12 +64,52 @@ def hopes(data: xr.Dataset) -> list[str]:
 
 
 def hope_message(data: xr.Dataset) -> str:
-    """How many methods of order two keep the energy better than the solver in the end, on each scene, as a title."""
-    parts = []
+    """Beside how many methods of order two the solver keeps the energy better at the notebook's end, and at last."""
+    shown = [method for method in DRAWN if method in data["integrator"].values]
+    parts, kept = [], True
     for scene in PARTS:
-        since = [better_from(data, scene, method) for method in DRAWN if method in data["integrator"].values]
-        parts.append(f"{sum(math.isfinite(time) for time in since)} of {len(since)} on {scene}")
-    return f"In the long run methods of order two keep the energy better than the solver, lsoda: {', '.join(parts)}"
+        largest = data["energy_largest"].sel(scene=scene)
+        ahead = int((largest.sel(integrator=shown) > float(largest.sel(integrator=SOLVER))).sum())
+        kept = kept and all(math.isfinite(better_from(data, scene, method)) for method in shown)
+        parts.append((ahead, scene))
+    (first, one), *others = parts
+    last = float(data[Column.LONG_TIME].max())
+    rest = "".join(f", {ahead} of {len(shown)} on {scene}" for ahead, scene in others)
+    return (
+        f"lsoda keeps the energy better than {first} of {len(shown)} methods of order two to the notebook's end on "
+        f"{one}{rest}; by {last:g} s it is {'worse than each' if kept else 'not worse than all'} of them"
+    )
+
+
+def worse_energies(data: xr.Dataset, scene: str) -> tuple[int, int]:
+    """How many discrete methods change the energy by more than the solver over the notebook's time, and of how many."""
+    largest = data["energy_largest"].sel(scene=scene)
+    discrete = largest.drop_sel(integrator=SOLVER).values
+    return int((discrete > float(largest.sel(integrator=SOLVER))).sum()), len(discrete)
+
+
+def residuals_message(data: xr.Dataset) -> str:
+    """What the discrete methods keep better than the solver, and with how many the energy is worse."""
+    lost = float(data[list(MOMENTA)].sel(integrator=SOLVER).to_dataarray().max())
+    counts = {scene: worse_energies(data, scene) for scene in PARTS}
+    return (
+        f"Discrete methods keep both momenta to {number(max(largest_momenta(data).values()))}, lsoda to "
+        f"{number(lost)}; the energy is worse than lsoda's with "
+        f"{' and '.join(f'{worse} of {count} on {scene}' for scene, (worse, count) in counts.items())}"
+    )
+
+
+def paths(data: xr.Dataset, scene: str) -> tuple[Array, Array]:
+    """The path that the notebook drew and that of the axis, shape (times, 3)."""
+    run = data.sel(scene=scene, integrator=SOLVER)
+    drawn = axis_from_angles(run[Column.SOLVER_THETA].values, run[Column.SOLVER_PHI].values + 0.5 * math.pi)
+    return drawn, axis_from_angles(run[Column.TRUE_THETA].values, run[Column.TRUE_PHI].values)
+
+
+def turned(data: xr.Dataset, scene: str) -> float:
+    """The angle about the vertical, in degrees, by which the notebook's path is best turned from that of the axis."""
+    drawn, true = (path[:, 0] + 1j * path[:, 1] for path in paths(data, scene))
+    return math.degrees(cmath.phase(complex(np.nansum(drawn * true.conj()))))
 
 
 def modified_message(data: xr.Dataset) -> str:

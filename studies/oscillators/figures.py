@@ -12,7 +12,13 @@ from .oscillator import ONE_SIDED
 from .tables import AGAINST_RK45, FRICTION, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOP_TOLERANCE, Column, order, tops
 
 SYMBOLS = {"midpoint": "o", "trapezoidal": "s", ONE_SIDED: "v"}
-SLOPES = {1.0: "$h$", 0.5: "$h^{1/2}$"}
+PLAIN = {ONE_SIDED: "force at one end"}
+CRITICAL, BESIDE = "damping-2", "damping-3"
+ORDERS = (  # panels: an oscillator, what is measured of it, and in words
+    (CRITICAL, Column.POSITION_ERROR, "position x: largest error"),
+    (BESIDE, Column.EXPONENT_ERROR, "rate of decay: relative error"),
+    (CRITICAL, Column.EXPONENT_ERROR, "rate of decay: relative error"),
+)
 TIME = r"time ($\sqrt{m/k}$)"
 
 
@@ -53,44 +59,39 @@ def draw_notebook(data: xr.Dataset) -> Picture:
 
 
 def draw_orders(data: xr.Dataset) -> Picture:
-    """Errors of the position and of the slow exponent against the step."""
-    figure, axes = style.panels(2, 6, height=1.8, sharex=True, sharey="row")
-    for column, (name, oscillator) in zip(axes.T, OSCILLATORS.items(), strict=True):
-        for axis, error in zip(column, (Column.POSITION_ERROR, Column.EXPONENT_ERROR), strict=True):
-            for method, marker in SYMBOLS.items():
-                run = data.sel(scene=name, integrator=method)
-                color = style.PURPLE if method == ONE_SIDED else style.look(method).color
-                face = "none" if method == "trapezoidal" else color
-                errors = run[error].where(run[error] > 1e-13)  # above rounding
-                axis.plot(run[Column.STEP], errors, marker + "-", color=color, ms=2.6, lw=0.9, mfc=face, label=method)
-            style.slope_guide(axis, 2.0, (1e-2, 1.0), 1e-9, "$h^2$")
-            axis.set(xscale="log", yscale="log")
-        style.slope_guide(column[0], 1.0, (1e-3, 1e-1), 2e-2, "$h$")
-        column[0].set_title(words.title(oscillator, "\n"))
-        column[1].set_xlabel("step")
-    axes[0, 0].set_ylabel("largest error of x")
-    axes[1, 0].set_ylabel("relative error of\nthe slow exponent")
-    style.few_ticks(*axes.flat, most=2)
-    style.legend_below(figure, axes)
-    for power, column in ((1.0, 3), (0.5, 3)):
-        style.slope_guide(axes[1, column], power, (2e-4, 1e-2), 1e-6 if power == 1.0 else 0.1, SLOPES[power])
-    halves = [order(data, "damping-2", m, Column.EXPONENT_ERROR).slope for m in ("trapezoidal", ONE_SIDED)]
-    style.headline(figure, f"At critical damping the slow exponent is right to order {halves[0]:.1f} (trapezoidal) and "
-                           f"{halves[1]:.1f} (force at one end) only")  # fmt: skip
+    """Errors of the position and of the rate of decay against the step, at critical damping and beside it."""
+    figure, axes = style.panels(1, len(ORDERS), height=2.9, sharex=True, sharey=True)
+    for axis, (name, error, what) in zip(axes[0], ORDERS, strict=True):
+        for line, (method, marker) in enumerate(SYMBOLS.items()):
+            run = data.sel(scene=name, integrator=method)
+            color = style.PURPLE if method == ONE_SIDED else style.look(method).color
+            marks = {"mfc": "none", "ms": 3.4} if method == "trapezoidal" else {"mfc": color, "ms": 4.6}
+            errors = run[error].where(run[error] > 1e-13)  # above rounding
+            axis.plot(run[Column.STEP], errors, marker + "-", color=color, lw=1.1, **marks)
+            slope = order(data, name, method, error).slope
+            axis.text(0.98, 0.23 - 0.085 * line, f"{PLAIN.get(method, method)}: order {slope:.1f}", ha="right",
+                      transform=axis.transAxes, color=style.ink(color), fontsize=7.5, weight="bold")  # fmt: skip
+        axis.set(xscale="log", yscale="log", xlabel=r"step ($\sqrt{m/k}$)")
+        told = (name, error) == ORDERS[-1][:2]  # the panel of the title
+        axis.set_title(f"{what}\n{words.title(OSCILLATORS[name])}", weight="bold" if told else "normal")
+    axes[0, 0].set_ylabel("error")
+    style.few_ticks(*axes.flat, most=6)
+    style.headline(figure, words.orders_message(data))
     least, most = (float(value(data[Column.STEP])) for value in (np.nanmin, np.nanmax))
-    halved = (f"{m} {order(data, 'damping-2', m, Column.EXPONENT_ERROR).slope:.2f}" for m in ("trapezoidal", ONE_SIDED))
+    halved = (f"{m} {order(data, CRITICAL, m, Column.EXPONENT_ERROR).slope:.2f}" for m in ("trapezoidal", ONE_SIDED))
     return Picture(
         "orders",
         figure,
         f"The oscillator released from rest, T = {HORIZON:g}, steps from {least:.0e} to {most:.2g}; one coordinate x, "
         "no "
-        "chart. Above: both rules have order 2 in every regime; the "
-        "whole force at one end of the step costs an order. Below: the slow exponent lambda of exp(lambda t). At "
+        "chart. Left: the position at critical damping has order 2 with both rules, as in every regime (table); the "
+        "whole force at one end of the step costs an order. Middle and right: lambda of exp(lambda t), the rate at "
+        "which the slower of the two parts of the motion decays, relative to the exact one. At "
         "critical damping (b = 2) it is the square root of a perturbation of the discriminant, so that the errors "
         f"there have half the usual order ({', '.join(halved)}). The midpoint rule leaves critical damping "
         "in place and keeps its order.",
-        "Log-log plots of errors against step for six dampings: slope 2 for both rules, slope 1 for the one-sided "
-        "force.",
+        "Log-log plots of errors against step: at critical damping the rate of decay has slopes 2, 1 and 1/2, in the "
+        "other panels 2, 2 and 1.",
     )
 
 

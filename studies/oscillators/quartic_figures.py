@@ -1,5 +1,7 @@
 """Figures of the planar quartic oscillator and its exact map."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import xarray as xr
 
@@ -58,55 +60,70 @@ def draw_errors(data: xr.Dataset) -> Picture:
 
 
 def draw_orbits(data: xr.Dataset) -> Picture:
-    """|x_{n+1}|^2 over |x_n|^2 of the maps, on the curve that the motion draws."""
-    figure, axes = style.panels(len(quartic.SHOWN), len(DRAWN), height=2.3, sharex="col", sharey="col")
-    curve = {"color": style.ORANGES[2], "lw": 3.5, "label": "the motion: $|x(t)|^2$, $|x(t + h)|^2$"}
-    for row, steps in enumerate(quartic.SHOWN):
-        for axis, name in zip(axes[row], DRAWN, strict=True):
-            true = data.sel(scene=name, integrator=MAPS[0]).isel(quartic_shown=row)
-            axis.plot(true[quartic.CURVE_HERE], true[quartic.CURVE_AHEAD], **curve)
-            for method in reversed(MAPS):
-                squares = data[quartic.ORBIT].sel(scene=name, integrator=method).isel(quartic_shown=row).values
-                look, face = LOOKS[method], "none" if method == MAPS[0] else LOOKS[method].color
-                dots = {"color": look.color, "mfc": face, "ms": 3.6 if method == MAPS[0] else 1.8, "lw": 0}
-                axis.plot(squares[:-1], squares[1:], look.marker, label=method, **dots)
-            low, high = float(true[quartic.CURVE_HERE].min()), float(true[quartic.CURVE_HERE].max())
-            margin = 0.25 * (high - low)
-            axis.set(xlim=(low - margin, high + margin), ylim=(low - margin, high + margin))
-            axis.set_title(f"{name}, step T/{steps:g}", fontsize=7.5)
-            if away := _outside(data.sel(scene=name).isel(quartic_shown=row), low - margin, high + margin):
-                axis.text(0.42, 0.45, away, transform=axis.transAxes, ha="center", va="center", color="#444444",
-                          fontsize=style.LEAST_TEXT)  # fmt: skip
-        axes[row, 0].set_ylabel("$|x_{n+1}|^2$ over the largest $|x|^2$")
-    for axis in axes[-1]:
-        axis.set_xlabel("$|x_n|^2$ over the largest $|x|^2$")
-    style.legend_below(figure, axes)
+    """|x_{n+1}|^2 over |x_n|^2 of the maps at the larger step, on the curve that the motion draws."""
+    figure, axes = style.panels(1, len(DRAWN), height=2.6)
+    curve = {"color": "#BDBDBD", "lw": 5.0, "label": "the motion: $|x(t)|^2$, $|x(t + h)|^2$", "zorder": 1}
     far = {method: quartic.off_curve(data, DRAWN[0], method) for method in MAPS}
-    off = style.number(min(value for method, value in far.items() if method != MAPS[0]))
-    at = f"with steps of T/{quartic.SHOWN[-1]:g} on {DRAWN[0]} the others are off it by {off} at least"
-    style.headline(figure, f"At every step {MAPS[0]} stays on the curve of the motion: {at}")
-    away = ", ".join(f"{method} {quartic.off_curve(data, DRAWN[0], method):.1g}" for method in MAPS[1:])
+    least, most = (pick(MAPS[1:], key=lambda method: far[method]) for pick in (min, max))
+    for axis, name in zip(axes[0], DRAWN, strict=True):
+        cell = data.sel(scene=name).isel(quartic_shown=-1)
+        true = cell.sel(integrator=MAPS[0])
+        axis.plot(true[quartic.CURVE_HERE], true[quartic.CURVE_AHEAD], **curve)
+        low, high = float(true[quartic.CURVE_HERE].min()), float(true[quartic.CURVE_HERE].max())
+        ends = low - 0.25 * (high - low), high + 0.25 * (high - low)
+        for method in MAPS:
+            squares, look = cell[quartic.ORBIT].sel(integrator=method).values, LOOKS[method]
+            dots = {"color": look.color, "mfc": "none" if method == MAPS[0] else look.color, "lw": 0, "ms": 3.2}
+            axis.plot(squares[:-1], squares[1:], look.marker, label=method, zorder=2 + (method != MAPS[0]), **dots)
+        axis.set(xlim=ends, ylim=ends, aspect="equal", xlabel="$|x_n|^2$ / largest $|x|^2$")
+        axis.set_title(f"{name}, step T/{quartic.SHOWN[-1]:g}", fontsize=7.5)
+        axis.text(0.5, 0.4, _outside(cell, *ends), transform=axis.transAxes, ha="center", va="center",
+                  color="#444444", fontsize=style.LEAST_TEXT)  # fmt: skip
+    for method, corner in ((least, (0.16, 0.07)), (most, (0.53, 0.55))) if least != most else ():
+        squares = data[quartic.ORBIT].sel(scene=DRAWN[0], integrator=method).values[-1]
+        worst = int(np.argmax(quartic.distances(data, DRAWN[0], method)))
+        place, color = squares[worst : worst + 2], style.ink(LOOKS[method].color)
+        axes[0, 0].plot(*place, "o", color=style.BLACK, mfc="none", ms=9.0, mew=1.2, zorder=5)
+        axes[0, 0].annotate(style.number(far[method]), place, corner, textcoords="axes fraction", weight="bold",
+                            ha="center", color=color, arrowprops={"arrowstyle": "-", "lw": 0.7, "shrinkB": 4}
+                            )  # fmt: skip
+    axes[0, 0].plot([], [], "o", color=style.BLACK, mfc="none", ms=9.0, mew=1.2, label="the title's distances")
+    axes[0, 0].set_ylabel("$|x_{n+1}|^2$ / largest $|x|^2$")
+    style.legend_below(figure, axes)
+    style.headline(figure, orbits_message(far))
+    away = ", ".join(f"{method} {far[method]:.1g}" for method in MAPS[1:])
     return Picture(
         "quartic-orbits",
         figure,
         f"The first {quartic.POINTS} steps of each map of an oscillator (no chart), by what needs no velocity: the "
         "square of the distance from the centre before a step and after it. Points of the exact map lie on the curve "
         "of the motion. "
-        "McMillan's map with constants to order h^2 is integrable and draws a curve of its own; the others "
-        "lie off by more the larger the step, and at T/4.4 some have left the picture. Largest distance from the curve "
-        f"on {DRAWN[0]} at T/{quartic.SHOWN[-1]:g}, in the units of the figure: {away}.",
-        "Scatter plots of consecutive squared radii for three oscillators and two steps, on closed curves.",
+        "McMillan's map with constants to order h^2 is integrable and draws a curve of its own; the others lie off as "
+        "well, and some have left the picture. Largest distance from the curve "
+        f"on {DRAWN[0]}, in the units of the figure: {away}.",
+        "Scatter plots of consecutive squared radii for three oscillators: one map on the closed curve of the motion, "
+        "three off it.",
+    )
+
+
+def orbits_message(far: Mapping[str, float]) -> str:
+    """Which map stays on the curve of the motion, and how far the nearest and the farthest of the others are off it."""
+    others = [far[method] for method in MAPS[1:]]
+    return (
+        f"At steps of T/{quartic.SHOWN[-1]:g} only {MAPS[0]} stays on the curve of the motion; the largest "
+        f"distance of the others is {style.number(min(others))} to {style.number(max(others))} on {DRAWN[0]}"
     )
 
 
 def _outside(orbits: xr.Dataset, low: float, high: float) -> str:
-    """Which maps have points outside a panel, or none in it, as a note; empty if none has."""
+    """Which maps have points outside a panel, as a note; empty if none has."""
     parts = []
     for method in MAPS:
         values = orbits[quartic.ORBIT].sel(integrator=method).values
-        out = int(np.sum(~((values >= low) & (values <= high))))
+        inside = (values >= low) & (values <= high)
+        out = int(np.sum(~(inside[:-1] & inside[1:])))  # a point is two values
         if out:
-            parts.append(f"{method}:\n{out} of {values.size} points\noff the chart")
+            parts.append(f"{method}:\n{'all' if out == values.size - 1 else out} of {values.size - 1}\noutside")
     return "\n".join(parts)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.order import Fit, power_law
+from symtop.model.charts import Array
 from symtop.model.scenes import scene
 from symtop.runner.study import Table
 
@@ -96,13 +97,21 @@ def quartic_order(data: xr.Dataset, name: str, method: str, column: str = ERROR)
     return power_law(steps, errors, (steps < ASYMPTOTIC) & (errors > ROUNDING))
 
 
-def off_curve(data: xr.Dataset, name: str, method: str) -> float:
-    """Largest distance in |x_{n+1}|^2 of a discrete orbit from the true curve at the larger of the steps shown."""
+def distances(data: xr.Dataset, name: str, method: str) -> Array:
+    """Distances of the points of a discrete orbit from the true curve, a polygon, at the larger of the steps shown."""
     true, cell = data.sel(scene=name, integrator="exact-discrete"), data.sel(scene=name, integrator=method)
     curve = true[CURVE_HERE].values[-1] + 1j * true[CURVE_AHEAD].values[-1]
+    begins, sides = curve[:-1], np.diff(curve)
     squares = cell[ORBIT].values[-1]
-    points = squares[:-1] + 1j * squares[1:]
-    return float(np.max(np.min(np.abs(points[:, None] - curve[None, :]), axis=1)))
+    away = (squares[:-1] + 1j * squares[1:])[:, None] - begins[None, :]
+    along = np.clip(np.real(away * sides.conj()) / np.maximum(np.abs(sides) ** 2, 1e-300), 0.0, 1.0)
+    nearest: Array = np.min(np.abs(away - along * sides), axis=1)
+    return nearest
+
+
+def off_curve(data: xr.Dataset, name: str, method: str) -> float:
+    """The largest of the distances, NaN if a point is lost."""
+    return float(np.max(distances(data, name, method)))
 
 
 def sentences(data: xr.Dataset) -> list[str]:

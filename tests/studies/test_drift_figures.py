@@ -101,3 +101,29 @@ def test_no_dot_of_the_phase_covers_another(histories):
     places = figure.axes[0].transData.transform(dots) * 72.0 / figure.dpi
     apart = np.linalg.norm(places[:, None] - places[None], axis=-1)[~np.eye(len(dots), dtype=bool)]
     assert apart.min() >= 4.2  # points, the size of a dot
+
+
+@pytest.fixture
+def ensembles():
+    """One method whose plain sums grow as n^0.4 and lose 50 times as much in the last decade."""
+    sums = {
+        "exponent": 0.49,
+        "plain_exponent": 0.40,
+        "late": 2e-15,
+        "plain_late": 1e-13,
+        "gain": 50.0,
+        "exponent_interval": 0.06,
+    }
+    return {"midpoint[angles]": xr.Dataset(sums)}
+
+
+def test_the_exponents_of_rounding_are_told_apart(ensembles):
+    (cell,) = ensembles.values()
+    assert messages.walk(cell) == "plain: power 0.40\ncompensated: power 0.49"
+    said = messages.rounding(ensembles)
+    assert said.startswith(
+        "Compensated sums lower the drift by rounding 50 to 50 times; it grows as n to the power 0.49"
+    )
+    assert "0.40" not in said
+    assert said.endswith("as a random walk does (0.5)")
+    assert messages.rounding({"midpoint[angles]": cell.assign(exponent=0.4)}).endswith("to 0.40 then")

@@ -200,3 +200,20 @@ def test_the_power_of_the_friction_is_what_the_energy_loses():
     assert np.subtract(*(scene.top.energy(symtop.Angles(*truth[:, k])) for k in (0, -1))) == pytest.approx(
         spent, rel=1e-4
     )
+
+
+def test_the_title_of_the_orders_tells_the_slopes_at_critical_damping():
+    steps = np.geomspace(1e-4, 1e-1, 13)
+    powers = {"midpoint": 2.0, "trapezoidal": 1.0, ONE_SIDED: 0.5}
+    errors = np.array([[steps**power for power in powers.values()]])
+    data = xr.Dataset(
+        {
+            Column.STEP: (("scene", "integrator", "setting"), np.broadcast_to(steps, errors.shape)),
+            Column.EXPONENT_ERROR: (("scene", "integrator", "setting"), errors),
+        },
+        coords={"scene": ["damping-2"], "integrator": list(powers)},
+    )
+    assert words.orders_message(data) == (
+        "At critical damping the rate of decay has order 1.0 only with trapezoidal and 0.5 with the force at one end; "
+        "midpoint keeps 2.0"
+    )

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
+from symtop_studies.oscillators import quartic_figures
 from symtop_studies.oscillators.quartic import (
     Map,
     Quartic,
@@ -14,7 +16,17 @@ from symtop_studies.oscillators.quartic import (
     of_top,
     true_path,
 )
-from symtop_studies.oscillators.quartic_tables import MAPS, PLAIN, QUARTICS, oscillator_of, quartic_table
+from symtop_studies.oscillators.quartic_tables import (
+    CURVE_AHEAD,
+    CURVE_HERE,
+    MAPS,
+    ORBIT,
+    PLAIN,
+    QUARTICS,
+    off_curve,
+    oscillator_of,
+    quartic_table,
+)
 
 import symtop
 from symtop.measure.order import power_law
@@ -131,3 +143,39 @@ def test_a_map_that_leaves_the_oscillator_ends():
     table = quartic_table("planar-hardening", "exact-discrete", (40.0, 2.1), 1.0)
     assert float(table["quartic_error"].max()) < 1e-14
     assert Map(0.0, 0.0, 1.0, 0.0).kick(3.0) == 0.0
+
+
+@pytest.fixture
+def orbits():
+    """A square as the curve of the motion; one orbit on it, one a tenth outside, one beyond the picture."""
+    corners = np.array([0.0, 1.0, 1.0, 0.0, 0.0])
+    ahead = np.array([0.0, 0.0, 1.0, 1.0, 0.0])
+    squares = {"exact-discrete": [0.0, 0.5, 0.0], "midpoint": [-0.1, 0.5, -0.1], "mcmillan": [9.0, 0.5, 9.0]}
+    return xr.Dataset(
+        {
+            CURVE_HERE: (("scene", "integrator", "quartic_shown", "curve"), np.tile(corners, (1, 3, 1, 1))),
+            CURVE_AHEAD: (("scene", "integrator", "quartic_shown", "curve"), np.tile(ahead, (1, 3, 1, 1))),
+            ORBIT: (
+                ("scene", "integrator", "quartic_shown", "quartic_point"),
+                np.array([list(squares.values())])[:, :, None],
+            ),
+        },
+        coords={"scene": ["planar"], "integrator": list(squares)},
+    )
+
+
+def test_distances_are_those_from_the_curve_not_from_its_nearest_corner(orbits):
+    assert off_curve(orbits, "planar", "exact-discrete") == 0.0
+    assert off_curve(orbits, "planar", "midpoint") == pytest.approx(0.1)
+
+
+def test_a_point_with_one_value_outside_the_picture_is_counted_as_outside(orbits, monkeypatch):
+    monkeypatch.setattr(quartic_figures, "MAPS", tuple(orbits["integrator"].values))
+    cell = orbits.sel(scene="planar").isel(quartic_shown=-1)
+    assert quartic_figures._outside(cell, -0.25, 1.25) == "mcmillan:\nall of 2\noutside"
+
+
+def test_the_title_names_the_least_and_the_largest_of_the_largest_distances():
+    said = quartic_figures.orbits_message(dict(zip(MAPS, (1e-6, 0.065, 0.076, 0.023), strict=True)))
+    assert said.startswith("At steps of T/4.37 only exact-discrete stays on the curve of the motion")
+    assert "is 0.023 to 0.076 on planar-softening" in said
