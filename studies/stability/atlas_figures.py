@@ -208,7 +208,7 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
             axis.set_xlabel(SHORT[one.control], fontsize=LEAST_TEXT, labelpad=1.0)
     figure.supylabel(AXES[over], fontsize=8.0)
     _key(figure, drawn)
-    said = [accurate_means(scene), *([f"Accurate everywhere: {bare(alike)}."] if alike else [])]
+    said = [accurate_means(scene), *([listed(alike)] if alike else [])]
     lines = [line for text in said for line in textwrap.wrap(text, round(18.0 * figure.get_figwidth()))]
     figure.legends[0].set_title("\n".join(lines))
     return figure
@@ -220,11 +220,11 @@ def accurate_means(scene: str) -> str:
     return f"Accurate: within {ACCURATE:g} rad and {OUTSIDE:g} of the nutation's width of the true axis, over {length}."
 
 
-def bare(names: Sequence[str]) -> str:
-    """A list of rows; those on the axis, if all of them are, without their chart."""
-    if all(split_name(name)[1] == "axis" for name in names):
-        return f"{', '.join(split_name(name)[0] for name in names)} (all [axis])"
-    return ", ".join(names)
+def listed(alike: Sequence[str]) -> str:
+    """The rows that share a panel; without their chart if all are on the axis."""
+    on_axis = all(split_name(name)[1] == "axis" for name in alike)
+    names = ", ".join(split_name(name)[0] if on_axis else name for name in alike)
+    return f"Accurate everywhere{', all [axis]' if on_axis else ''}: {names}."
 
 
 def _title(name: str, one: OutcomeMap) -> str:

@@ -436,7 +436,7 @@ def test_rows_that_are_accurate_everywhere_share_a_panel():
     drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-steps"]
     titles = [axis.get_title() for axis in drawn.figure.axes if axis.get_visible()]
     assert titles == ["3 methods\n(named below) 100%", "rk4\n[axis] 33%"]
-    assert "everywhere: yoshida-4, suzuki-4, strang (all [axis])" in drawn.figure.legends[0].get_title().get_text()
+    assert "everywhere, all [axis]: yoshida-4, suzuki-4, strang." in drawn.figure.legends[0].get_title().get_text()
 
 
 def test_the_page_of_the_pole_tells_charts_apart_and_names_an_exception():
