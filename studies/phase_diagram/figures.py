@@ -1,5 +1,6 @@
 """The pictures: the family of the cheapest row for every allowed error and horizon, three errors wide."""
 
+import textwrap
 from collections import Counter
 from typing import Any
 
@@ -20,7 +21,8 @@ from .tables import TARGETS, TIE, Diagram, diagram, tops_run
 HATCH = "///"  # foretold
 LETTER = 0.62  # of a cell: the width of a letter of a name on a region
 PALE = 0.45  # of white in the colour of a family beside that of its row in the title
-MOST_NAMES = 2  # of a family in the key
+MOST_NAMES = 4  # of a family in the key
+KEY = 44  # letters of a line of it
 UNREACHED = "#F0F0F0"
 LEVEL: dict[str, Any] = {
     "ls": "none",
@@ -53,7 +55,7 @@ def draw(data: xr.DataTree, name: str) -> Picture:
     for row, _ in area.most_common():
         groups.setdefault(row if row in spoken else integrator(row).family, []).append(row)
     colors = {name: _color(rows, spoken) for name, rows in groups.items()}
-    figure, axes = panels(1, len(QUANTITIES), height=3.0, sharex=True, sharey=True)
+    figure, axes = panels(1, len(QUANTITIES), height=3.6, sharex=True, sharey=True)
     for axis, quantity in zip(axes[0], QUANTITIES, strict=True):
         _panel(axis, each[quantity], groups, colors)
         title = words.PANELS[quantity].replace(": ", "\n", 1)
@@ -70,6 +72,11 @@ def draw(data: xr.DataTree, name: str) -> Picture:
         Line2D([], [], **LEVEL, label=f"dot: another costs less than {TIE:g} times as much"),
     ]
     figure.legend(handles=keys, loc="outside lower center", ncols=2, frameon=False)
+    figure.legends[0].set_title(
+        "Cheapest: the least time of a run, its force evaluations times the measured time of one, among "
+        f"{len(words.taking_part(data))} methods.\n{words.foretold_share(data, name):.0%} of the cells that any of "
+        "them reaches are foretold."
+    )
     headline(figure, words.message(data, name))
     tops = "random tops (medians)" if name == POPULATION else f"the scene {name}"
     return Picture(
@@ -80,9 +87,9 @@ def draw(data: xr.DataTree, name: str) -> Picture:
         "height and vertical velocity from the true orbit, which a delay does not change. At each cell every row has "
         "the step or tolerance that suits it. A name is that of the method with the most cells of a region. Hatched: "
         "the error of the winner is foretold from the measured growth of its own run. "
-        f"{words.level_sentence(data, name)} {words.spot_sentence(data)} Gauss methods take no part in energy and "
-        "shape, which they keep at any step. Closed forms (exact, exact-discrete) take no part: they cost the same at "
-        "every horizon.",
+        f"{words.level_sentence(data, name)} {words.spot_sentence(data)} {words.part_sentence(data)} Gauss methods "
+        "take no part in energy and shape, which they keep at any step, and closed forms (exact, exact-discrete) in "
+        "nothing: they cost the same at every horizon.",
         f"Three maps of the cheapest method over horizon and allowed error on {tops}: phase, energy and shape.",
         lead="Cheapest by error and run length" if name == POPULATION else "",
     )
@@ -148,4 +155,5 @@ def _key(group: str, rows: list[str]) -> str:
         return group
     more = len(rows) - MOST_NAMES
     others = f" and {more} other{'s' * (more > 1)}" if more > 0 else ""
-    return f"{FAMILIES.get(group, group)}: {', '.join(map(_method, rows[:MOST_NAMES]))}{others}"
+    label = f"{FAMILIES.get(group, group)}: {', '.join(map(_method, rows[:MOST_NAMES]))}{others}"
+    return textwrap.fill(label, KEY, break_on_hyphens=False)

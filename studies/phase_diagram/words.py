@@ -131,7 +131,30 @@ def message(data: xr.DataTree, name: str) -> str:
         said = f"{share:.0%}{'' if shares else ' of the cells that any method reaches'} for "
         shares.setdefault(row, []).append(said + quantity.replace("axis", "phase"))
     each = "; ".join(f"{row} is the cheapest method in {', '.join(parts)}" for row, parts in shares.items())
-    return f"On {named(name)} {each}"
+    return f"On {'' if name == POPULATION else 'the scene '}{named(name)} {each}"
+
+
+def foretold_share(data: xr.DataTree, name: str) -> float:
+    """Of the cells of these tops that any row reaches, the share that is foretold."""
+    panels = [diagram(data, name, quantity) for quantity in QUANTITIES]
+    reached = sum(int((panel.winner >= 0).sum()) for panel in panels)
+    return sum(int((panel.foretold & (panel.winner >= 0)).sum()) for panel in panels) / max(reached, 1)
+
+
+def taking_part(data: xr.DataTree) -> list[str]:
+    """The rows of the diagram, those on the axis without their chart."""
+    rows = map(str, data[LADDERS].to_dataset()["integrator"].values)
+    return [row.removesuffix("[axis]") for row in rows]
+
+
+def part_sentence(data: xr.DataTree) -> str:
+    """Which rows take part, and why another study may have another winner."""
+    rows = taking_part(data)
+    return (
+        f"{len(rows)} rows take part, on the axis if they name no chart: {', '.join(rows)}. All others do not, as "
+        "taylor-longdouble and taylor-quad, which can be the fastest in the study work_precision where errors are "
+        "close to the rounding of double precision."
+    )
 
 
 def level_sentence(data: xr.DataTree, name: str) -> str:

@@ -14,7 +14,7 @@ from symtop.run.guard import EXPECTED
 from symtop.runner.study import Picture
 
 from . import messages, verdicts, words
-from .costs import TIE, run_lengths
+from .costs import TIE, Share, run_lengths
 from .ladder import KEPT, WRONG
 from .verdicts import ALL, UNITS, Cell
 
@@ -22,6 +22,7 @@ NAMED = 6  # rows with a label; all others are thin and grey
 FAMILIAR = ("rk4[axis]", "strang[axis]", "midpoint[angles]")  # always among them, thin
 MARKS = 9  # on a line
 SHOWN = 6  # rows of a panel of slowdowns
+NOBODY = "nobody"  # the tops on which no row is the cheapest beyond ties
 EVEN = 1e-6  # of a win: what a tie counts between rows with the same wins
 FAR = 1e3  # slowdown at which an axis ends
 LATEST = 0.995  # of a named row's costs lie within the axis of a panel
@@ -132,35 +133,44 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
     cells = [verdicts.standings(verdicts.costs(data, Cell(horizon, "axis", target), words.UNIT)) for target in targets]
     wins: Counter[str] = Counter()
     for listed in cells:
-        wins.update({one.name: one.won.value + EVEN * one.level.value for one in listed if one.won.total})
-    names = [name for name, _ in wins.most_common(SHOWN)]
+        wins.update({one.name: one.won.count + EVEN * one.level.count for one in listed if one.won.total})
+    winners = [name for name, total in wins.most_common() if total >= 1.0]
+    names = winners[:SHOWN]
+    others = ["another method"] if len(winners) > len(names) else []
+    lines = [*names, *others, NOBODY]
     spoken = {name for name, _ in messages.first_and_last(data, horizon)}
-    figure, axes = panels(1, len(targets), height=0.19 * len(names) + 1.2, sharey=True)
+    figure, axes = panels(1, len(targets), height=0.19 * len(lines) + 1.2, sharey=True)
     for axis, target, listed in zip(axes[0], targets, cells, strict=True):
         for one in (one for one in listed if one.name in names and one.won.total):
             _slowdown(axis, names.index(one.name), one, one.name in spoken)
         solved = max((one.won.total for one in listed), default=0)
-        axis.set(xscale="log", xlim=(0.6, FAR), ylim=(len(names) - 0.4, -0.6), yticks=range(len(names)))
-        axis.set(xlabel="times the least cost")
+        if solved:
+            elsewhere = sum(one.won.count for one in listed if one.name not in names)
+            nobody = solved - sum(one.won.count for one in listed)
+            for place, count in enumerate([*([elsewhere] if others else []), nobody], len(names)):
+                _beside(axis, place, messages.share_won(Share(count, solved)))
+        axis.set(xscale="log", xlim=(0.6, FAR), ylim=(len(lines) - 0.4, -0.6), yticks=range(len(lines)))
+        axis.set(xlabel="times the least time")
         axis.set_title(f"to {power(target)} rad", pad=24.0)
         axis.annotate(f"cheapest on,\nof {solved:,} tops", (1.3, -0.6), xycoords=("axes fraction", "data"), va="bottom",
                       ha="right", fontsize=LEAST_TEXT, annotation_clip=False)  # fmt: skip
         axis.set_xticks([1.0, 10.0, 100.0, 1000.0], ["1", "10", "100", "1000"])
         axis.grid(visible=False, axis="y")
         axis.tick_params(axis="y", length=0)
-    axes[0, 0].set_yticklabels(names, fontsize=LEAST_TEXT)
-    for name, text in zip(names, axes[0, 0].get_yticklabels(), strict=True):
+    axes[0, 0].set_yticklabels(lines, fontsize=LEAST_TEXT)
+    for name, text in zip(lines, axes[0, 0].get_yticklabels(), strict=True):
         text.set_weight("bold" if name in spoken else "normal")
     dark = {"color": "#444444", "lw": 0.0}
     axes[0, 0].plot([], [], "o", ms=4.5, label="median over the tops", **dark)
     axes[0, 0].plot([], [], color="#444444", lw=1.5, label="10 to 90 % of the tops")
     axes[0, 0].plot([], [], ">", ms=4, mfc="white", label="unsolved on 10 % or more", **dark)
     style.legend_below(figure, axes)
-    most = max(map(len, cells))
-    figure.legends[0].set_title(
-        f"Cheapest on: of the tops that any method solves, those on which all others cost at least {TIE:g} times as "
-        f"much.\nShown: the {len(names)} of {most} methods that are the cheapest most often, all accuracies together."
+    note = (
+        f"Cheapest: every other method takes at least {TIE:g} times as long; nobody: two are closer. Counted are the "
+        f"tops that any method solves. {messages.asked_sentence(data, horizon)} Rows: the {len(names)} of "
+        f"{max(map(len, cells))} methods that are the cheapest {'most often' if others else 'on at least one top'}."
     )
+    figure.legends[0].set_title("\n".join(textwrap.wrap(note, 120)))
     headline(figure, messages.slowdowns(data, horizon))
     return Picture(
         f"slowdowns-{horizon}",
@@ -168,7 +178,8 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
         f"The {len(names)} rows, method[chart], with the most wins at all accuracies together, in the same order in "
         "each panel: marker, median of the slowdown against the cheapest row on the same top; bar, from the 10 % to "
         "the 90 % quantile (arrow: not reached within the budget; no marker: not on half of the tops). Beside it the "
-        f"share of tops on which the row is the cheapest beyond ties. A bar that stays near 1 is a safe choice. "
+        f"share of tops on which the row is the cheapest beyond ties; the last line has the tops on which nobody is. "
+        f"{messages.asked_sentence(data, horizon)} A bar that stays near 1 is a safe choice. "
         f"{words.span(data, horizon)}, no named scene; cost in {UNITS[words.UNIT]}, each at its own step or tolerance. "
         f"{words.verdict_of(data, horizon, 'axis')}",
         "Dot plots of slowdown with bars from the 10 to the 90 % quantile, one panel for each axis error.",
@@ -185,10 +196,13 @@ def _slowdown(axis: Any, place: int, one: verdicts.Standing, spoken: bool) -> No
         axis.plot(0.75 * FAR, place, ">", color=color, mfc="white", ms=4)
     if np.isfinite(middle):
         axis.plot(middle, place, mark.marker, color=color, ms=5, fillstyle=mark.fill)
-    axis.annotate(
-        f"{one.won.value:.0%}", (1.3, place), xycoords=("axes fraction", "data"), va="center", ha="right",
-        fontsize=LEAST_TEXT, weight=weight, annotation_clip=False,
-    )  # fmt: skip
+    _beside(axis, place, messages.share_won(one.won), weight)
+
+
+def _beside(axis: Any, place: int, text: str, weight: str = "normal") -> None:
+    """A number at the right of a line of a panel."""
+    axis.annotate(text, (1.3, place), xycoords=("axes fraction", "data"), va="center", ha="right",
+                  fontsize=LEAST_TEXT, weight=weight, annotation_clip=False)  # fmt: skip
 
 
 def draw_strata(data: xr.DataTree) -> Picture:
@@ -298,13 +312,24 @@ def draw_guard(data: xr.DataTree) -> Picture:
             axis.plot(np.maximum(curve.alarms, RARE)[seen:], curve.hits[seen:], color=color, lw=2.0)
             axis.plot(max(alarms.value, RARE), hits.value, "o", color=color, ms=7)
             axis.annotate(
-                f"{label}\n{words.percent(hits)} of wrong runs,\n{words.percent(alarms)} of right ones",
+                f"{label}:\n{messages.found_of(hits, whole=False)},\n{words.percent(alarms)} of the right ones",
                 (max(alarms.value, RARE), hits.value), spot, textcoords="axes fraction", fontsize=LEAST_TEXT,
                 color=color, va="top", arrowprops={"arrowstyle": "-", "color": color, "lw": 0.7},
             )  # fmt: skip
-        axis.set(xscale="log", xlim=(RARE, 1.05), ylim=(-0.01, 1.03), title=words.span(data, horizon))
+        axis.set(xscale="log", xlim=(RARE, 1.05), ylim=(-0.01, 1.03))
+        hits, alarms = verdicts.caught(data, horizon)
+        tops, length = int(data[horizon].sizes["guarded"]), verdicts.nutations(data, horizon)
+        axis.set_title(
+            f"{tops} tops over {length:g} nutations:\n{hits.total:,} wrong runs, {alarms.total:,} right ones"
+        )
         axis.set(xlabel="share of right runs that are suspected")
     axes[0, 0].set_ylabel("share of wrong runs that are found")
+    figure.supxlabel(
+        "The guard runs a short piece of the method and foretells the error of the axis. Wrong: the axis is off by "
+        f"more than\n{WRONG:g} rad; right: by less than {EXPECTED:g} rad. Lines: any threshold; dots: the guard warns "
+        f"at {EXPECTED:g} rad, energy and momenta at {KEPT:.0%}.",
+        fontsize=7.5, ha="left", x=0.01,
+    )  # fmt: skip
     headline(figure, messages.guard(data))
     return Picture(
         "guard",
@@ -312,7 +337,9 @@ def draw_guard(data: xr.DataTree) -> Picture:
         "Wrong runs that are noticed against right ones that are suspected, as the threshold varies. Black: by the "
         f"guard's forecast, made before the run (dot: {EXPECTED:g} rad, where it warns). Orange: by the larger error "
         f"of energy and momenta, seen after the run (dot: {KEPT:.0%}). All rows, method[chart], at every "
-        "step and tolerance of the ladder, on random tops, no named scene. "
-        f"{words.guard_sentence(data)}",
+        f"step and tolerance of the ladder, on {' and on '.join(messages.guarded(data, one) for one in spans)}; no "
+        f"named scene. {words.guard_sentence(data)} The figure of silent failures counts all tops, at the settings "
+        "that were run on every one, and therefore another share of wrong runs that keep energy and momenta: "
+        f"{words.hidden(data).everywhere:.1%}.",
         "Receiver operating characteristics of the guard and of the conserved quantities, with their thresholds.",
     )

@@ -9,10 +9,12 @@ import xarray as xr
 from symtop.report.style import FIRM, RAISED, number
 
 from . import verdicts
+from .costs import Share
 from .verdicts import Cell
 from .words import FINE, UNIT, hidden, percent
 
 HALF = 0.5  # of the tops, at which costs are compared
+FEW = 0.01  # of the wrong runs: if fewer are missed, they are counted
 SCALES = {"evaluations": 1.0}  # of a cost in a figure, by unit; microseconds of all others
 MADE = {"evaluations": "force evaluations"}
 
@@ -25,6 +27,24 @@ def ten(target: float) -> str:
 def over(data: xr.DataTree, horizon: str) -> str:
     """The run length."""
     return f"over {verdicts.nutations(data, horizon):g} nutations"
+
+
+def share_won(share: Share) -> str:
+    """A share in whole per cent, with a digit more if it is small: what is not zero is not printed as zero."""
+    if not share.count or share.value >= 0.095:
+        return f"{share.value:.0%}"
+    return f"{share.value:.1%}" if share.value >= 0.0005 else "<0.1%"
+
+
+def asked_sentence(data: xr.DataTree, horizon: str) -> str:
+    """At which errors some tops are not asked for an axis, because their whole nutation is narrower."""
+    drawn = verdicts.members(data, horizon)
+    asked = {target: verdicts.costs(data, Cell(horizon, "axis", target), "evaluations").values.shape[1]
+             for target in verdicts.targets(data)}  # fmt: skip
+    fewer = [f"to {target:g} rad the {count:,}" for target, count in asked.items() if count < drawn]
+    if not fewer:
+        return ""
+    return f"Asked are, of {drawn:,} tops, {' and '.join(fewer)} whose nutation is wider than the error."
 
 
 class First(NamedTuple):
@@ -67,7 +87,7 @@ def first_and_last(data: xr.DataTree, horizon: str) -> list[tuple[str, str]]:
     for target in verdicts.targets(data):
         taken, won = verdicts.best(data, Cell(horizon, "axis", target), UNIT)
         if won is not None:
-            winners.append((taken.names[won.row], f"on {won.share.value:.0%} of the tops at {ten(target)}"))
+            winners.append((taken.names[won.row], f"on {share_won(won.share)} of the tops at {ten(target)}"))
     return winners if len(winners) < 2 else [winners[0], winners[-1]]
 
 
@@ -104,20 +124,35 @@ def silent(data: xr.DataTree) -> str:
     """The share of wrong runs that nothing warns of, and that among small steps."""
     share = hidden(data)
     return (
-        f"Wrong runs look healthy: {share.everywhere:.0%} of all, {share.fine:.0%} of those with at least {FINE:g} "
+        f"{share.everywhere:.0%} of all wrong runs look healthy, {share.fine:.0%} of those with at least {FINE:g} "
         "steps a nutation"
     )
 
 
 def guard(data: xr.DataTree) -> str:
-    """What the guard finds of the wrong runs, and how many right ones it suspects, over each horizon."""
-    found, alarms = zip(*(verdicts.caught(data, horizon) for horizon in verdicts.horizons(data)), strict=True)
-    least = min(found, key=lambda share: share.value)
-    suspected = [
-        f"{percent(share)} {over(data, horizon) if not place else f'over {verdicts.nutations(data, horizon):g}'}"
-        for place, (horizon, share) in enumerate(zip(verdicts.horizons(data), alarms, strict=True))
-    ]
+    """How many wrong runs the guard finds, and what share a look at them afterwards finds."""
+    found, after = ([verdicts.caught(data, horizon, score)[0] for horizon in verdicts.horizons(data)]
+                    for score in ("foretold", "watched"))  # fmt: skip
+    together = Share(sum(share.count for share in found), sum(share.total for share in found))
     return (
-        f"The guard finds {percent(least)} of the wrong runs before they are made; of the right ones it suspects "
-        f"{' and '.join(suspected)}"
+        f"The guard finds {found_of(together)} before they are made; energy and momenta afterwards find "
+        f"{' and '.join(map(percent, after))} of them"
+    )
+
+
+def found_of(share: Share, whole: bool = True) -> str:
+    """How many wrong runs are found: in per cent, or how many are not if these are few."""
+    missed, of = share.total - share.count, f" of {share.total:,}" if whole else ""
+    if missed > FEW * share.total:
+        return f"{percent(share)}{of or ' of'} wrong runs"
+    return f"all but {missed:,}{of} wrong runs" if missed else f"all {f'{share.total:,} ' if whole else ''}wrong runs"
+
+
+def guarded(data: xr.DataTree, horizon: str) -> str:
+    """Over which runs the guard is judged."""
+    tops = int(data[horizon].sizes["guarded"])
+    wrong, right = verdicts.caught(data, horizon)
+    return (
+        f"the first {tops:,} of {verdicts.members(data, horizon):,} tops over {verdicts.nutations(data, horizon):g} "
+        f"nutations ({wrong.total:,} wrong runs, {right.total:,} right ones)"
     )

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.methods.registry import integrator
+from symtop.report.style import number
 from symtop.runner.study import Table
 
 from .tables import (
@@ -66,6 +67,16 @@ def commuting_message(data: xr.Dataset) -> str:
     return (
         f"Eliminating {PHI} and {PSI} before or after discretising makes the same method for "
         f"{', '.join(same) or 'no rule'}, and different ones for {', '.join(rest) or 'none'}"
+    )
+
+
+def unreduced_message(data: xr.Dataset, methods: list[str]) -> str:
+    """What eliminating angles after discretising changes, as a title."""
+    gap = largest_gap(data)
+    judged = "nothing but rounding" if gap < SAME_MAP else "more than rounding"
+    return (
+        f"Eliminating {PHI} and {PSI} after discretising changes {judged}: {' and '.join(methods)} with and without it "
+        f"differ by at most {number(gap)} rad"
     )
 
 

@@ -26,6 +26,7 @@ COMMON = 0.5  # of the rows must fail, at every larger setting too, before a thr
 LASTING = 3  # settings at least, beyond a threshold: at the last one "every larger" would say nothing
 NOTABLE = 0.1  # of the failed runs: a kind of failure with a smaller share is not named
 SAME = 1.0 + 1e-9  # two ladders that end at one value end this close
+ALIKE = 3  # rows without a wrong run, from which on one map stands for all
 NEAR, FAR = 1e-4, 0.1  # gaps delta: next to a pole, and well away from it
 
 
@@ -138,6 +139,12 @@ def methods_of(data: xr.Dataset) -> dict[str, Integrator]:
     """The integrators of a dataset that are registered, by the names of their rows."""
     names = map(str, data["integrator"].values)
     return {name: integrator(name) for name in names if split_name(name)[0] in integrators()}
+
+
+def accurate_everywhere(shown: Mapping[str, OutcomeMap]) -> list[str]:
+    """The rows that are accurate in every run, whose maps are all alike; empty if they are fewer than `ALIKE`."""
+    names = [name for name, one in shown.items() if not one.outcome.any()]
+    return names if len(names) >= ALIKE else []
 
 
 def closed_forms(data: xr.Dataset, shown: Iterable[str]) -> list[str]:

@@ -12,12 +12,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.measure.verdicts import VERDICTS
+from symtop.measure.verdicts import ACCURATE, OUTSIDE, VERDICTS
 from symtop.methods.registry import split_name
 from symtop.report.style import GREY, LEAST_TEXT, OUTCOME_COLORS, WIDTH, headline, panels
 
-from .atlas import OutcomeMap, closed_forms, common, maps
-from .tables import Column
+from .atlas import OutcomeMap, accurate_everywhere, closed_forms, common, maps
+from .tables import PERIODS, Column
 
 RASTER = {"small": (55, 90), "enlarged": (150, 220)}  # pixels of a map: hatches stay visible
 SHADE = 0.72  # a hatch line is the same colour, darker
@@ -111,9 +111,15 @@ def _ticks(ends: tuple[float, float], most: int) -> tuple[range, list[str]]:
     return shown, [f"{10.0**k:g}" if -3 <= k <= 2 else rf"$10^{{{k}}}$" for k in shown]
 
 
-def draw_map(axis: Any, one: OutcomeMap, size: str = "enlarged") -> None:
-    """One map; parameter upwards, step or tolerance to the right, both logarithmic."""
-    x, y = _edges(one.settings), _edges(one.parameter)
+def draw_map(
+    axis: Any, one: OutcomeMap, size: str = "enlarged", extent: tuple[float, float, float, float] | None = None
+) -> None:
+    """One map; parameter upwards, step or tolerance to the right, both logarithmic.
+
+    Cells are equally wide, over `extent` if it is given (decimal logarithms): between the first value and the last of
+    an axis every cell still holds its own value.
+    """
+    x, y = (extent[:2], extent[2:]) if extent else (_edges(one.settings), _edges(one.parameter))
     image = painted(one.outcome, size)
     axis.imshow(image, origin="lower", extent=(*x, *y), aspect="auto", interpolation="nearest")
     axis.grid(visible=False)
@@ -141,7 +147,8 @@ def _limits(axis: Any, cell: xr.Dataset, one: OutcomeMap, over: str) -> list[str
     """The lines that belong on a map; returns the names of those that were drawn."""
     if over == "gap":  # the fall at 1.1 gap past the pole takes one step
         at = 1.1 * one.parameter / FALL_SPEED / FALL_PERIOD, one.parameter
-        return _line(axis, *at, "passage") if one.control == "step_size" else []
+        angles = split_name(str(cell["integrator"].values))[1] == "angles"  # other charts have no pole
+        return _line(axis, *at, "passage") if angles and one.control == "step_size" else []
     if Column.LINEAR_LIMIT not in cell:
         return []
     parameter = cell[Column.LIMIT_PARAMETER].values
@@ -157,8 +164,9 @@ def by_area(shown: Mapping[str, OutcomeMap]) -> list[str]:
 def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) -> Any:
     """A page of the maps over a scene's spin or gap, in the given order, each with its name and accurate share.
 
-    Of each map the part is drawn that all of them have, of which the shares are. The names of the rows with the
-    largest and the smallest share are bold, but for closed forms.
+    Of each map the part is drawn that all of them have, of which the shares are, over the whole panel: the share that
+    is printed is the share that is seen. Rows that are accurate everywhere have one panel together. The names of the
+    rows with the largest and the smallest share are bold, but for closed forms.
     """
     shown = common({name: one for name, one in maps(data, scene).items() if name in names})
     judged = [name for name in names if name not in closed_forms(data, names)] or names
@@ -166,37 +174,57 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
     drawn = dict[str, None]()  # outcomes and lines, for the legend
     across, upwards = (_reach([one[k] for one in shown.values()]) for k in (2, 1))
     inner = across[0] + INSET * (across[1] - across[0]), across[1] - INSET * (across[1] - across[0])
-    columns = min(len(names), min(COLUMNS, key=lambda count: (-(-len(names) // count), -len(names) % count)))
-    rows = -(-len(names) // columns)
-    titles = {name: _title(name, shown[name]) for name in names}
-    high = [max(titles[name].count("\n") for name in names[k : k + columns]) + 1 for k in range(0, len(names), columns)]
+    alike = accurate_everywhere({name: shown[name] for name in names})
+    alone = [name for name in names if name not in alike[1:]]  # one panel each
+    columns = min(len(alone), min(COLUMNS, key=lambda count: (-(-len(alone) // count), -len(alone) % count)))
+    rows = -(-len(alone) // columns)
+    titles = {name: _title(name, shown[name]) for name in alone}
+    if alike:
+        titles[alike[0]] = f"{len(alike)} methods\n(named below) 100%"
+    high = [max(titles[name].count("\n") for name in alone[k : k + columns]) + 1 for k in range(0, len(alone), columns)]
     height = 0.62 + 0.115 * sum(high) / rows + 0.7 / rows
     figure, axes = panels(rows, columns, width=WIDTH * max(columns, 3) / max(columns, COLUMNS[-1]), height=height)
     figure.get_layout_engine().set(w_pad=0.02, h_pad=0.015, wspace=0.01, hspace=0.01)
-    for axis in axes.flat[len(names) :]:
+    for axis in axes.flat[len(alone) :]:
         axis.set_visible(False)
-    for k, (axis, name) in enumerate(zip(axes.flat, names, strict=False)):
+    for k, (axis, name) in enumerate(zip(axes.flat, alone, strict=False)):
         one = shown[name]
         parts = zip(VERDICTS, one.shares, strict=False)
         drawn |= dict.fromkeys(word for word, share in parts if share >= SEEN)
-        draw_map(axis, one, "small")
+        draw_map(axis, one, "small", None if one.control == "none" else (*across, *upwards))
         if one.control != "none":
-            axis.set(xlim=across, ylim=upwards)
             axis.set_xticks(*_ticks(inner, 3))
             axis.set_yticks(*_ticks(upwards, 3))
         drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, integrator=name), one, over))
-        weight = "bold" if name in judged and f"{one.shares[0]:.0%}" in ends else "normal"
+        bold = name in alike or (name in judged and f"{one.shares[0]:.0%}" in ends)
+        weight = "bold" if bold else "normal"
         axis.set_title(titles[name], fontsize=LEAST_TEXT, pad=2.0, linespacing=1.0, weight=weight)
         axis.tick_params(length=1.5, pad=1.0, labelsize=LEAST_TEXT)
         if k % columns:
             axis.set_yticklabels([])
-        if k + columns < len(names):
+        if k + columns < len(alone):
             axis.set_xticklabels([])
         else:
             axis.set_xlabel(SHORT[one.control], fontsize=LEAST_TEXT, labelpad=1.0)
     figure.supylabel(AXES[over], fontsize=8.0)
     _key(figure, drawn)
+    said = [accurate_means(scene), *([listed(alike)] if alike else [])]
+    lines = [line for text in said for line in textwrap.wrap(text, round(18.0 * figure.get_figwidth()))]
+    figure.legends[0].set_title("\n".join(lines))
     return figure
+
+
+def accurate_means(scene: str) -> str:
+    """What `accurate` is in the maps of a scene."""
+    length = "one fall past the pole" if scene == "grazing" else f"{PERIODS:g} nutations"
+    return f"Accurate: within {ACCURATE:g} rad and {OUTSIDE:g} of the nutation's width of the true axis, over {length}."
+
+
+def listed(alike: Sequence[str]) -> str:
+    """The rows that share a panel; without their chart if all are on the axis."""
+    on_axis = all(split_name(name)[1] == "axis" for name in alike)
+    names = ", ".join(split_name(name)[0] if on_axis else name for name in alike)
+    return f"Accurate everywhere{', all [axis]' if on_axis else ''}: {names}."
 
 
 def _title(name: str, one: OutcomeMap) -> str:
@@ -206,7 +234,7 @@ def _title(name: str, one: OutcomeMap) -> str:
 
 
 def _reach(values: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
-    """Both ends of an axis for some maps, as decimal logarithms: their outermost values, at which cells are cut."""
+    """Both ends of an axis for some maps, as decimal logarithms: their outermost values."""
     low, high = (float(np.log10(pick([pick(one) for one in values]))) for pick in (np.min, np.max))
     return (low, high) if high > low else _edges(values[0])
 

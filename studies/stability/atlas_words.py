@@ -1,7 +1,7 @@
 """The atlas in words: for each integrator when to use it and when it fails, and what a page of maps says."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ import xarray as xr
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT
 from symtop.methods.registry import split_name
 
-from .atlas import COMMON, NOTABLE, OutcomeMap, closed_forms, common, maps, pole_effect
+from .atlas import COMMON, NOTABLE, OutcomeMap, accurate_everywhere, closed_forms, common, maps, pole_effect
 from .tables import PERIODS, Column
 
 FAILURES = {
@@ -22,6 +22,7 @@ FAILURES = {
     "step_too_small": "stop because their steps become too small",
     "out_of_budget": "exceed their budget of steps",
 }  # what runs do
+EXCEPTIONS = 2  # methods at most that a sentence on all others names apart
 
 
 class Advice(NamedTuple):
@@ -111,18 +112,37 @@ def page_message(data: xr.Dataset, scene: str, shown: Mapping[str, OutcomeMap]) 
     closed = closed_forms(data, shown)
     compared = common({name: one for name, one in shown.items() if name not in closed} or shown)
     control = "steps" if next(iter(shown.values())).control == "step_size" else "tolerances"
-    if scene == "grazing" and control == "steps":
-        shares = [(split_name(name)[1] == "angles", float(one.shares[0])) for name, one in compared.items()]
-        angles, others = ([share for turned, share in shares if turned is there] for there in (True, False))
-        if angles and others and max(angles) < min(others):
-            return (
-                f"Past a pole methods in angles are accurate in {min(angles):.0%} to {max(angles):.0%} of their runs, "
-                f"methods in other charts in {min(others):.0%} to {max(others):.0%}"
-            )
+    if scene == "grazing" and control == "steps" and (by_chart := _charts_message(compared)):
+        return by_chart
     best, worst = ends(compared)
-    place = "past a pole" if scene == "grazing" else f"of the scene {scene}"
-    apart = f"; {' and '.join(closed)}: exact at any step" if closed and len(closed) < len(shown) else ""
-    return f"The most runs {place} are accurate with {best}, the fewest with {worst}{apart}"
+    place = "past a pole" if scene == "grazing" else f"on tops like {scene}"
+    apart = closed and len(closed) < len(shown)
+    after = f" after {' and '.join(closed)}, exact at any step," if apart else ""
+    return f"At equal {control} {place} the most runs{after} are accurate with {best}, the fewest with {worst}"
+
+
+def _charts_message(compared: Mapping[str, OutcomeMap]) -> str:
+    """How far methods in angles are behind all others; nothing if more than `EXCEPTIONS` of them are not behind."""
+    shares = {name: float(one.shares[0]) for name, one in compared.items()}
+    others = {name: share for name, share in shares.items() if split_name(name)[1] != "angles"}
+    angles = {name: share for name, share in shares.items() if name not in others}
+    beside = {name: share for name, share in angles.items() if others and share >= min(others.values())}
+    behind = [share for name, share in angles.items() if name not in beside]
+    if not behind or len(beside) > EXCEPTIONS:
+        return ""
+    charts = {split_name(name)[1] for name in others}
+    on = "on the axis" if charts == {"axis"} else "in other charts"
+    apart = ", ".join(f"{split_name(name)[0]} ({share:.0%})" for name, share in beside.items())
+    return (
+        f"Past a pole methods {on} are accurate in {_span(others.values())} of their runs, methods in angles in "
+        f"{_span(behind)}{f', but for {apart}' if apart else ''}"
+    )
+
+
+def _span(shares: Collection[float]) -> str:
+    """The smallest and the largest of some shares."""
+    low, high = f"{min(shares):.0%}", f"{max(shares):.0%}"
+    return low if low == high else f"{low} to {high}"
 
 
 def caption(data: xr.Dataset, scene: str, names: Sequence[str]) -> str:
@@ -143,9 +163,11 @@ def caption(data: xr.Dataset, scene: str, names: Sequence[str]) -> str:
         "r = 1 is the spin from which a top sleeps (spins upright and stays so)"
     )  # fmt: skip
     control = "step" if shown[names[0]].control == "step_size" else "tolerance"
+    together = ", one map for all without a wrong run" if accurate_everywhere(compared) else ", a map each"
     return (
-        f"Outcome of every run of {len(names)} rows, a map each, named by method and chart, with the share of its map "
-        f"that is accurate: {what}. The {control} grows to the right. Bold: the largest share and the smallest. "
+        f"Outcome of every run of {len(names)} rows{together}, named by method and chart, with the share of its map "
+        f"that is accurate: {what}. The {control} grows to the right; an equal {control} is not an equal cost. Bold: "
+        "the largest share and the smallest. "
         f"{_counted(shown, compared)}Accurate in the largest part of its map: {best}; "
         f"in the smallest: {worst}. {early}{_without_limit(data, scene, shown) if scene != 'grazing' else ''}"
     )

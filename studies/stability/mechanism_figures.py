@@ -1,7 +1,6 @@
 """Six ways to fail, a figure each, with what theory says as a thin grey line.
 
-In the figure of the pole the runs that ended early are crosses above the errors, a line a method. Values below 1e-16
-are drawn there.
+In the figure of the pole a cross is where runs begin to end early. Values below 1e-16 are drawn there.
 """
 
 import textwrap
@@ -29,7 +28,9 @@ SHOWN = (
 )  # fmt: skip
 PLACED = ("stormer-verlet[angles]", "midpoint[angles]", "rk4[axis]", "strang[axis]", "gauss-4[axis]")
 GUIDE = {"color": GREY, "lw": 0.9, "zorder": 1}
-ENDED = 4.0  # rad, above any error: runs that ended early are drawn over it
+RINGED_TOGETHER = 0.1  # of h omega: rings that are closer share a label
+LABEL = 1.0  # of h omega: as wide as the label of a ring
+TALL = {"pole": 3.1, "resonances": 3.2}  # inches
 FLOOR = 1e-16  # what is smaller is drawn here
 NOTE = {"fontsize": LEAST_TEXT, "color": "#444444"}
 
@@ -44,7 +45,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 
 def _picture(data: xr.Dataset, scene: str, name: str, draw: Callable[[Any, xr.Dataset], None]) -> Picture:
-    figure, axes = panels(1, 1, height=2.7)
+    figure, axes = panels(1, 1, height=TALL.get(name, 2.7))
     part = data.sel(scene=scene)
     draw(axes[0, 0], part)
     said = messages.of_mechanism(name, part)
@@ -61,58 +62,74 @@ def _each(data: xr.Dataset, variable: str, names: Sequence[str] = SHOWN) -> list
 
 
 def _pole(axis: Any, data: xr.Dataset) -> None:
-    ends, height = {}, ENDED
-    for name, cell in _each(data, Column.GRAZING_ERROR):
-        x, y = cell[Column.PARAMETER].values, np.maximum(cell[Column.GRAZING_ERROR].values, FLOOR)
-        every = max(1, int(np.isfinite(x).sum()) // 10)
-        marks = line(name)
-        axis.plot(x, y, **marks, markevery=every)
-        gone = np.isfinite(x) & ~np.isfinite(y)
-        if gone.any():
-            height *= 2.2
-            axis.plot(x[gone][::3], np.full(int(gone.sum()), height)[::3], "x", color=marks["color"], ms=3.5, mew=0.8)
-        last = int(np.flatnonzero(np.isfinite(y))[-1])
-        ends[name] = float(x[last]), float(y[last]), str(marks["color"])
+    """Errors of all rows of fixed step; a cross where those nearer to the pole have none, since the run ended early."""
+    ends, rows = {}, messages.at_pole(data)
+    for name, (x, errors) in rows.items():
+        y = np.maximum(errors, FLOOR)
+        named = name in SHOWN or messages.lasts(name, x, y)
+        marks = line(name) if named else {"color": GREY, "lw": 0.6, "alpha": 0.6, "zorder": 1}
+        axis.plot(x, y, **marks, markevery=max(1, x.size // 10))
+        gone = np.flatnonzero(~np.isfinite(y))
+        last = int(gone[-1]) + 1 if gone.size else 0
+        if 0 < last < x.size:
+            color = marks["color"] if named else "black"
+            axis.plot(x[last], y[last], "x", color=color, ms=5, mew=1.2, zorder=4)
+        if named:
+            ends[name] = float(x[-1]), float(y[-1]), str(marks["color"])
     axis.set(xscale="log", yscale="log", xlabel=r"gap $\delta$ to the pole (rad)", ylabel="largest axis error (rad)")
-    if height > ENDED:
-        axis.axhline(ENDED, **GUIDE)
-        axis.text(0.02, 0.6 * ENDED, "crosses: ended early, no error to show", va="top",
-                  transform=axis.get_yaxis_transform(), **NOTE)  # fmt: skip
-        axis.set_ylim(top=3.0 * height)
-        powers = np.arange(np.floor(np.log10(axis.get_ylim()[0])) + 1, 1)
-        axis.set_yticks(10.0**powers)
-        axis.yaxis.set_minor_locator(NullLocator())
+    axis.set_ylim(top=1e3)
+    axis.set_yticks(10.0 ** np.arange(np.floor(np.log10(axis.get_ylim()[0])) + 1, 1, 2))
+    axis.yaxis.set_minor_locator(NullLocator())
+    said = "cross: closer to the pole runs end early\ngrey: all other methods with a fixed step"
+    axis.text(0.01, 0.98, said, va="top", transform=axis.transAxes, **NOTE)
+    axis.text(0.99, 0.01, "below $10^{-14}$: rounding, not compared", va="bottom", ha="right", transform=axis.transAxes,
+              **NOTE)  # fmt: skip
     name_ends(axis, ends)
 
 
 def _resonance(axis: Any, data: xr.Dataset) -> None:
+    """Rows whose step can turn the nutation by a third; those that lose all there have a colour and a ring."""
     ends, ringed = {}, resonant(data)
-    for name, cell in _each(data, Column.SURVIVING):
+    tried = [str(row) for row in data["integrator"].values[np.isfinite(data[Column.THIRD_TURN_PHASE].values)]]
+    for name, cell in _each(data, Column.SURVIVING, tried):
         # the resonance lies between two points of the grid
         x = np.append(cell[Column.PHASE].values, float(cell[Column.THIRD_TURN_PHASE]))
         y = np.append(cell[Column.SURVIVING].values, float(cell[Column.SURVIVING_AT_THIRD_TURN]))
         good = np.isfinite(x) & np.isfinite(y)
         order = np.argsort(x[good])
         x, y = x[good][order], y[good][order]
+        if name not in ringed:
+            axis.plot(x, y, color=GREY, lw=0.6, alpha=0.6, zorder=1)
+            continue
         marks = line(name)
-        axis.plot(x, y, **marks, markevery=5, clip_on=False)
-        if name in ringed:
-            axis.plot(ringed[name], float(cell[Column.SURVIVING_AT_THIRD_TURN]), "o", ms=11, mfc="none", mec="black",
-                      mew=0.9, clip_on=False, zorder=5)  # fmt: skip
+        axis.plot(x, y, **marks, markevery=6, clip_on=False)
         ends[name] = float(x[-1]), float(y[-1]), str(marks["color"])
     most = float(np.nanmax(data[Column.SURVIVING].values))
-    axis.set(xlabel=r"step $h\omega$ (times the frequency of the nutation)", ylabel="displacement that survives (rad)")
-    axis.set_ylim(0.0, 1.2 * most)
-    limit, third = "2: Verlet's linear limit", r"$2\sqrt{3}$: midpoint"
-    for place, label, side, shift in (
-        (3.0**0.5, r"$\sqrt{3}$: Verlet", "right", -2), (2.0, limit, "left", 2), (12.0**0.5, third, "left", 2),
-    ):  # fmt: skip
-        axis.axvline(place, color=GREY, lw=0.8, ls=(0, (5, 3)), zorder=1)
-        axis.annotate(label, (place, 1.2 * most), (shift, -2), textcoords="offset points", va="top", ha=side, **NOTE)
-    axis.annotate(f"{most:.2g} rad is the largest tried", (0.01, most), (0, 4), textcoords="offset points",
-                  xycoords=axis.get_yaxis_transform(), **NOTE)  # fmt: skip
-    axis.annotate("ringed: the nutation turns\nby a third a step", (0.01, 0.03), xycoords="axes fraction", **NOTE)
+    axis.set(xlabel=r"step $h\omega$ ($\omega$: frequency of the nutation)", ylabel="displacement that survives (rad)")
+    groups: dict[float, list[str]] = {}  # rows whose rings are at one step
+    for name, phase in sorted(ringed.items(), key=lambda one: one[1]):
+        near = next((other for other in groups if abs(other - phase) < RINGED_TOGETHER), phase)
+        groups.setdefault(near, []).append(name)
+    axis.set_ylim((-0.055 - 0.018 * max(map(len, groups.values()), default=0)) * most / 0.3, 1.1 * most)
+    places = list(groups)
+    for k, (phase, names) in enumerate(groups.items()):
+        axis.plot(phase, 0.0, "o", ms=11, mfc="none", mec="black", mew=1.0, zorder=5)
+        said = "\n".join([f"$h\\omega = {phase:.2f}$", *(split_name(name)[0] for name in names)])
+        side = _side([other - phase for other in places[:k] + places[k + 1 :]])
+        axis.annotate(said, (phase, 0.0), (-14 if side == "left" else 0, -8), textcoords="offset points", va="top",
+                      ha=side, fontsize=LEAST_TEXT)  # fmt: skip
+    axis.set_yticks([tick for tick in axis.get_yticks() if 0.0 <= tick <= 1.01 * most])
+    rest = len(tried) - len(ringed)
+    axis.annotate(f"grey: the {rest} other methods; {most:.2g} rad is the largest displacement tried", (0.01, most),
+                  (0, 4), textcoords="offset points", xycoords=axis.get_yaxis_transform(), **NOTE)  # fmt: skip
+    axis.annotate("rings: a step turns\nthe nutation by a third", (0.01, 0.05), xycoords="axes fraction", **NOTE)
     name_ends(axis, ends)
+
+
+def _side(others: Sequence[float]) -> str:
+    """How a label stands at its place, by the distances of the next: away from one that is too close."""
+    nearest = min(others, key=abs, default=np.inf)
+    return "center" if abs(nearest) > LABEL else "right" if nearest > 0.0 else "left"
 
 
 def _sleep(axis: Any, data: xr.Dataset) -> None:

@@ -32,11 +32,12 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     axes[0].fill_between([], [], [], color=style.GREY, alpha=0.3, lw=0, label="shade: up to the bound it claims")
     style.few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
+    figure.legends[0].set_title(words.measured_against(data))
     _, broken, ratio = bound_ratios(data)
     flat = float(data[ERROR].sel(integrator="closed form").max())
     style.headline(figure, words.message(data))
     caption = (
-        "True error of each source, measured against the closed form in 45 digits, at horizons from "
+        "Error of each source, measured against the closed form in 45 digits, at horizons from "
         f"{float(data['horizon'].min()):g} s to {float(data['horizon'].max()):.0e} s on {data.sizes['scene']} scenes. "
         "A "
         "source is a Taylor integration at the tolerance of its arithmetic's rounding, in the axis or the attitude "

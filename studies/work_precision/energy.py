@@ -17,6 +17,7 @@ from symtop.measure import ranking
 from symtop.methods.registry import split_name
 from symtop.runner.study import Table
 
+ROUNDED = 1e-12  # an error below it is not compared between horizons
 CHARTS = {"axis": "the axis and the angular momentum (e, L)", "angles": "Euler angles"}
 CLASSIC = ("rk4", "rk45-compiled", "taylor")  # compared in each chart that they have
 KINDS = ("at every run time", "at short run times only", "at long run times only", "in turns", "at none")
@@ -107,17 +108,22 @@ def at_steps(runs: xr.Dataset, steps: float) -> tuple[float, float]:
     return tuple(float(np.exp(np.interp(np.log(steps), np.log(x), np.log(one)))) for one in (y, work / x))
 
 
-def growth_at_equal_settings(runs: xr.Dataset, quantity: str) -> float:
-    """Median ratio of an error at the last horizon to that at the first, over settings that were run at both."""
+def ratios_at_equal_settings(runs: xr.Dataset, quantity: str) -> list[float]:
+    """An error at the last horizon over that at the first, for each setting run at both; none where it is rounding."""
     near, later = runs.isel(horizon=0), runs.isel(horizon=-1)
     ratios = [
         later[quantity].values[j] / near[quantity].values[k]
         for k, setting in enumerate(near["setting_value"].values)
         for j in np.flatnonzero(np.isclose(later["setting_value"].values, setting, rtol=1e-9))
-        if near[quantity].values[k] > 1e-12
+        if near[quantity].values[k] > ROUNDED
     ]
-    good = [ratio for ratio in ratios if np.isfinite(ratio)]
-    return float(np.median(good)) if good else np.nan
+    return [float(ratio) for ratio in ratios if np.isfinite(ratio)]
+
+
+def growth_at_equal_settings(runs: xr.Dataset, quantity: str) -> float:
+    """Median ratio of an error at the last horizon to that at the first, over settings that were run at both."""
+    ratios = ratios_at_equal_settings(runs, quantity)
+    return float(np.median(ratios)) if ratios else np.nan
 
 
 def table(data: xr.Dataset) -> Table:

@@ -1,23 +1,22 @@
 """The figures of the work-precision study: fronts, the fastest rows, how much slower the others are, energy, parts."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from symtop.measure.phase import PARTS
-from symtop.report.style import few_ticks, grid, headline, legend_below, line, number
+from symtop.report.style import BLUE, GREY, LEAST_TEXT, VERMILLION, headline, legend_below, number, panels
 from symtop.runner.study import Picture
 
 from . import energy, energy_figures, fronts, words
-from .fronts import COSTS, curve
 from .rankings import slowdown, winners
 
 PARTS_OF = ("midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]", "rk4[axis]",
             "rk45-compiled[angles]", "gauss-8[axis]")  # fmt: skip
 SAME = 1.5  # an error that grows less stays the same
-FILLS = "Open markers: Euler angles; full ones: (e, L)."
+MARKS = {"shape": ("o", "black", "black"), "nutation_lag": ("s", "white", VERMILLION),
+         "precession_lag": ("^", "white", BLUE)}  # fmt: skip
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
@@ -34,19 +33,37 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 
 def _parts(data: xr.Dataset) -> Picture:
+    """How the parts of the error grow from one horizon to the other at equal steps, a row a method."""
     scene = data.isel(scene=0)
-    scene = scene.assign(evaluations_a_nutation=scene["force_evaluations"] / scene["horizon"])  # alike at equal steps
-    name, spans = str(scene["scene"].values), words.spans(data)
     rows = [row for row in PARTS_OF if row in data["integrator"].values]
-    shape = {"height": 1.9, "sharex": True, "sharey": "row"}
-    figure, axes = grid(2 * len(PARTS), 2, (COSTS["evaluations_a_nutation"], ""), **shape)
-    for row, (part, label) in enumerate(PARTS.items()):
-        for far, axis in zip((0, -1), axes[2 * row : 2 * row + 2], strict=True):
-            _draw(axis, scene.isel(horizon=far), rows, part, "evaluations_a_nutation", 5e-17)
-            axis.set(title="" if row else f"scene {name}, {spans[far]}", ylabel="" if far else label)
-    few_ticks(*axes)
-    legend_below(figure, axes)
     first, last = (f"{data['horizon'].values[far]:g}" for far in (0, -1))
+    length = float(data["horizon"][-1] / data["horizon"][0])
+    figure, axes = panels(1, 1, height=0.36 * len(rows) + 0.9)
+    axis = axes[0, 0]
+    for place, row in enumerate(rows):
+        for k, part in enumerate(PARTS):
+            marker, fill, color = MARKS[part]
+            height = place + 0.22 * (k - 1)
+            ratios = energy.ratios_at_equal_settings(scene.sel(integrator=row), part)
+            label = PARTS[part].partition(" (")[0]
+            if not ratios:
+                box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+                said = f"{label}: at rounding or over budget"
+                axis.text(1.6 * length, height, said, fontsize=LEAST_TEXT, va="center", bbox=box)
+                continue
+            axis.plot(ratios, [height] * len(ratios), "|", color=color, ms=5, mew=0.7, alpha=0.6, zorder=2)
+            axis.plot(np.median(ratios), height, marker, mfc=fill, mec=color, ms=6, mew=1.2, zorder=3,
+                      label=f"{label}, median")  # fmt: skip
+    axis.plot([], [], "|", color="#444444", ms=5, mew=0.7, label="one step or tolerance")
+    for at, said in ((1.0, "the same"), (length, "as the time")):
+        axis.axvline(at, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
+        axis.annotate(said, (at, 1.0), (0, 3), xycoords=("data", "axes fraction"), textcoords="offset points",
+                      ha="center", fontsize=LEAST_TEXT)  # fmt: skip
+    axis.set(xscale="log", ylim=(len(rows) - 0.5, -0.5), yticks=range(len(rows)), yticklabels=rows)
+    axis.set_xlabel(f"error over {last} nutations / error over {first}, at equal steps or tolerances")
+    axis.grid(visible=False, axis="y")
+    axis.tick_params(axis="y", length=0)
+    legend_below(figure, axes)
     growths = {part: [energy.growth_at_equal_settings(scene.sel(integrator=row), part) for row in rows]
                for part in ("shape", "nutation_lag")}  # fmt: skip
     known = [[value for value in values if np.isfinite(value)] for values in growths.values()]
@@ -54,15 +71,21 @@ def _parts(data: xr.Dataset) -> Picture:
         headline(figure, growth_message((first, last), *known))
     else:
         headline(figure, f"Parts of the axis error over {first} and {last} nutations")
+    figure.legends[0].set_title(
+        "Shape: distance from the true path. Lags: how far the run is behind or ahead on it, in the angle of the\n"
+        f"nutation and of the precession. Scene {scene['scene'].values}; errors over {first} nutations above "
+        f"{number(energy.ROUNDED, 1)}."
+    )
     return Picture(
         "parts",
         figure,
-        f"Parts of the axis error on {name} against force evaluations a nutation, which are alike at equal "
-        "steps: distance from the true path (shape), and how far the run is behind or "
-        f"ahead of the truth in its nutation and in its precession (lags). From {first} to {last} nutation periods, at "
-        f"equal step or tolerance, the shape error grows by a factor of {words.growth(scene, rows, 'shape')}; the "
-        f"nutation lag by a factor of {words.growth(scene, rows, 'nutation_lag')}. {FILLS}",
-        "Shape error, nutation lag and precession lag against work at two horizons.",
+        f"How the parts of the axis error on {scene['scene'].values} grow from {first} to {last} nutation periods at "
+        "equal step or tolerance: distance from the true path (shape), and how far the run is behind or ahead of the "
+        "truth in its nutation and in its precession (lags). Large marks: medians over the settings that were run at "
+        f"both and whose error is above {energy.ROUNDED:g} at the first; thin ones: each of them. The shape error "
+        f"grows by a factor of {words.growth(scene, rows, 'shape')}; the nutation lag by a factor of "
+        f"{words.growth(scene, rows, 'nutation_lag')}.",
+        "Dot plot of the growth of shape error, nutation lag and precession lag, a row a method.",
     )
 
 
@@ -70,14 +93,6 @@ def growth_message(horizons: tuple[str, str], shapes: Sequence[float], lags: Seq
     """How the errors of the path and of the nutation's phase grow from one horizon to another at equal steps."""
     same, lag = sum(value < SAME for value in shapes), number(float(np.median(lags)))
     return (
-        f"From {horizons[0]} to {horizons[1]} nutations the shape error stays the same with {same} of the "
-        f"{len(shapes)} methods above rounding, at equal steps; the lag in the nutation grows {lag} times in the median"
+        f"The shape error stays the same with {same} of the {len(shapes)} methods above rounding from {horizons[0]} to "
+        f"{horizons[1]} nutations; the lag in the nutation grows {lag} times in the median"
     )
-
-
-def _draw(axis: Any, cell: xr.Dataset, names: Sequence[str], quantity: str, cost: str, floor: float) -> None:
-    """An error of a few rows against cost; `cell` is one scene and one horizon."""
-    for name in names:
-        x, y = curve(cell.sel(integrator=name), quantity, cost, floor)
-        axis.plot(x, y, **line(name, 0.9), lw=1.0, label=name, zorder=2)
-    axis.set(xscale="log", yscale="log")

@@ -1,21 +1,22 @@
 """The fronts: error against cost, a panel a scene, with the runs that no other run beats in both."""
 
+import textwrap
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
+from symtop.measure.work import TARGETS
 from symtop.report.figures import bound_of, error_band, pareto
-from symtop.report.style import GREY, few_ticks, grid, headline, legend_below, line, look
+from symtop.report.style import GREY, RAISED, few_ticks, grid, headline, legend_below, line, look
 from symtop.runner.study import Picture
 
 from . import words
 
-COSTS = {"seconds": "wall time of one run (s)", "force_evaluations": "force evaluations of one run",
-         "evaluations_a_nutation": "force evaluations a nutation"}  # fmt: skip
+COSTS = {"seconds": "wall time of one run (s)", "force_evaluations": "force evaluations of one run"}
 BELOW_AXIS = {"seconds": "time of a run (s)", "force_evaluations": "force evaluations"}  # of a small panel
 BEATEN = {"seconds": "time", "force_evaluations": "evaluations"}  # what a run on the front needs least of
 LEAST = 1e-15  # the lowest error that is drawn, where the reference has no bound
@@ -23,6 +24,7 @@ OTHERS = {"color": GREY, "lw": 0.5, "alpha": 0.5, "zorder": 1}  # a line without
 REST = "another method, on the front"
 OFF = "runs that another beats"
 CLOSED = "closed form: takes no steps, not ranked"
+MOST_OTHERS = 5  # named of those whose runs are open circles
 COLUMNS = 4
 
 
@@ -47,8 +49,7 @@ def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     fronts = {scene: front(cell.sel(integrator=compiled), cost, floors[scene]) for scene, cell in cells.items()}
     owners = Counter(owner for one in fronts.values() for owner in one.owners)
     most = [row for row, _ in owners.most_common(2)]
-    labels = BELOW_AXIS[cost], "largest axis error (rad)"
-    figure, axes = grid(len(scenes), COLUMNS, labels, height=1.75, sharex=True, sharey=True)
+    figure, axes = grid(len(scenes), COLUMNS, (BELOW_AXIS[cost], ""), height=1.75, sharex=True, sharey=True)
     for axis, (scene, cell) in zip(axes, cells.items(), strict=True):
         error_band(axis, cell["axis_bound"].values, LEAST)
         for row in compiled:
@@ -60,11 +61,16 @@ def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
         axis.set_title(f"{scene}\n{fronts[scene].of(most)} of {len(fronts[scene].owners)} runs")
         axis.tick_params(which="minor", length=0)
     axes[0].plot([], [], **(OTHERS | {"lw": 0.8, "alpha": 0.8}), label=OFF)
+    figure.supylabel("largest axis error (rad)", fontsize=8.0)
     few_ticks(*axes, most=4)
     legend_below(figure, axes)
-    figure.legends[0].set_title(
-        f"The front: runs that no other beats in both {BEATEN[cost]} and error, of all compiled methods on a scene."
-    )
+    said = f"The front: runs that no other beats in both {BEATEN[cost]} and error, of all compiled methods on a scene. "
+    if cost == "seconds":
+        said += (
+            f"Only runs that were timed are drawn: the cheapest of a method for {', '.join(map(power, TARGETS))} rad, "
+            "and some for the comparison of energies. "
+        )
+    figure.legends[0].set_title("\n".join(textwrap.wrap(f"{said}{others(owners, most)}", 116)))
     whole = sum(owners.values())
     headline(figure, message(most, sum(owners[row] for row in most), whole, BEATEN[cost], words.spans(data)[far]))
     timed = (
@@ -85,6 +91,22 @@ def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
         f"Grey band: below the error bound of the reference.{timed}",
         f"Log-log work-precision plots of the axis error against {COSTS[cost]}, one panel a scene.",
     )
+
+
+def power(target: float) -> str:
+    """A target as a power of ten."""
+    return f"10{str(round(np.log10(target))).translate(RAISED)}"
+
+
+def others(owners: Mapping[str, int], most: Sequence[str]) -> str:
+    """Whose the open circles of a front are: the rows that its title does not name, with the most runs first."""
+    rest = {row: count for row, count in owners.items() if row not in most}
+    ranked = sorted(rest, key=lambda row: -rest[row])
+    if not ranked:
+        return ""
+    more = len(ranked) - MOST_OTHERS
+    listed = ", ".join(f"{row} ({rest[row]})" for row in ranked[:MOST_OTHERS])
+    return f"Open circles: {listed}{f' and {more} more' if more > 0 else ''}."
 
 
 def message(most: Sequence[str], count: int, whole: int, unit: str, span: str) -> str:

@@ -10,7 +10,7 @@ from symtop.measure.errors import QUANTITIES
 from symtop.runner.study import Chart, Opening, Series, Table
 
 from . import energy
-from .figures import COSTS
+from .fronts import COSTS
 from .words import COMPARED, not_asked, of_implementation, seconds, spans
 
 

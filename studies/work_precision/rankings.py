@@ -75,9 +75,19 @@ def winners(data: xr.Dataset) -> Picture:
         f"The fastest compiled row, method[chart], on each scene, for each axis error that steps and tolerances were "
         "searched for. "
         f"Most often: {most}, of {len(met)} cells.{words.not_asked(data)} Pale and with a tilde: its lead over at "
-        "least one other row is within the noise. All times are measured; the closed form is not ranked.",
+        "least one other row is within the noise. All times are measured; the closed form is not ranked. "
+        f"{_taking_part(data)}",
         "Coloured cells naming the fastest row, a line a scene, a column an accuracy.",
     )
+
+
+def _taking_part(data: xr.Dataset) -> str:
+    """How many rows were compared, and that another study compares fewer."""
+    ranked = ranking.ranked(data)
+    rows = [row for row in words.of_implementation(data, "compiled") if row in ranked]
+    more = [row for row in ("taylor-longdouble[axis]", "taylor-quad[axis]") if row in rows]
+    beside = f", {' and '.join(more)} among them, which the study phase_diagram leaves out" if more else ""
+    return f"{len(rows)} rows take part{beside}."
 
 
 class Middle(NamedTuple):

@@ -339,7 +339,9 @@ def test_the_message_of_the_pole_is_that_of_the_step_drawn():
     part = xr.Dataset(columns, coords={"integrator": ["stormer-verlet[angles]", "strang[axis]"]})
     said = messages.of_mechanism("pole", part)
     assert said.startswith("1 of 1 fixed-step methods in angles end early within 0.0001 rad of a pole")
-    assert "the 1 in other charts err at most 2 times as much" in said
+    assert said.endswith("the 1 in other charts have errors that differ at most 2 times between all gaps")
+    part[Column.GRAZING_ERROR][1, 2] = 4e-5  # the base is the smallest error at any gap
+    assert "differ at most 5 times" in messages.of_mechanism("pole", part)
 
 
 def test_the_runs_that_outlast_the_law_of_the_separatrix_are_named_and_not_counted():
@@ -411,6 +413,42 @@ def test_shares_of_a_page_are_of_what_all_its_maps_have_and_panels_share_their_a
         assert axis.get_title().endswith("67%")
     key = {text.get_text() for text in drawn.figure.legends[0].get_texts()}
     assert key == {"accurate", "bounded but wrong"}
+
+
+def test_the_share_of_a_coarse_map_is_seen_beside_that_of_a_fine_one():
+    data = tolerances([1e-6, 1e-5, 1e-4, 1e-3, 1e-2], [1e-6, 1e-4, 1e-2])
+    shares = [one.shares[0] for one in atlas.common(atlas.maps(data, "cusp")).values()]
+    drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-tolerances"]
+    for axis in (axis for axis in drawn.figure.axes if axis.get_visible()):
+        printed = float(axis.get_title().split()[-1].rstrip("%")) / 100.0
+        assert any(printed == pytest.approx(share, abs=0.005) for share in shares)
+        left, right, low, high = axis.images[0].get_extent()  # all of it is inside the panel
+        assert (left, right, low, high) == pytest.approx((*axis.get_xlim(), *axis.get_ylim()))
+        painted = np.isclose(axis.images[0].get_array(), to_rgb(OUTCOME_COLORS["accurate"])).all(axis=-1)
+        assert painted.mean() == pytest.approx(printed, abs=0.02)
+
+
+def test_rows_that_are_accurate_everywhere_share_a_panel():
+    right = hand_made([[A, A, A]] * 4).sel(scene="cusp", integrator="midpoint", drop=True)
+    wrong = hand_made([[A, B, B]] * 4).sel(scene="cusp", integrator="midpoint", drop=True)
+    names = ["yoshida-4[axis]", "suzuki-4[axis]", "strang[axis]", "rk4[axis]"]
+    data = store.combine([(Case("cusp", name), wrong if name == "rk4[axis]" else right) for name in names])
+    drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-steps"]
+    titles = [axis.get_title() for axis in drawn.figure.axes if axis.get_visible()]
+    assert titles == ["3 methods\n(named below) 100%", "rk4\n[axis] 33%"]
+    assert "everywhere, all [axis]: yoshida-4, suzuki-4, strang." in drawn.figure.legends[0].get_title().get_text()
+
+
+def test_the_page_of_the_pole_tells_charts_apart_and_names_an_exception():
+    rows = {"rk4[axis]": [0, 0, 0], "strang[axis]": [0, 0, 1], "rk4[angles]": [0, 1, 1],
+            "stormer-verlet-reversible[angles]": [0, 0, 1]}  # fmt: skip
+    axes = np.array([1e-6, 0.3]), np.array([0.001, 0.01, 0.1]), "step_size"
+    shown = {name: atlas.OutcomeMap(np.array([row] * 2), *axes) for name, row in rows.items()}
+    data = xr.Dataset(coords={"integrator": list(rows)})
+    assert atlas_words.page_message(data, "grazing", shown) == (
+        "Past a pole methods on the axis are accurate in 67% to 100% of their runs, methods in angles in 33%, but for "
+        "stormer-verlet-reversible (67%)"
+    )
 
 
 def test_a_tie_has_no_single_winner():

@@ -4,8 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.optimize import root
-from symtop_studies.reduction import commutation
+from symtop_studies.reduction import commutation, words
 from symtop_studies.reduction.commutation import gap, kernel_path, path, reduced_first
 from symtop_studies.reduction.tables import Column, commutation_table, unreduced_forms
 
@@ -14,6 +15,7 @@ from symtop.measure.order import power_law
 from symtop.methods import registry
 from symtop.methods.discrete_lagrangian import rule_of
 from symtop.methods.quadrature import Quadrature
+from symtop.report.style import number
 from tests.conftest import random_scenes
 
 SCENES = ("spheroid", "goldstein")
@@ -121,6 +123,16 @@ def test_an_unreduced_form_steps_the_same_rule_whatever_it_is_called(monkeypatch
     known["whole"] = dataclasses.replace(known.pop("midpoint-unreduced"), name="whole")
     monkeypatch.setattr(registry, "_registry", known)
     assert unreduced_forms() == {"midpoint": "whole", "trapezoidal": "trapezoidal-unreduced"}
+
+
+@pytest.mark.parametrize(("gap", "judged"), [(2e-13, "nothing but rounding"), (3e-4, "more than rounding")])
+def test_the_title_of_the_twins_says_which_order_and_whether_the_difference_is_rounding(gap, judged):
+    gaps = {name: (("scene", "integrator", "sample"), [[[0.0, value]]]) for name, value in
+            ((Column.THETA_GAP, 1e-15), (Column.PHI_GAP, gap), (Column.PSI_GAP, 1e-14))}  # fmt: skip
+    data = xr.Dataset(gaps, coords={"scene": ["spheroid"], "integrator": ["midpoint"]})
+    said = words.unreduced_message(data, ["midpoint"])
+    assert f"after discretising changes {judged}: midpoint with and without it" in said
+    assert said.endswith(f"{number(gap)} rad")
 
 
 def test_a_method_that_has_no_reduced_twin_is_refused_in_one_sentence():

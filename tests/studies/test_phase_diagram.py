@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.phase_diagram import checks, figures, laws, runs, tables, words
+from symtop_studies.phase_diagram import checks, figures, laws, runs, study, tables, words
 from symtop_studies.phase_diagram.tables import TARGETS, diagram
 
 import symtop
@@ -102,6 +102,14 @@ def test_step_times_number_is_exact():
     h = runs.steps_of(tops, 17.48)
     assert all(float(step).as_integer_ratio()[0].bit_length() <= runs.BITS for step in h)
     np.testing.assert_allclose(h * 17.48, tops.period, rtol=1e-7)
+
+
+def test_the_diagram_says_which_rows_take_part():
+    ladders = xr.Dataset(coords={"integrator": ["series[axis]", "midpoint[angles]"]})
+    said = words.part_sentence(xr.DataTree.from_dict({tables.LADDERS: ladders}))
+    assert said.startswith("2 rows take part, on the axis if they name no chart: series, midpoint[angles].")
+    assert "as taylor-longdouble and taylor-quad" in said
+    assert not any(name.startswith(("taylor-longdouble", "taylor-quad")) for name in study.CANDIDATES)
 
 
 def test_costs_rise_with_the_horizon_and_with_the_accuracy(data):

@@ -283,6 +283,29 @@ def test_a_method_made_worse_loses():
     assert (won.row, won.share, won.next_share) == (1, Share(500, 500), Share(0, 500))
 
 
+def test_slowdowns_show_only_who_is_the_cheapest_somewhere_and_say_which_tops_are_asked():
+    data = tree({"a": [1.0, 1.0, 1.0, NAN], "b": [2.0, 1.05, 0.5, NAN], "c": [1.01, 3.0, 3.0, NAN]})
+    held = {name: ("scene", [value]) for name, value in (("nutations", 10.0), ("budget", 1e3))}
+    data["short"] = data["short"].to_dataset().assign(held)
+    drawn = figures.draw_slowdowns(data, "short")
+    axis = drawn.figure.axes[0]
+    rows = [text.get_text() for text in axis.get_yticklabels()]
+    assert rows == ["b", "nobody"]  # a is level with another on two tops and slower on the third
+    shares = {text.xy[1]: text.get_text() for text in axis.texts if text.xy[0] == 1.3 and text.xy[1] >= 0}
+    assert shares == {0: "33%", 1: "67%"}
+    note = drawn.figure.legends[0].get_title().get_text().replace("\n", " ")
+    assert "of 4 tops, to 0.001 rad the 3 whose nutation is wider than the error" in note
+    assert "the 1 of 3 methods that are the cheapest on at least one top" in note
+
+
+def test_what_is_not_zero_is_not_printed_as_zero_and_what_is_not_all_not_as_all():
+    shares = Share(0, 9), Share(1, 9000), Share(32, 9883), Share(1, 2)
+    assert [messages.share_won(share) for share in shares] == ["0%", "<0.1%", "0.3%", "50%"]
+    assert messages.found_of(Share(9998, 10000)) == "all but 2 of 10,000 wrong runs"
+    assert messages.found_of(Share(70, 70)) == "all 70 wrong runs"
+    assert messages.found_of(Share(70, 100), whole=False) == "70.0% of wrong runs"
+
+
 def test_a_winner_by_times_that_are_not_met_again_is_not_sure():
     even = {"a": np.ones(500), "b": np.ones(500)}
     for price, sure in (({"a": (1.0, 1.0), "b": (1.3, 1.3)}, True), ({"a": (1.0, 1.4), "b": (1.3, 1.3)}, False)):

@@ -275,6 +275,17 @@ def test_the_title_of_the_truth_study_has_a_number_whatever_was_run_longest():
     assert "nan" not in said + alone
 
 
+def test_the_truth_study_says_what_errors_are_measured_against_and_what_else_agrees():
+    errors = [[[1e-31, 2e-31], [3e-16, 5e-16]]]
+    coords = {"scene": ["spheroid"], "integrator": ["quadruple, attitude", "closed form"], "horizon": [8.0, 1e2]}
+    data = xr.Dataset({truth_tables.ERROR: (("scene", "integrator", "horizon"), errors)}, coords=coords)
+    said = truth_words.measured_against(data).replace("\N{NO-BREAK SPACE}", " ")
+    assert "from the closed form in 45 digits" in said
+    assert said.endswith("agrees with it to 2 × 10⁻³¹ rad.")
+    alone = truth_words.measured_against(data.sel(integrator=["closed form"]))
+    assert alone == "Error: the distance from the closed form in 45 digits."
+
+
 @pytest.mark.parametrize(("bound", "holding"), [(2e-9, 2), (5e-10, 1)])
 def test_the_truth_study_counts_the_bounds_that_an_error_exceeds(bound, holding):
     data = xr.Dataset({

@@ -301,6 +301,21 @@ def test_the_title_of_slowdowns_names_the_fastest_before_the_one_that_fails_leas
     assert rankings.middles(table) == (3, [("quick", 2, 1.0), ("sure", 3, 60.0)])
 
 
+def test_the_open_circles_of_a_front_are_named():
+    owners = {"a": 9, "b": 1, "c": 3, "d": 1, "e": 1, "f": 1, "g": 1}
+    assert fronts.others(owners, ["a"]) == "Open circles: c (3), b (1), d (1), e (1), f (1) and 1 more."
+    assert fronts.others({"a": 9}, ["a"]) == ""
+    assert fronts.power(1e-12) == "10⁻¹²"
+
+
+def test_the_parts_are_compared_at_equal_settings_and_above_rounding():
+    settings = [[0.1, 0.05, 0.01], [0.05, 0.1, np.nan]]
+    runs = xr.Dataset({"setting_value": (("horizon", "setting"), settings),
+                       "shape": (("horizon", "setting"), [[1e-3, 1e-4, 1e-14], [2e-4, 3e-3, np.nan]])})  # fmt: skip
+    assert energy.ratios_at_equal_settings(runs, "shape") == pytest.approx([3.0, 2.0])
+    assert energy.growth_at_equal_settings(runs, "shape") == pytest.approx(2.5)
+
+
 def test_the_title_of_the_parts_tells_what_stays_from_what_grows():
     said = work_figures.growth_message(("10", "1000"), [1.0, 1.02, 99.0], [100.0, 101.0, 9e3])
     assert "stays the same with 2 of the 3 methods" in said
