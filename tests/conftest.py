@@ -6,6 +6,7 @@ import math
 import os
 import random
 import shutil
+import signal
 import sys
 from pathlib import Path
 
@@ -13,6 +14,9 @@ import pytest
 from click.testing import CliRunner
 
 os.environ.setdefault("SYMTOP_CACHE", str(Path(__file__).resolve().parent.parent / ".pytest_cache" / "symtop"))
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what runs in its background like that
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 from symtop.cli.main import main
 from symtop.methods import registry
