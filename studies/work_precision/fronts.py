@@ -104,9 +104,10 @@ def others(owners: Mapping[str, int], most: Sequence[str]) -> str:
     ranked = sorted(rest, key=lambda row: -rest[row])
     if not ranked:
         return ""
-    more = len(ranked) - MOST_OTHERS
+    unnamed = ranked[MOST_OTHERS:]
     listed = ", ".join(f"{row} ({rest[row]})" for row in ranked[:MOST_OTHERS])
-    return f"Open circles: {listed}{f' and {more} more' if more > 0 else ''}."
+    more = f"; {len(unnamed)} other{'s' * (len(unnamed) > 1)} ({sum(rest[row] for row in unnamed)})" if unnamed else ""
+    return f"Open circles: {listed}{more}."
 
 
 def message(most: Sequence[str], count: int, whole: int, unit: str, span: str) -> str:

@@ -303,7 +303,7 @@ def test_the_title_of_slowdowns_names_the_fastest_before_the_one_that_fails_leas
 
 def test_the_open_circles_of_a_front_are_named():
     owners = {"a": 9, "b": 1, "c": 3, "d": 1, "e": 1, "f": 1, "g": 1}
-    assert fronts.others(owners, ["a"]) == "Open circles: c (3), b (1), d (1), e (1), f (1) and 1 more."
+    assert fronts.others(owners, ["a"]) == "Open circles: c (3), b (1), d (1), e (1), f (1); 1 other (1)."
     assert fronts.others({"a": 9}, ["a"]) == ""
     assert fronts.power(1e-12) == "10⁻¹²"
 
