@@ -14,17 +14,7 @@ from symtop.methods.loop import Loop, March
 from symtop.methods.many import GROUP, Many, Whole, groups, members_of, refused
 from symtop.methods.outcomes import LEFT_CHART, OUTCOMES
 from symtop.methods.plan import Plan, Run
-from symtop.methods.preparation import (
-    Later,
-    Pack,
-    Preparation,
-    Requirement,
-    Scaled,
-    Shown,
-    as_fields,
-    as_it_is,
-    as_it_steps,
-)
+from symtop.methods.preparation import Later, Pack, Preparation, Scaled, Shown, as_fields, as_it_is, as_it_steps
 from symtop.methods.registry import Array, Solver
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop, flat
@@ -36,11 +26,10 @@ Present = Callable[[Any, Array, Array], Array]
 class _Whole(NamedTuple):
     """A run in one compiled call, put together once."""
 
-    run: Callable[..., tuple[int, int, int]]
     rule: Any  # what compiled code makes the rule from
     fit: Callable[..., Any] | None  # the same of a rule that hangs on the start
-    check: Requirement | None
     size: int  # of a sample
+    alone: tuple[Any, ...]  # what a run of one takes, for a plain tuple comes apart quicker than a NamedTuple
     many: Callable[[], Callable[..., None]]  # the loop over members around `run`
     blocks: Callable[[], Blocks] | None  # many members in lanes
     table: Any  # the rule as the method has it
@@ -78,16 +67,15 @@ class FixedStep:
         if whole is None or marks.item(-1) > loops.BLOCK:
             return self._in_stretches(top, start, plan)
         # a field at a time, `counts`, and the class's constructor, which passes its arguments on, take 0.6 us more
-        run, rule, fit, check, size = whole[:5]
+        run, rule, fit, check, size, evaluations, each_step, counted = whole.alone
         if check is not None:
             check(start)
         samples, numbers = len(marks), flat(top, start)
-        states, momenta = np.empty((samples, size)), np.empty((samples, 2))
+        states, momenta = np.empty((samples, size)), np.empty((2, samples))  # a row costs half of what a column does
         given = rule if fit is None else fit(numbers, h)
         steps, work, outcome = run(numbers, given, h, marks, states, momenta)
-        evaluations, iterations = work * self.evaluations + steps * self.each_step, work if self.implicit else 0
-        ended, p_phi, p_psi = OUTCOMES[outcome], momenta[:, 0], momenta[:, 1]
-        seen = states, p_phi, p_psi, steps, evaluations, iterations, ended, steps * h
+        spent, ended = work * evaluations + steps * each_step, OUTCOMES[outcome]
+        seen = states, momenta[0], momenta[1], steps, spent, work * counted, ended, steps * h
         return tuple.__new__(Run, seen)
 
     def _in_stretches(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
@@ -172,7 +160,9 @@ class FixedStep:
         lanes = None if fit is not None else loop.lanes(rule)
         blocks = None if lanes is None else partial(loop.blocks, lanes, as_fields(rule)[0], *parts[1:])
         many = partial(loop.many, *parts)
-        return _Whole(loop.whole(*parts), numbers, fit, prepare.check, size, many, blocks, rule)
+        costs = self.evaluations, self.each_step, int(self.implicit)
+        alone = loop.whole(*parts), numbers, fit, prepare.check, size, *costs
+        return _Whole(numbers, fit, size, alone, many, blocks, rule)
 
 
 def _fitting(rule: Scaled, pack: Pack) -> Callable[[tuple[float, ...], float], Any]:

@@ -111,10 +111,10 @@ class Loop:
     A run records the state after ``marks[j]`` steps for each j (increasing whole numbers; a mark at 0 records the
     start). `begun` and `advance` do the same in stretches, and the bits do not depend on where a stretch ends.
     ``whole(kind, prepare, scale, sample)`` is a run in one compiled call, from the plain numbers of
-    `symtop.methods.preparation` to filled arrays: ``run(numbers, rule, h, marks, states, momenta)`` returns steps, work
-    and outcome. `many` takes the same parts and is the loop over members around that run (`many.over_members`).
-    `lanes` is what the family has for a rule to run many members in lanes, if it has it, and ``blocks(lanes, ...)`` the
-    kernels of that, from the same parts again.
+    `symtop.methods.preparation` to filled arrays: ``run(numbers, rule, h, marks, states, momenta)``, with momenta
+    (2, samples), returns steps, work and outcome. `many` takes the same parts and is the loop over members around that
+    run (`many.over_members`). `lanes` is what the family has for a rule to run many members in lanes, if it has it, and
+    ``blocks(lanes, ...)`` the kernels of that, from the same parts again.
     """
 
     begin: Callable[..., Any]
@@ -140,7 +140,7 @@ class Loop:
         state, low, carry, k = at
         if isinstance(carry, np.ndarray):  # a kernel's working space: `at` stays what it is
             carry = carry.copy()
-        states, momenta = np.empty((len(marks), len(state))), np.empty((len(marks), 2))
+        states, momenta = np.empty((len(marks), len(state))), np.empty((2, len(marks)))
         states.fill(np.nan)
         momenta.fill(np.nan)
         j = work = outcome = 0
@@ -150,7 +150,7 @@ class Loop:
                 par, rule, state, low, carry, h, k, j, stop, marks, states, momenta
             )
             work += effort
-        return March(states, momenta, k, work, outcome), Position(state, low, carry, k)
+        return March(states, momenta.T, k, work, outcome), Position(state, low, carry, k)
 
 
 def driver(  # noqa: C901  (one loop, read in one piece)
@@ -187,7 +187,7 @@ def driver(  # noqa: C901  (one loop, read in one piece)
                 for i in range(len(shown)):
                     states[j, i] = shown[i]
                 if k > 0:
-                    momenta[j, 0], momenta[j, 1] = observe(par, rule, before, dstate, h)
+                    momenta[0, j], momenta[1, j] = observe(par, rule, before, dstate, h)
                 j += 1
             return state, low, carry, k, j, work, outcome
 
@@ -209,11 +209,11 @@ def driver(  # noqa: C901  (one loop, read in one piece)
                 low = set_item(low, i, 0.0)
             if marks[0] == 0:
                 begun = conserved(top, at)
-                momenta[0, 0], momenta[0, 1] = begun.p_phi, begun.p_psi
+                momenta[0, 0], momenta[1, 0] = begun.p_phi, begun.p_psi
             carry, stop = begin(par, rule, state, h), marks[-1]
             _, _, _, k, j, work, outcome = march(par, rule, state, low, carry, h, 0, 0, stop, marks, states, momenta)
             states[j:] = np.nan
-            momenta[max(j, int(marks[0] == 0)) :] = np.nan
+            momenta[:, max(j, int(marks[0] == 0)) :] = np.nan
             return k, work, outcome
 
         running_once: Callable[..., tuple[int, int, int]] = register_jitable(run)

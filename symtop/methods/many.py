@@ -48,7 +48,7 @@ def over_members(run: Callable[..., tuple[int, int, int]]) -> Callable[..., None
         for i in chosen:
             at = numbers[i]
             plain = (at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7], at[8])
-            steps[i], work[i], outcome[i] = run(plain, coefficients, h[i], marks[i], states[i], momenta[i])
+            steps[i], work[i], outcome[i] = run(plain, coefficients, h[i], marks[i], states[i], momenta[i].T)
 
     return members
 
