@@ -56,7 +56,7 @@ def sizes(histories: xr.Dataset) -> Picture:
     style.legend_below(figure, axes)
     style.headline(figure, messages.sizes(data))
     caption = (
-        "Largest relative change of every constant over the whole run and all scenes, energies relative to E0 - min V. "
+        "Largest relative change of every constant over the run and all scenes, energies relative to E0 - min V. "
         "A dot is a row, method[chart]: those that hold all constants on a line for each family, the "
         f"others on their own lines. {rows.setting(data)} A million steps of rounding explain changes up to "
         f"{ROUNDED:.0e} of a momentum or of |E|: what a method conserves lies below. A larger change is the truncation "
