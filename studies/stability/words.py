@@ -106,7 +106,7 @@ def limits(part: xr.Dataset) -> str:
     free, subject, parts = unlimited(part), "Small nutations about a steady precession", []
     if phases:
         parts.append(
-            f"{subject} grow beyond a limit of the step with {few(list(phases), most=2)}. As h omega, step times "
+            f"{subject} grow beyond a step limit with {few(list(phases), most=2)}. As h omega, step times "
             f"nutation frequency, the limits reach {_ends(phases)}."
         )
     if free:
@@ -153,7 +153,7 @@ def resonances(part: xr.Dataset) -> str:
     return (
         "A step that turns the nutation by a third is linearly stable, but with "
         f"{len(steps)} of {counted(tried)} a top displaced by {BARELY:g} rad or more does not stay. "
-        f"This step is h omega = {', '.join(known) or _ends(steps)}."
+        f"There h omega is {', '.join(known) or _ends(steps)}."
     )
 
 
