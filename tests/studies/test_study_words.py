@@ -266,14 +266,14 @@ def test_the_truth_study_says_what_the_printed_values_test():
         return published.Published("somebody", "something", 1.0, ours, 1e-3, kind, tests=tests)
 
     values = [value(1.0, published.TRAJECTORY), value(1.1, published.TRAJECTORY), value(1.0, published.START)]
-    sentence = truth_words.published([*values, value(1.0, published.START, "formula")])
+    sentence = " ".join(truth_words.published([*values, value(1.0, published.START, "formula")]))
     assert "2 of 3 printed values" in sentence
     assert (
         "Only 2 of them test a trajectory of the top (somebody); 1 tests the energy of a start, and 0 belong"
         in sentence
     )
     assert "1 of 1 agree; 0 of them test a trajectory and 1 a start." in sentence
-    everything = truth_words.published(published.published_values())
+    everything = " ".join(truth_words.published(published.published_values()))
     assert "7 of 7 printed values" in everything
     assert "Only 3 of them test a trajectory" in everything
     assert "6 of 6 agree; 4 of them test a trajectory and 2 a start." in everything
