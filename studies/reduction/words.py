@@ -96,9 +96,9 @@ def commuting(data: xr.Dataset) -> str:
     ends = " to ".join(dict.fromkeys(f"h^{pick(powers):.2f}" for pick in (min, max))) if powers else ""
     parts = [f"the same method for {few(list(same))}, to {max(same.values()):.1e} rad"] if same else []
     parts += [f"different ones for {few(list(apart))}, apart as {ends}"] if apart else []
-    return (
-        f"Eliminating phi and psi (reducing) before or after discretising {', and '.join(parts) or 'was not compared'}."
-    )
+    if not parts:
+        return ""
+    return f"Eliminating phi and psi (reducing) before or after discretising gives {', and '.join(parts)}."
 
 
 def largest_gap(data: xr.Dataset) -> float:
