@@ -25,7 +25,7 @@ NOTES = [  # what a number of a library rests on
     ["solve_ivp", "its set-up cannot be taken out of its call"],
     ["CVODE", "that of SUNDIALS 7.9 in scikit-sundae's wheel"],
     ["ARKODE", "the symplectic stepper of SUNDIALS 7.3 in SundialsPy's wheel, which does not wrap it"],
-    ["sundials4py", "SUNDIALS' own wrapper has wheels from Python 3.12 on only, and is not here"],
+    ["sundials4py", "SUNDIALS' own wrapper has wheels from Python 3.12 on"],
     ["rebound", "IAS15 has no user-defined ODEs and gets the axis as a particle"],
     ["MuJoCo, Drake", "model bodies of any kind and are not in the figure"],
 ]  # fmt: skip

@@ -58,7 +58,7 @@ def sizes(histories: xr.Dataset) -> Picture:
     caption = (
         "Largest relative change of every constant over the run and all scenes, energies relative to E0 - min V. "
         "A dot is a row, method[chart]: those that hold all constants on a line for each family, the "
-        f"others on their own lines. {rows.setting(data)} A million steps of rounding explain changes up to "
+        f"others on their own. {rows.setting(data)} A million steps of rounding explain changes up to "
         f"{ROUNDED:.0e} of a momentum or of |E|: what a method conserves lies below. A larger change is the truncation "
         "error of a step or, farthest right, a drift."
     )
@@ -130,8 +130,8 @@ def exponents(histories: xr.Dataset) -> Picture:
     axes[-1, 0].set_xlabel(f"power of time with which the phase error grows; a dot: a method on one of {scenes} scenes")
     style.headline(figure, messages.exponents(data))
     caption = (
-        "Growth exponents of the phase error over the last decade of time, a dot a run, in columns of "
-        f"{BIN:g}; a panel holds the runs whose row fares alike with its energy on its worst scene. 0 is a bounded "
+        "Growth exponents of the phase error over the last decade of time, a dot a run of a method[chart], in columns "
+        f"of {BIN:g}; a panel holds the runs whose row fares alike with its energy on its worst scene. 0 is a bounded "
         "error, 1 a steady lag (shaded), 3/2 the phase under a random walk of the energy, 2 that under a drift of the "
         f"energy. Phase errors below {words.ROUNDED_PHASE:g} rad may be rounding alone, which also grows as t^3/2. "
         f"{rows.setting(data)}"

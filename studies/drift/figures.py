@@ -170,8 +170,8 @@ def _rounding(data: xr.Dataset) -> Picture:
     caption = (
         f"Drift of the modified energy by rounding near {data['scene'].values[0]}, {PER_NUTATION:.0f} steps a "
         f"nutation, over {float(data['elapsed'].max()):.0e} steps; the chart is in the row's name. Each of "
-        f"{members[0]} starts is a thin line, their root mean square a thick one; dashed is that of the first "
-        f"{members[1]} with plain sums in the same kernels. Above a panel: the fitted exponents of both; in it the "
+        f"{members[0]} starts is a thin line, their root mean square a thick one. Dashed is that of the first "
+        f"{members[1]} with plain sums in the same kernels. Above a panel: the fitted exponents of both, in it the "
         f"ratio of the root mean squares over the last decade of steps. {words.walks(ensembles)}"
     )
     alt = "Log-log plots of the drift by rounding against steps for each method, with compensated and plain sums."

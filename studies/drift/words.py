@@ -132,7 +132,7 @@ def moved(windows: xr.Dataset) -> str:
     modified = np.abs(last["modified_energy_mean"] - first["modified_energy_mean"])
     return (
         f"the mean energy moves by at most {strayed(windows)[0]:.0e} of the width of its oscillation from the first "
-        f"window to the last, the mean modified energy by at most {float(modified.max()):.0e} of the energy of the "
+        f"window to the last; the mean modified energy by at most {float(modified.max()):.0e} of the energy of the "
         "nutation."
     )
 
@@ -165,6 +165,8 @@ def predictions(runs: Mapping[str, xr.Dataset], where: str = "") -> str:
     hits = [100.0 * error for error in off.values() if error <= CLOSE]
     missed = [f"{name} ({f'{error:.0%} off' if math.isfinite(error) else 'not reached'})"
               for name, error in off.items() if not error <= CLOSE]  # fmt: skip
+    if not runs:
+        return ""
     short = max(float(cell["short"]) for cell in runs.values())
     text = (
         f"A run of {short:g} nutations predicts when the phase error reaches {LOST:g} rad{where}"
@@ -186,8 +188,8 @@ def verdict(data: xr.DataTree) -> list[str]:
         held = [setting(told), shortened(told)]
     if WINDOWS in groups:
         steps, names = float(groups[WINDOWS]["steps"].max()), list(map(str, groups[WINDOWS]["integrator"].values))
-        of = f"{few(names)}, {PER_NUTATION:.0f} a nutation of {_scene(groups[WINDOWS])},"
-        sentences.append(f"Over {steps:.0e} steps of {of} {moved(groups[WINDOWS])}")
+        ran = f"{few(names)} ran {steps:.0e} steps, {PER_NUTATION:.0f} a nutation of {_scene(groups[WINDOWS])}."
+        sentences.append(f"{ran} {moved(groups[WINDOWS]).capitalize()}")
     if ROUNDINGS in groups:
         sentences.append(walks(by_integrator(groups[ROUNDINGS])))
     if HORIZONS in groups:

@@ -24,7 +24,7 @@ DOES_NOT_SAY = (
 )
 HOW_TO_READ = (
     "These are the maps by which engines step a free body; a row is a map in one chart. "
-    f"{SLOW} nutates in 3 s; {FAST} spins at 100 rad/s and nutates in 0.13 s. Steps: from 16 a nutation up, and 60, "
+    f"{SLOW} nutates in 3 s, {FAST} spins at 100 rad/s and nutates in 0.13 s. Steps: from 16 a nutation up, and 60, "
     "240 and 1000 a second. The error of the axis is the largest of a hundred samples, against the closed form; pi for "
     "a run that ended early. Energy is relative to |E| + |mgl|, the spin L.e to the larger of both momenta. The "
     "precession is the azimuth that the axis has run through, which means little once the axis is far off. Cost is "
@@ -135,11 +135,11 @@ def by_order(data: xr.DataTree) -> dict[int, list[str]]:
 def ordered(data: xr.DataTree) -> str:
     """What the order of a map decides at the usual step."""
     said = [
-        f"{span((frame(data, row, 'axis', USUAL) for row in group), angle)} with {counted(len(group))} "
-        f"{f'of order {order}' if order else 'without a gyroscopic term'}"
+        f"{f'Order {order}' if order else 'Without a gyroscopic term'}: "
+        f"{span((frame(data, row, 'axis', USUAL) for row in group), angle)} ({counted(len(group))})."
         for order, group in by_order(data).items()
     ]
-    return f"The order decides. At 1/{USUAL:g} s on {SLOW} the axis is off by {', '.join(said)}."
+    return f"The order decides how far the axis is off at 1/{USUAL:g} s on {SLOW}. {' '.join(said)}"
 
 
 def in_the_long_run(data: xr.DataTree) -> str:
@@ -231,12 +231,12 @@ def on_the_population(data: xr.DataTree) -> str:
     """How many random tops the maps follow."""
     shares = {row: share(data, row) for row in rows(data)}
     beside = next(row for row in rows(data) if of_catalogue(row))
+    followed = span((shares[row] for row in engine_rows(data)), "{:.0%}".format)
     median = float(np.nanmedian(data["population"]["steps_a_nutation"].values))
     return (
-        f"On {data['population'].sizes['member']} random tops, at 1/{USUAL:g} of their unit of time ({median:.0f} "
-        "steps a nutation in the median), the axis ends within 5 degrees on "
-        f"{span((shares[row] for row in engine_rows(data)), '{:.0%}'.format)} of the tops with the maps of engines and "
-        f"on {shares[beside]:.0%} with {beside}."
+        f"Of {data['population'].sizes['member']} random tops, at {median:.0f} steps a nutation in the median, the maps "
+        f"of engines end within 5 degrees on {followed}, {beside} on {shares[beside]:.0%} (a step is 1/{USUAL:g} of the "
+        "unit of time)."
     )
 
 

@@ -228,8 +228,8 @@ def draw_spheres(data: xr.Dataset) -> Picture:
         f"spheroid and goldstein, by the solver in angles at tolerance {SOLVER_TOLERANCE:g}. Reproduced, orange: the "
         "notebook's "
         "curve, which takes phi for the azimuth. Corrected, black: its own rotations (phi about z, theta about the "
-        "line of nodes) carry the axis to (sin theta sin phi, -sin theta cos phi, cos theta), a quarter turn away, so "
-        "that its animated triad and its curve do not meet. Dashed: from the vertical to the start of each.",
+        "line of nodes) carry the axis to (sin theta sin phi, -sin theta cos phi, cos theta), a quarter turn away. "
+        "Its animated triad and its curve therefore do not meet. Dashed: from the vertical to the start of each.",
         "Two views of the sphere from above, each with two paths of the same shape; an arc of 90 degrees joins the "
         "directions of their starts.",
     )

@@ -168,7 +168,7 @@ def modified_orders(data: xr.Dataset) -> dict[tuple[str, str], tuple[float, floa
     """Slopes of the energy change and of the modified energy's change against the step, by scene and row."""
     slopes = {}
     for scene in map(str, data["scene"].values):
-        for name in MODIFIED:
+        for name in (row for row in MODIFIED if row in data["integrator"].values):
             run = data.sel(scene=scene, integrator=name)
             plain, modified = (
                 power_law(run[Column.MODIFIED_STEP].values, run[column].values).slope

@@ -38,7 +38,7 @@ class Advice(NamedTuple):
     @property
     def sentence(self) -> str:
         """Both halves."""
-        return f"Use it {self.use}; {self.fails}."
+        return f"Use it {self.use}. I{self.fails[1:]}."
 
 
 def advice(data: xr.Dataset, family: str) -> dict[str, Advice]:
@@ -74,7 +74,7 @@ def _fails(one: OutcomeMap, over_gap: OutcomeMap | None) -> str:
         parts.append(f"needs {control} within {effect.width:.1g} rad of a pole{beside}")
     if not parts:
         return "it fails nowhere on the map"
-    return "it " + " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
+    return f"it {'. It '.join(parts)}"
 
 
 def _commonly(one: OutcomeMap) -> str:
@@ -161,16 +161,16 @@ def caption(data: xr.Dataset, scene: str, names: Sequence[str]) -> str:
     )
     control = "step" if shown[names[0]].control == "step_size" else "tolerance"
     what = (
-        f"One fall (one nutation period) of the scene grazing past a pole that the axis misses by 1.1 delta, in rad; "
-        f"upwards delta grows, to the right the {control}"
+        f"One fall (one nutation period) of the scene grazing past a pole that the axis misses by 1.1 delta, in rad. "
+        f"Upwards delta grows, to the right the {control}"
         if scene == "grazing"
-        else f"The scene {scene} over {PERIODS:g} nutation periods; upwards the spin r grows (from r = 1 on a top "
+        else f"The scene {scene} over {PERIODS:g} nutation periods. Upwards the spin r grows (from r = 1 on a top "
         f"sleeps: it spins upright and stays so), to the right the {control}"
     )
     together = ", one map for all without a wrong run" if accurate_everywhere(compared) else ""
     return (
         f"Outcome of every run of {counted(len(names))}, a map each, named by method and chart, with the share that is "
-        f"accurate{together}. {what}; all else is held fixed, and an equal {control} is not an equal cost. "
+        f"accurate{together}. {what}. All else is held fixed, and an equal {control} is not an equal cost. "
         f"{_counted(shown, compared)}Accurate in the largest part of its map: {best}; in the smallest: {worst}. {early}"
         f"{_without_limit(data, scene, shown) if scene != 'grazing' else ''}"
     )

@@ -96,7 +96,7 @@ def poles(part: xr.Dataset) -> str:
     return (
         f"A pole closer than {NEAR:g} rad to the path at least halves the accurate step of {sum(halved[True])} of "
         f"{len(halved[True])} rows of fixed step in the angles chart, and of {sum(halved[False])} of "
-        f"{len(halved[False])} in charts without poles (one fall past the pole, the rest of the start held fixed)."
+        f"{len(halved[False])} in charts without poles. Each run is one fall past the pole, all else is held fixed."
     )
 
 

@@ -188,7 +188,7 @@ def test_advice_reads_reach_and_failures_off_the_map():
     assert (
         line.fails
         == "it fails at h = 1 nutation periods and every larger step in at least 75% of 4 starts (of these runs 100% "
-        "leave their chart) and is wrong with bounded energy in 25% of its map"
+        "leave their chart). It is wrong with bounded energy in 25% of its map"
     )
     assert line.sentence.startswith("Use it with steps up to 0.1")
 
