@@ -231,10 +231,8 @@ def on_the_population(data: xr.DataTree) -> str:
     """How many random tops the maps follow."""
     shares = {row: share(data, row) for row in rows(data)}
     beside = next(row for row in rows(data) if of_catalogue(row))
-    count, followed = (
-        data["population"].sizes["member"],
-        span((shares[row] for row in engine_rows(data)), "{:.0%}".format),
-    )
+    count = data["population"].sizes["member"]
+    followed = span((shares[row] for row in engine_rows(data)), "{:.0%}".format)
     median = float(np.nanmedian(data["population"]["steps_a_nutation"].values))
     return (
         f"Of {count} random tops, at {median:.0f} steps a nutation in the median, the maps of engines end within 5 "

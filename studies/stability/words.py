@@ -248,11 +248,12 @@ def solver(part: xr.Dataset) -> str:
         solved, one = float(row[Column.TEXTBOOK_ENERGY][-1]), float(row[Column.ONE_ITERATION_ENERGY])
         energy, momenta = row[Column.SOLVER_ENERGY].values, row[Column.SOLVER_MOMENTUM].values
         first = f"grows to {one:.1e}" if one > LOOSE * solved else f"stays at {one:.1e}"
+        cause = ": the solver makes the difference" if one > LOOSE * solved else ""
         lost = {"energy": energy[0] > LOOSE * energy[-1], "momenta": momenta[0] > LOOSE * momenta[-1]}
         verbs = {name: f"{'loses' if gone else 'conserves'} the {name}" for name, gone in lost.items()}
         return (
             f"With one Newton iteration a step the energy error of {name} {first}, with its equation solved it stays "
-            f"within {solved:.1e}. This package's kernel, stopped after one iteration, {verbs['energy']} "
+            f"within {solved:.1e}{cause}. This package's kernel, stopped after one iteration, {verbs['energy']} "
             f"({energy[0]:.1e}; solved: {energy[-1]:.1e}) {'and' if len(set(lost.values())) == 1 else 'but'} "
             f"{verbs['momenta']} ({momenta[0]:.0e}; solved: {momenta[-1]:.0e})."
         )
