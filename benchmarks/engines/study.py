@@ -6,6 +6,7 @@ from typing import Any
 from benchmarks.engines.measure import COMPARED, COUNT, LEVEL, STEPS, agrees
 from symtop.base import datasets
 from symtop.methods.engines import SINGLE
+from symtop.report.phrases import counted, few
 
 NAME = "live-engines"  # of the findings; `engines` is the study of the maps
 UNRUN = "YADE is not run: its map is held by its formula and a reference value alone."
@@ -54,11 +55,15 @@ def verdict(rows: Sequence[dict[str, Any]]) -> list[str]:
                 f"{COMPARED}."
             )
     others = [f"{made['engine']} ({made['name']}, {made['held']})" for made in compared if not agrees(made)]
-    none = [f"{made['engine']} ({made['name']}, {made['held']})" for made in rows if not made["method"]]
+    none = [made for made in rows if not made["method"]]
     if others:
-        said.append(f"Not the map: {', '.join(others)}.")
+        said.append(f"Not the map: {few(others, 'setting')}.")
     if none:
-        said.append(f"Run without a map in the catalogue: {', '.join(none)}.")
+        engines = list(dict.fromkeys(made["engine"] for made in none))
+        said.append(
+            f"{counted(len(none), 'setting')} of {few(engines, 'engine')} ran without a map in the catalogue, and "
+            "show their error alone in the table."
+        )
     return said
 
 

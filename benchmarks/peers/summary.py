@@ -19,10 +19,16 @@ LEVEL = 1.25  # a ratio nearer to one than this is no difference
 NAMES = {"public": "public call", "inner": "inner loop"}
 SHORT = {"Python": "Python", "numba, called through Python": "numba", "numba, called from C": "C"}
 ENGINES = ("mujoco", "drake")  # model bodies, not equations
-WHEEL = (
-    "CVODE is that of SUNDIALS 7.9 in scikit-sundae's wheel. ARKODE's symplectic stepper comes from SUNDIALS 7.3 in "
-    "SundialsPy's wheel, which does not wrap it; SUNDIALS' own wrapper, sundials4py, has wheels from Python 3.12 on."
-)
+NOTES = [  # what a number of a library rests on
+    ["simulate", "also computes energy, momenta and angles; it has its defaults and observe=axis"],
+    ["symtop with heyoka", "`taylor`, heyoka's stepper called by symtop"],
+    ["solve_ivp", "its set-up cannot be taken out of its call"],
+    ["CVODE", "that of SUNDIALS 7.9 in scikit-sundae's wheel"],
+    ["ARKODE", "the symplectic stepper of SUNDIALS 7.3 in SundialsPy's wheel, which does not wrap it"],
+    ["sundials4py", "SUNDIALS' own wrapper has wheels from Python 3.12 on"],
+    ["rebound", "IAS15 has no user-defined ODEs and gets the axis as a particle"],
+    ["MuJoCo, Drake", "model bodies of any kind and are not in the figure"],
+]  # fmt: skip
 
 
 class Best(NamedTuple):
@@ -226,6 +232,7 @@ def tables(data: xr.Dataset) -> list[Table]:
             ["scene", "axis error", "row", NAMES["public"], "times symtop's", NAMES["inner"], "times symtop's"],
             by_row,
         ),
+        Table("What a number of a library rests on", ["library", "note"], NOTES),
         Table(
             "What each row was given",
             [
@@ -245,17 +252,13 @@ def tables(data: xr.Dataset) -> list[Table]:
 
 HOW_TO_READ = (
     "Held fixed: the top, the start, ten nutations, the largest axis error over them, one thread, double precision. "
-    "One code measures all errors, and the setting is searched for every row. Two calls are timed. Public call: what "
-    f"a user types; objects are built in it, and `simulate` has its defaults and observe=axis. It returns {SHOWN} "
-    "samples, or the ends of the library's own steps where it does not interpolate. `simulate` also computes energy, "
-    "momenta and angles. Inner loop: all that can be built once is built before; start to horizon, no samples. Below "
-    "about 15 us it compares calls from Python more than integrators. Compilation (numba, JAX, heyoka) is outside of "
-    "both calls for all; solve_ivp's set-up cannot be taken out of its call. A row is method[chart]: axis is the six "
-    "equations on (e, L), angles are Euler's, attitude is a quaternion. The columns `times symtop's` divide by the "
-    "time of the fastest of symtop's own kernels in the same call. `symtop with heyoka` is `taylor`, heyoka's stepper "
-    f"called by symtop. {WHEEL} rebound's IAS15 has no user-defined ODEs and gets the axis as a particle. MuJoCo and "
-    "Drake model bodies of any kind and are not in the figure. None of this says anything about a library's other "
-    "uses."
+    "One code measures all errors, and the setting is searched for every row. A row is method[chart]: axis is the six "
+    "equations on (e, L), angles are Euler's, attitude is a quaternion. Two calls are timed. Public call: what a user "
+    f"types, with the objects built in it. It returns {SHOWN} samples, or the ends of the library's own steps where it "
+    "does not interpolate. Inner loop: all that can be built once is built before; start to horizon, no samples. Below "
+    "about 15 us it compares calls from Python more than integrators. Compilation is outside of both calls for all. "
+    "The columns `times symtop's` divide by the time of the fastest of symtop's own kernels in the same call. None of "
+    "this says anything about a library's other uses."
 )
 
 

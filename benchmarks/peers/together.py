@@ -156,14 +156,15 @@ def verdict(rows: list[Row]) -> list[str]:
         ours = min((row for row in cell if row.name.endswith("lanes")), key=lambda row: row.seconds, default=None)
         if ours is None:
             continue
-        others = ", ".join(
-            f"{row.name} {row.seconds / ours.seconds:.3g} times as long (error {row.error:.0e})"
-            for row in cell
-            if not row.name.endswith("lanes")
+        others = sorted((row for row in cell if not row.name.endswith("lanes")), key=lambda row: row.seconds)
+        ends = dict.fromkeys(others[:1] + others[-1:])
+        beside = " and ".join(
+            f"{row.name} takes {row.seconds / ours.seconds:.3g} times as long (error {row.error:.0e})" for row in ends
         )
+        told = {0: "", 1: f" {beside}."}.get(len(others), f" Of {len(others)} others {beside}.")
         said.append(
             f"{most:,} tops on one core at {tolerance:g}: {ours.name}, takes {ours.seconds * 1e6:.1f} us a top and "
-            f"{ours.nanoseconds:.1f} ns a step to an error of {ours.error:.0e}; {others}."
+            f"{ours.nanoseconds:.1f} ns a step to an error of {ours.error:.0e}.{told}"
         )
     return said
 

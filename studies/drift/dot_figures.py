@@ -56,15 +56,14 @@ def sizes(histories: xr.Dataset) -> Picture:
     style.legend_below(figure, axes)
     style.headline(figure, messages.sizes(data))
     caption = (
-        "Largest relative change of every constant over the whole run and all scenes, energies relative to E0 - min V. "
-        "A dot is a row, method[chart]: those that hold all three constants on a line for each family, the others on "
-        f"lines of their own. {rows.setting(data)} {rows.charts_apart(data)} A million steps of rounding explain "
-        f"changes up to {ROUNDED:.0e} of a momentum or of |E|: what a method conserves lies below. What it does not "
-        "conserve shows the truncation error of a step, or, farthest to the right, a drift. "
-        f"{words.shortened(data)}"
+        "Largest relative change of every constant over the run and all scenes, energies relative to E0 - min V. "
+        "A dot is a row, method[chart]: those that hold all constants on a line for each family, the "
+        f"others on their own. {rows.setting(data)} A million steps of rounding explain changes up to "
+        f"{ROUNDED:.0e} of a momentum or of |E|: what a method conserves lies below. A larger change is the truncation "
+        "error of a step or, farthest right, a drift."
     )
     alt = "Dot plot of the largest changes of energy and momenta; methods that lose one are named."
-    return Picture("sizes", figure, caption.rstrip(), alt)
+    return Picture("sizes", figure, caption, alt)
 
 
 def _lines(groups: dict[tuple[str, ...], list[str]]) -> list[tuple[str, list[str], tuple[str, ...]]]:
@@ -131,14 +130,14 @@ def exponents(histories: xr.Dataset) -> Picture:
     axes[-1, 0].set_xlabel(f"power of time with which the phase error grows; a dot: a method on one of {scenes} scenes")
     style.headline(figure, messages.exponents(data))
     caption = (
-        "Growth exponents of the phase error of the nutation over the last decade of time, a dot a run, in columns of "
-        f"{BIN:g}, by what becomes of the row's energy on the scene where it fares worst. 0 is a bounded error, 1 a "
-        "steady lag, 3/2 the phase under a random walk of the energy, 2 that under a drift of the energy. Where the "
-        "energy is at rounding, so may be the phase error, and an exponent says little. Shaded: as t. "
-        f"{rows.setting(data)} {words.quoted(data)} {words.shortened(data)}"
+        "Growth exponents of the phase error over the last decade of time, a dot a run of a method[chart], in columns "
+        f"of {BIN:g}; a panel holds the runs whose row fares alike with its energy on its worst scene. 0 is a bounded "
+        "error, 1 a steady lag (shaded), 3/2 the phase under a random walk of the energy, 2 that under a drift of the "
+        f"energy. Phase errors below {words.ROUNDED_PHASE:g} rad may be rounding alone, which also grows as t^3/2. "
+        f"{rows.setting(data)}"
     )
     alt = "Columns of dots of the growth exponents of the phase error, in a panel for each behaviour of the energy."
-    return Picture("exponents", figure, caption.rstrip(), alt)
+    return Picture("exponents", figure, caption, alt)
 
 
 def _columns(slopes: np.ndarray) -> dict[float, list[float]]:

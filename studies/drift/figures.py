@@ -76,16 +76,14 @@ def _residuals(histories: xr.Dataset) -> Picture:
     style.legend_below(figure, axes)
     headline(figure, messages.residuals(data))
     caption = (
-        "Change of energy since the start relative to E0 - min V, the energy of the nutation, and of both momenta "
-        "relative to the larger one: samples as dots, the largest of each time window as a line with markers, at 1e-17 "
-        "if smaller; open markers: rows in angles; the dashed line rises as t. "
-        f"{rows.setting(data)} {rows.charts_apart(data)} On every scene the energy error is at rounding or bounded "
-        f"(growth exponent nearest to 0, 95 % interval below 1/2) for {words.holding(data)}. Bounded is the energy, "
-        f"not the error of the motion. {' '.join(words.phase_growth(data))} The momenta are recomputed from the "
-        f"increments of the trajectory. {words.shortened(data)}"
+        "Change of the energy since the start, relative to E0 - min V, the energy of the nutation, and of both "
+        "momenta, relative to the larger. Dots are samples, markers the largest in a window of time (at 1e-17 "
+        f"if less); the dashed line rises as t; open markers are rows in angles. {rows.setting(data)} On every scene "
+        f"the energy stays at rounding or within bounds with {len(words.holding(data))} of these "
+        f"{data.sizes['integrator']} rows, which does not bound the error of the motion."
     )
     alt = "Log-log plots of residuals over time: level for the discrete methods, rising for adaptive Runge-Kutta."
-    return Picture("residuals", figure, caption.rstrip(), alt)
+    return Picture("residuals", figure, caption, alt)
 
 
 def _windows(data: xr.Dataset) -> Picture:
@@ -120,17 +118,15 @@ def _windows(data: xr.Dataset) -> Picture:
     momenta = [np.abs(data[f"{name}_{part}"]).max() for name in ("p_phi", "p_psi") for part in ("least", "largest")]
     caption = (
         f"{float(data['steps'].max()):.0e} steps of rows in angles and in the axis chart on {data['scene'].values[0]}, "
-        f"all with {PER_NUTATION:.0f} steps a nutation: the band "
-        "reaches from the least to the largest relative change in each window of steps, equally wide on the "
-        "logarithmic axis, the line is its mean, the dashed line the mean of the first window. The percentages are the "
-        "mean energy of the last window less that of the first, over the width of the band. The modified "
-        "energy is the energy with the h^2 term of the discrete motion, less the oscillation of order h^4 that "
-        f"remains. {words.moved(data).capitalize()} The momenta, not drawn and recomputed inside the "
-        f"step, stay within {max(map(float, momenta)):.0e}."
+        f"{PER_NUTATION:.0f} steps a nutation. A band reaches from the least to the largest change in a window of "
+        "steps, the line is its mean, the dashed line that of the first window. A percentage is the mean of the last "
+        "window less that of the first, over the band's width. The modified energy adds the h^2 term of the discrete "
+        f"motion to the energy. {words.scatter(data)} Momenta stay within "
+        f"{max(map(float, momenta)):.0e}."
     )
     alt = (
-        "Bands of energy and modified energy over the logarithm of the steps, a column for each method: the means of "
-        "the energy stay on a dashed line, those of the modified energy leave it late, by rounding."
+        "Bands of energy and modified energy over the logarithm of the steps, a column for each method: the mean "
+        "energy stays on a dashed line, the mean modified energy leaves it late, by rounding."
     )
     return Picture("windows", figure, caption, alt)
 
@@ -173,11 +169,10 @@ def _rounding(data: xr.Dataset) -> Picture:
     headline(figure, messages.rounding(ensembles))
     caption = (
         f"Drift of the modified energy by rounding near {data['scene'].values[0]}, {PER_NUTATION:.0f} steps a "
-        f"nutation, over {float(data['elapsed'].max()):.0e} steps: each of {members[0]} starts "
-        f"as a thin line, their root mean square as a thick one, and dashed that of the first {members[1]} "
-        "with the same kernels and plain sums; the chart is in the row's name. Above a panel: the fitted exponents of "
-        "both; in it the ratio of the root mean squares over the last decade of steps. "
-        f"{' '.join(words.walk(name, ensemble) for name, ensemble in ensembles.items())}"
+        f"nutation, over {float(data['elapsed'].max()):.0e} steps; the chart is in the row's name. Each of "
+        f"{members[0]} starts is a thin line, their root mean square a thick one. Dashed is that of the first "
+        f"{members[1]} with plain sums in the same kernels. Above a panel: the fitted exponents of both, in it the "
+        f"ratio of the root mean squares over the last decade of steps. {words.walks(ensembles)}"
     )
     alt = "Log-log plots of the drift by rounding against steps for each method, with compensated and plain sums."
     return Picture("rounding", figure, caption, alt)
@@ -229,10 +224,10 @@ def _horizons(data: xr.Dataset) -> Picture:
         name_ends(axis, ends)
     caption = (
         f"Force evaluations per nutation that keep the phase error of the nutation of {data['scene'].values[0]} below "
-        f"{LOST:g} rad for N nutations, a line a row, method[chart]. Measured at the marker, where each row with a "
-        "step of its own loses its phase; elsewhere foreseen by its law: error as N^q with the exponent q measured "
-        f"there and h^p with the declared order p, without rounding. Named: {', '.join(named)}; grey: all others. "
-        f"Before the run the time of the loss was predicted too. {words.predictions(lost)}"
+        f"{LOST:g} rad for N nutations, a line a row, method[chart]. The marker is measured: there each row, with a "
+        "step of its own, loses its phase. The rest follows from its law, error as N^q h^p with the exponent q found "
+        f"there and the declared order p, without rounding. Coloured: {len(named)} rows, the familiar ones and the "
+        "cheapest of each order for a thousand nutations; grey: all others."
     )
     alt = "Log-log plot of the work per nutation against the nutations that the phase must last, a line a row."
     return Picture("horizons", figure, caption, alt)

@@ -10,6 +10,9 @@ import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS
 from symtop.methods.registry import split_name
+from symtop.model.charts import CHARTS
+from symtop.report.phrases import counted, few
+from symtop.runner.study import Table
 
 from .tables import rounding
 
@@ -25,16 +28,18 @@ def without_repeats(histories: xr.Dataset) -> xr.Dataset:
 
 def setting(histories: xr.Dataset) -> str:
     """Scene, horizon, and step or tolerance of all runs, in a sentence or two."""
-    scenes, most = ", ".join(map(str, histories["scene"].values)), float(histories["nutations"].max())
+    scenes, most = " and ".join(map(str, histories["scene"].values)), float(histories["nutations"].max())
     steps = histories["steps_a_nutation"].values
     step = f"{np.nanmax(steps):.0f} steps a nutation" if np.isfinite(steps).any() else ""
     own, common = _tolerances(histories)
-    tolerance = f"tolerance {' or '.join(map('{:.0e}'.format, sorted(set(common.values()))))} ({', '.join(common)})"
+    tolerance = (
+        f"tolerance {' or '.join(map('{:.0e}'.format, sorted(set(common.values()))))} ({few(list(common), most=2)})"
+    )
     parts = " or ".join(filter(None, [step, tolerance if common else ""]))
-    text = f"All runs have the same start and length, {most:.0f} nutations of {scenes}, and {parts}."
+    text = f"Held fixed: the start, {most:.0f} nutations of {scenes}, {parts}."
     if own:
-        listed = ", ".join(f"{name} {value:.1e}" for name, value in own.items())
-        text += f" At the default tolerance, which is the rounding of the arithmetic: {listed}."
+        keeps = "keeps its" if len(own) == 1 else "keep their"
+        text += f" {few(list(own), most=2)} {keeps} default tolerance, the rounding of the arithmetic."
     return text
 
 
@@ -84,25 +89,54 @@ def pairs(histories: xr.Dataset) -> Iterator[Pair]:
             yield Pair(constant, worse, better, *sizes)
 
 
-def charts_apart(histories: xr.Dataset) -> str:
-    """Constants that one chart of a method keeps much better than another; empty if no method has two charts."""
-    compared = list(pairs(histories))
+def _apart(histories: xr.Dataset) -> list[Pair]:
+    """Two charts of a method of which one keeps a constant much better than the other."""
     explained = {
         constant: max(rounding(histories.sel(scene=scene), constant) for scene in histories["scene"].values)
         for constant in CONSTANTS
     }
-    apart = [one for one in compared if one.change > max(explained[one.constant], APART * one.other)]
-    methods = {split_name(one.worse)[0] for one in compared}
-    if not compared:
+    return [one for one in pairs(histories) if one.change > max(explained[one.constant], APART * one.other)]
+
+
+def charts_apart(histories: xr.Dataset) -> str:
+    """How many methods keep a constant much better in one chart than in another; empty if none has two charts."""
+    methods = {split_name(one.worse)[0] for one in pairs(histories)}
+    if not methods:
         return ""
-    listed = "; ".join(
-        f"{one.constant} changes by {one.change:.1e} with {one.worse} and by "
-        f"{'exactly 0' if one.other == 0.0 else f'{one.other:.1e}'} with {one.better}"
-        for one in apart
+    apart = _apart(histories)
+    differing = {split_name(one.worse)[0] for one in apart}
+    if not apart:
+        return f"The chart changes no constant more than {APART:g} times with {counted(len(methods), 'method')} in two."
+    examples = [
+        max(group, key=lambda one: (one.change / one.other if one.other else math.inf, one.change))
+        for names in (CONSTANTS[:1], CONSTANTS[1:])
+        if (group := [one for one in apart if one.constant in names])
+    ]
+    listed = ", and ".join(
+        f"{one.constant} changes by {one.change:.1e} with {one.worse} and by {_size(one.other)} with {one.better}"
+        for one in examples
     )
-    same = sorted(methods - {split_name(one.worse)[0] for one in apart})
-    rest = (
-        f" The other {len(same)} methods with two charts keep energy and momenta equally well in both (within a factor "
-        f"of {APART:g}, or both at rounding)." if same else ""
-    )  # fmt: skip
-    return (f"The chart alone, same method and step: {listed}." if listed else "") + rest
+    return (
+        f"The chart alone, same method and step: {listed}. It matters more than {APART:g}-fold for {len(differing)} of "
+        f"{counted(len(methods), 'method')} that have two charts."
+    )
+
+
+def _size(value: float) -> str:
+    return "exactly 0" if value == 0.0 else f"{value:.1e}"
+
+
+def charts_table(histories: xr.Dataset) -> list[Table]:
+    """Every method and constant for which the chart matters, with the largest change in each chart; none if none."""
+    found = dict.fromkeys((one.constant, split_name(one.worse)[0]) for one in _apart(histories))
+    names = list(map(str, histories["integrator"].values))
+    lines = []
+    for constant, method in found:
+        cells = []
+        for chart in CHARTS:
+            row = f"{method}[{chart}]"
+            largest = histories[f"{constant}_largest"].max("scene")
+            cells.append(_size(float(largest.sel(integrator=row))) if row in names else "")
+        lines.append([constant, method, *cells])
+    title = f"The chart alone: largest relative change where two charts of a method differ more than {APART:g} times"
+    return [Table(title, ["constant", "method", *CHARTS], lines)] if lines else []

@@ -138,7 +138,7 @@ def draw_cost(data: xr.DataTree) -> Picture:
     caption = (
         f"Axis error within {HORIZON:g} s on two scenes, each row in the chart that it names, with the same number of "
         "evaluations of the torque: a method of four evaluations a step takes steps four times as long. "
-        f"Sorted by the error on {words.SLOW} at {words.USUAL:g} a second. {SAID} Pi stands for a run that ended early."
+        f"Sorted by the error on {words.SLOW} at {words.USUAL:g} a second. {SAID} Pi marks a run that ended early."
     )
     return Picture("cost", figure, caption, "Dots, one line a row, of the axis error at three costs on two tops.")
 

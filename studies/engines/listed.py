@@ -12,10 +12,41 @@ from . import words
 from .documentation import STATEMENTS
 from .tables import FREQUENCIES, HORIZON, SCENES
 
+CHANGES = ("energy", "spin", "precession")
+
 
 def tables(data: xr.DataTree) -> list[Table]:
     """All of them."""
-    return [used(data), same_cost(data), kinds(data), said()]
+    return [orders(data), kinds(data), *spherical(data), used(data), same_cost(data), said()]
+
+
+def orders(data: xr.DataTree) -> Table:
+    """What the order of a map decides: the range of errors over the maps of each."""
+    lines = []
+    for order, group in words.by_order(data).items():
+        off = [words.span((words.frame(data, row, "axis", rate) for row in group), words.angle) for rate in FREQUENCIES]
+        fast = words.span((words.frame(data, row, "axis", words.USUAL, scene=words.FAST) for row in group), words.angle)
+        shares = words.span((words.share(data, row) for row in group), "{:.0%}".format)
+        lines.append([f"{order}{'' if order else ' (no gyroscopic term)'}", str(len(group)), *off, fast, shares])
+    header = [
+        "order", "maps of engines", *(f"axis on {words.SLOW}, 1/{rate:g} s" for rate in FREQUENCIES),
+        f"axis on {words.FAST}, 1/{words.USUAL:g} s", "random tops followed to 5 degrees",
+    ]  # fmt: skip
+    return Table(f"Errors within {HORIZON:g} s by the order of the map, in double precision", header, lines)
+
+
+def spherical(data: xr.DataTree) -> list[Table]:
+    """How near the maps without the gyroscopic term are to the spherical top; none if there is no such map."""
+    lines = [
+        [row, *(f"{words.frame(data, row, 'spherical', rate):.1e}" for rate in FREQUENCIES),
+         f"{words.order_of_difference(data, row):.2f}", words.angle(words.frame(data, row, "axis", words.USUAL)),
+         f"{1.0 + words.frame(data, row, 'precession', words.USUAL, scene=words.FAST):.2f}"]
+        for row in words.without_term(data)
+    ]  # fmt: skip
+    title = f"Without a gyroscopic term: the axis (rad) from the spherical top's, within {HORIZON:g} s of {words.SLOW}"
+    header = ["row", *(f"1/{rate:g} s" for rate in FREQUENCIES), "order", f"from the true axis, 1/{words.USUAL:g} s",
+              f"{words.FAST} precesses at this part of its rate"]  # fmt: skip
+    return [Table(title, header, lines)] if lines else []
 
 
 def used(data: xr.DataTree) -> Table:
@@ -31,14 +62,14 @@ def used(data: xr.DataTree) -> Table:
             cell("axis", ".1e", long=False),
             *(cell(name, "+.1e", long=False) for name in ("energy", "precession")),
         ]
-        changes = [cell(name, "+.1e", long=True) for name in ("energy", "spin", "precession")]
+        changes = [cell(name, "+.1e", long=True) for name in CHANGES]
         return [scene, row, f"1/{rate:g}", f"{forces:.0f}", *short, cell("axis", ".1e", long=True), *changes]
 
     long = f"{words.seconds(data):g} s"
     header = [
         "scene", "row", "step (s)", "forces a second",
         *(f"{name}, {HORIZON:g} s" for name in ("axis", "energy", "precession")),
-        *(f"{name}, {long}" for name in ("axis", "energy", "spin", "precession")),
+        *(f"{name}, {long}" for name in ("axis", *CHANGES)),
     ]  # fmt: skip
     rows = [shown(scene, row, rate) for scene in SCENES for row in words.rows(data) for rate in FREQUENCIES]
     return Table("At the steps that people use", header, rows)
@@ -63,19 +94,27 @@ def same_cost(data: xr.DataTree) -> Table:
 
 
 def kinds(data: xr.DataTree) -> Table:
-    """Order, least error and share of the population."""
+    """Every map: what it is, order, least error, what it does at the usual step, and its share of the population."""
     rows: list[list[str]] = []
     for row in words.rows(data):
         known: Any = words.facts(data, row)
+        off = [words.angle(words.frame(data, row, "axis", rate)) for rate in FREQUENCIES]
+        changes = [words.change(words.frame(data, row, name, words.USUAL, long=True)) for name in CHANGES]
         rows.append([
-            row, integrator(row).summary, f"{known.order:.2f}", f"{known.best:.1e}", f"{known.best_count:,.0f}",
-            f"{words.share(data, row):.0%}",
+            row, integrator(row).summary, f"{known.order:.2f}", *off,
+            words.angle(words.frame(data, row, "axis", words.USUAL, scene=words.FAST)), *changes,
+            f"{known.best:.1e}", f"{known.best_count:,.0f}", f"{known.last:.1e}", f"{words.share(data, row):.0%}",
         ])  # fmt: skip
+    step, long = f"1/{words.USUAL:g} s", f"{words.seconds(data):g} s"
     title = (
-        f"Order and least error on {words.SLOW}, and the share of the population within 5 degrees at "
-        f"1/{words.USUAL:g} s"
+        f"Every map: order, axis error within {HORIZON:g} s, changes in {long} of {words.SLOW} at {step}, least error, "
+        "and the share of the population within 5 degrees"
     )
-    header = ["row", "what it is", "order", "least axis error (rad)", "at steps a nutation", "share"]
+    header = [
+        "row", "what it is", "order", *(f"axis on {words.SLOW}, 1/{rate:g} s" for rate in FREQUENCIES),
+        f"axis on {words.FAST}, {step}", *(f"{name}, {long}" for name in CHANGES), "least axis error (rad)",
+        "at steps a nutation", "at the most steps (rad)", "share",
+    ]  # fmt: skip
     return Table(title, header, rows)
 
 

@@ -1,6 +1,7 @@
-"""What the study of engines says: a sentence an engine, the two ends of the field, and what it does not say."""
+"""What the study of engines says: the two ends of the field, what decides, and what it does not say."""
 
 import math
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ import xarray as xr
 
 from symtop.methods.engines import SINGLE
 from symtop.methods.registry import integrator, split_name
+from symtop.report.phrases import counted, few
 
 from .tables import FREQUENCIES, HORIZON, SCENES
 
@@ -16,23 +18,20 @@ BETWEEN = (400.0, 3000.0)  # steps a nutation that the measured order is taken b
 NEAR = math.radians(5.0)
 USUAL = 240.0  # steps a second of the sentences
 DOES_NOT_SAY = (
-    "What this does not say. It is about the rotation of one smooth body: not about contacts, joints, stacks, "
-    "friction, speed or robustness, which is what engines are made for and chosen by. A map is that of the "
-    "version and the setting its paragraph names, with damping, sleep and limits of speed off; with them on, an "
-    "engine does what they do, and another version may do something else. Names in single precision are the maps "
-    "rounded after every operation, in symtop's order of operations. Other tops are followed better or worse, as the "
-    "population shows. An engine's own documentation is the last table."
+    "What this does not say: it is about the rotation of one smooth body, not about contacts, joints, stacks, "
+    "friction, speed or robustness, by which engines are chosen. A map is that of the version and setting that its "
+    "description names, without damping, sleep and limits of speed."
 )
 HOW_TO_READ = (
-    "The maps that engines step a free body by (`symtop integrators`), each in the chart its row names, on "
-    f"{SLOW}, whose nutation takes 3 s, and {FAST}, which spins at 100 rad/s and nutates in 0.13 s. Steps: from "
-    "16 a nutation up, and those of 60, 240 and 1000 a second. The error of the axis is the largest of a hundred "
-    "samples, against the closed form; pi for a run that ended early. Energy is relative to |E| + |mgl|, the "
-    "spin L.e to the larger of both momenta; the precession is the azimuth that the axis has run through, which means "
-    "little once the axis is far off. Rows of the catalogue stand beside the engines at the same step and, in a table "
-    "and a figure of their own, at the same cost. Cost is counted in evaluations of the torque, which neither the "
-    "machine nor the language decides: four substeps on one torque count as one. The population is that of "
-    f"`symtop.population` with its unit of time taken for a second. {DOES_NOT_SAY}"
+    "These are the maps by which engines step a free body; a row is a map in one chart. "
+    f"{SLOW} nutates in 3 s, {FAST} spins at 100 rad/s and nutates in 0.13 s. Steps: from 16 a nutation up, and 60, "
+    "240 and 1000 a second. The error of the axis is the largest of a hundred samples, against the closed form; pi for "
+    "a run that ended early. Energy is relative to |E| + |mgl|, the spin L.e to the larger of both momenta. The "
+    "precession is the azimuth that the axis has run through, which means little once the axis is far off. Cost is "
+    "counted in evaluations of the torque: four substeps on one torque count as one. The population is that of "
+    "`symtop.population`, its unit of time taken for a second. Damping, sleep, limits of speed or another version "
+    "change what an engine does. Rows in single precision round after every operation, in symtop's order. The last "
+    "table quotes engines' own documentation."
 )
 
 
@@ -114,26 +113,57 @@ def change(value: float) -> str:
     )
 
 
-def sentence(data: xr.DataTree, row: str) -> str:
-    """The verdict on one engine: order, the steps in use, what is left after long, and a floor if it has one."""
-    known, method = facts(data, row), integrator(row)
-    off = ", ".join(angle(frame(data, row, "axis", rate)) for rate in FREQUENCIES)
-    rates = ", ".join(f"1/{rate:g}" for rate in FREQUENCIES)
-    kind = (
-        f"stays {angle(known.best)} or more from the truth at every step" if abs(known.order) < 0.1
-        else f"has order {known.order:.2g}" if not single(row)
-        else f"is best at {known.best_count:,.0f} steps a nutation, {angle(known.best)}"
-    )  # fmt: skip
-    worse = f", {angle(known.last)} at the most" if single(row) and known.last > 1.5 * known.best else ""
-    energy, spin, turned = (
-        change(frame(data, row, name, USUAL, long=True)) for name in ("energy", "spin", "precession")
-    )
-    fast = angle(frame(data, row, "axis", USUAL, scene=FAST))
+def span(values: Iterable[float], say: Callable[[float], str]) -> str:
+    """The least and the largest of some numbers, in words."""
+    several = list(values)
+    return " to ".join(dict.fromkeys((say(min(several)), say(max(several)))))
+
+
+def engine_rows(data: xr.DataTree) -> list[str]:
+    """The maps of engines in double precision."""
+    return [row for row in rows(data) if not of_catalogue(row) and not single(row)]
+
+
+def by_order(data: xr.DataTree) -> dict[int, list[str]]:
+    """The maps of engines in double precision by their order, 0 without the gyroscopic term."""
+    groups: dict[int, list[str]] = {}
+    for row in engine_rows(data):
+        groups.setdefault(0 if row in without_term(data) else max(1, round(facts(data, row).order)), []).append(row)
+    return dict(sorted(groups.items()))
+
+
+def ordered(data: xr.DataTree) -> str:
+    """What the order of a map decides at the usual step."""
+    said = [
+        f"{f'Order {order}' if order else 'Without a gyroscopic term'}: "
+        f"{span((frame(data, row, 'axis', USUAL) for row in group), angle)} ({counted(len(group))})."
+        for order, group in by_order(data).items()
+    ]
+    return f"The order decides how far the axis is off at 1/{USUAL:g} s on {SLOW}. {' '.join(said)}"
+
+
+def in_the_long_run(data: xr.DataTree) -> str:
+    """What the maps do to energy and spin over the long time, with the worst of each."""
+    there, parts = engine_rows(data), []
+    for name in ("energy", "spin"):
+        changed = {row: frame(data, row, name, USUAL, long=True) for row in there}
+        size = {row: abs(value) if math.isfinite(value) else math.inf for row, value in changed.items()}
+        least, most = (pick(there, key=lambda row: size[row]) for pick in (min, max))
+        parts.append(f"the {name} by {change(changed[least])} ({least}) to {change(changed[most])} ({most})")
+    return f"In {seconds(data):g} s at 1/{USUAL:g} s on {SLOW}, the maps of engines change {' and '.join(parts)}."
+
+
+def in_single_precision(data: xr.DataTree) -> str:
+    """Where shorter steps stop helping; empty without such a row."""
+    floors = {row: facts(data, row) for row in rows(data) if single(row) and row not in without_term(data)}
+    if not floors:
+        return ""
+    worse = sum(known.last > 1.5 * known.best for known in floors.values())
+    counts = span((known.best_count for known in floors.values()), "{:,.0f}".format)
     return (
-        f"{row} ({method.summary}) {kind}{worse}; on {SLOW} at {rates} s the axis is off by {off} within "
-        f"{HORIZON:g} s; at 1/{USUAL:g} s, {seconds(data):g} s change the energy by {energy}, the spin by {spin} and "
-        f"the mean precession by {turned}, and {FAST} is off by {fast} within {HORIZON:g} s; "
-        f"{share(data, row):.0%} of the population is within 5 degrees."
+        "In single precision shorter steps stop helping: the maps with the gyroscopic term are best at "
+        f"{counts} steps a nutation, off by {span((known.best for known in floors.values()), angle)}, and {worse} of "
+        f"{len(floors)} are worse at the most steps tried."
     )
 
 
@@ -142,21 +172,26 @@ def without_term(data: xr.DataTree) -> list[str]:
     return [row for row in rows(data) if split_name(row)[0].startswith("no-gyro")]
 
 
-def spherical(data: xr.DataTree) -> list[str]:
-    """What a map without the gyroscopic term follows: the closed form of the spherical top, by order h."""
-    said = []
-    for row in (row for row in without_term(data) if not single(row)):
-        off = [frame(data, row, "spherical", rate) for rate in FREQUENCIES]
-        order = -float(np.polyfit(np.log(FREQUENCIES), np.log(off), 1)[0])
-        turned = frame(data, row, "precession", USUAL, scene=FAST)
-        said.append(
-            f"{row}, which has no gyroscopic term, follows the closed form of the spherical top with I3 := I1: on "
-            f"{SLOW}, at {', '.join(f'1/{rate:g}' for rate in FREQUENCIES)} s, its axis stays within "
-            f"{', '.join(f'{value:.1e}' for value in off)} rad of it for {HORIZON:g} s, a difference of order "
-            f"{order:.2f}; the closed form of the top itself it misses by {angle(frame(data, row, 'axis', USUAL))}. "
-            f"{FAST} precesses at {1.0 + turned:.2f} of its rate."
-        )
-    return said
+def order_of_difference(data: xr.DataTree, row: str) -> float:
+    """With which power of the step a map comes to the spherical top."""
+    off = [frame(data, row, "spherical", rate) for rate in FREQUENCIES]
+    return -float(np.polyfit(np.log(FREQUENCIES), np.log(off), 1)[0])
+
+
+def spherical(data: xr.DataTree) -> str:
+    """What maps without the gyroscopic term follow: the closed form of the spherical top, by order h."""
+    there = [row for row in without_term(data) if not single(row)]
+    if not there:
+        return ""
+    near = span((frame(data, row, "spherical", USUAL) for row in there), angle)
+    orders = span((order_of_difference(data, row) for row in there), "{:.2f}".format)
+    missed = span((frame(data, row, "axis", USUAL) for row in there), angle)
+    turned = span((1.0 + frame(data, row, "precession", USUAL, scene=FAST) for row in there), "{:.2f}".format)
+    return (
+        f"Without a gyroscopic term a map follows another top, the spherical one with I3 := I1: {few(there)} are off "
+        f"it by {near} at 1/{USUAL:g} s on {SLOW}, which shrinks with order {orders}. The true top is missed by "
+        f"{missed}, and {FAST} precesses at {turned} of its rate."
+    )
 
 
 def level(data: xr.DataTree, row: str, rate: float, *, scene: str = SLOW, long: bool = False) -> float:
@@ -165,37 +200,50 @@ def level(data: xr.DataTree, row: str, rate: float, *, scene: str = SLOW, long: 
     return float(cell.isel(horizon=int(long)))
 
 
-def at_the_same_cost(data: xr.DataTree) -> str:
-    """The best map of an engine and the methods of the catalogue, at as many evaluations of the torque."""
-    engines = [row for row in rows(data) if not of_catalogue(row) and not single(row)]
-    said = []
+def at_the_same_cost(data: xr.DataTree) -> list[str]:
+    """On each scene the best map of an engine and the best of the catalogue, at as many evaluations of the torque."""
+    engines, said = engine_rows(data), []
     for scene in SCENES:
         off = {row: level(data, row, USUAL, scene=scene) for row in rows(data)}
         best = min(engines, key=lambda row: off[row])
-        beside = ", ".join(f"{row} by {angle(off[row])}" for row in rows(data) if of_catalogue(row))
-        said.append(f"on {scene} {best}, the nearest map of an engine, is off by {angle(off[best])}, {beside}")
-    return f"With {USUAL:g} evaluations of the torque a second, within {HORIZON:g} s, {'; '.join(said)}."
+        ours = [row for row in rows(data) if of_catalogue(row)]
+        beside = ", ".join(f"{row} by {angle(off[row])}" for row in ours)
+        said.append(
+            f"At equal cost, {USUAL:g} evaluations of the torque a second for {HORIZON:g} s on {scene}, the best map "
+            f"of an engine, {best}, is off by {angle(off[best])}; {beside}."
+        )
+    return said
 
 
 def summary(data: xr.DataTree) -> str:
     """The two ends of the field, in a sentence."""
-    engines = [row for row in rows(data) if not of_catalogue(row) and not single(row)]
-    ranked = sorted(engines, key=lambda row: frame(data, row, "axis", USUAL))
-    shares = {row: share(data, row) for row in rows(data)}
+    ranked = sorted(engine_rows(data), key=lambda row: frame(data, row, "axis", USUAL))
     best, worst = ranked[0], ranked[-1]
     beside = next(row for row in rows(data) if of_catalogue(row))
-    median = float(np.nanmedian(data["population"]["steps_a_nutation"].values))
     return (
         f"At 1/{USUAL:g} s, within {HORIZON:g} s of {SLOW}, the maps of engines are off by "
         f"{angle(frame(data, best, 'axis', USUAL))} ({best}) to {angle(frame(data, worst, 'axis', USUAL))} ({worst}); "
-        f"{beside}, one force evaluation a step, by {angle(frame(data, beside, 'axis', USUAL))}. On the population, "
-        f"where that is {median:.0f} steps a nutation in the median, the axis ends within 5 degrees on "
-        f"{min(shares[row] for row in engines):.0%} to {max(shares[row] for row in engines):.0%} of the tops with the "
-        f"maps of engines and on {shares[beside]:.0%} with {beside}."
+        f"{beside}, one force evaluation a step, by {angle(frame(data, beside, 'axis', USUAL))}."
+    )
+
+
+def on_the_population(data: xr.DataTree) -> str:
+    """How many random tops the maps follow."""
+    shares = {row: share(data, row) for row in rows(data)}
+    beside = next(row for row in rows(data) if of_catalogue(row))
+    count = data["population"].sizes["member"]
+    followed = span((shares[row] for row in engine_rows(data)), "{:.0%}".format)
+    median = float(np.nanmedian(data["population"]["steps_a_nutation"].values))
+    return (
+        f"Of {count} random tops, at {median:.0f} steps a nutation in the median, the maps of engines end within 5 "
+        f"degrees on {followed}, {beside} on {shares[beside]:.0%} (a step is 1/{USUAL:g} of the unit of time)."
     )
 
 
 def verdict(data: xr.DataTree) -> list[str]:
-    """The field, then every engine, then what it does not say."""
-    each = [sentence(data, row) for row in rows(data) if not of_catalogue(row)]
-    return [summary(data), at_the_same_cost(data), *spherical(data), *each, DOES_NOT_SAY]
+    """The field, at equal steps and equal cost, what decides, and what it does not say."""
+    said = [
+        summary(data), *at_the_same_cost(data), on_the_population(data), ordered(data), spherical(data),
+        in_the_long_run(data), in_single_precision(data), DOES_NOT_SAY,
+    ]  # fmt: skip
+    return list(filter(None, said))

@@ -138,13 +138,12 @@ def draw_residuals(data: xr.Dataset) -> Picture:
     return Picture(
         "residuals",
         figure,
-        "Energy and both momenta on spheroid and goldstein. Left: the solver's residuals, of the energy from its mean "
-        f"and of the momenta from their start. {words.MATCHED} Corrected: "
-        "the notebook takes the "
-        "mean of its momenta over a table with a single entry, so that its residuals of momenta count from the start. "
-        f"Right, all relative to the start: {SOLVER} beside every discrete Lagrangian (in angles) and splitting (in "
-        f"angles or the axis chart) at {STEPS_A_NUTATION:.0f} steps a nutation, over the notebook's horizons, "
-        f"{len(NAMED) - 1} of them named; the momenta of all discrete methods stay within {largest:.0e}.",
+        f"Energy and both momenta on spheroid and goldstein. Left: residuals of {SOLVER}, of the energy from its mean "
+        f"and of the momenta from their start. Its tolerance of {SOLVER_TOLERANCE:g} was matched by choice, as the "
+        "notebook states none. Corrected: the notebook takes the mean of its momenta over a table with a single entry, "
+        "so that their residuals count from the start. Right, all relative to the start: the solver beside every "
+        "discrete Lagrangian (in angles) and splitting (in angles or the axis chart) at "
+        f"{STEPS_A_NUTATION:.0f} steps a nutation. The momenta of all discrete methods stay within {largest:.0e}.",
         "Left, residuals of the library solver; right, on logarithmic scales, momenta of the discrete methods at "
         "rounding and their bounded energy errors, below or above the solver's.",
     )
@@ -187,9 +186,11 @@ def draw_hope(data: xr.Dataset) -> Picture:
     return Picture(
         "hope",
         figure,
-        f"{' '.join(words.hopes(data))} Held fixed: start, {STEPS_A_NUTATION:.0f} steps a nutation of every discrete "
-        "row (open markers: angles, full: axis).",
-        "Two log-log plots: the solver's energy error rises with time and crosses the level lines of the discrete "
+        f"Largest energy error so far of {SOLVER} at tolerance {SOLVER_TOLERANCE:g} and of methods of order two at "
+        f"{STEPS_A_NUTATION:.0f} steps a nutation, from the same start, on both scenes and far beyond the notebook's "
+        "end. Open markers are rows in angles, full ones in the axis chart; a ring is the time from which a method "
+        f"stays better than the solver. {words.hope_message(data)}.",
+        "Two log-log plots: the solver's energy error rises with time and crosses the flat lines of the discrete "
         "methods, one after the other.",
     )
 
@@ -227,8 +228,8 @@ def draw_spheres(data: xr.Dataset) -> Picture:
         f"spheroid and goldstein, by the solver in angles at tolerance {SOLVER_TOLERANCE:g}. Reproduced, orange: the "
         "notebook's "
         "curve, which takes phi for the azimuth. Corrected, black: its own rotations (phi about z, theta about the "
-        "line of nodes) carry the axis to (sin theta sin phi, -sin theta cos phi, cos theta), a quarter turn away, so "
-        "that its animated triad and its curve do not meet. Dashed: from the vertical to the start of each.",
+        "line of nodes) carry the axis to (sin theta sin phi, -sin theta cos phi, cos theta), a quarter turn away. "
+        "Its animated triad and its curve therefore do not meet. Dashed: from the vertical to the start of each.",
         "Two views of the sphere from above, each with two paths of the same shape; an arc of 90 degrees joins the "
         "directions of their starts.",
     )
@@ -333,8 +334,7 @@ def draw_modified_energy(data: xr.Dataset) -> Picture:
         "modified-energy",
         figure,
         f"Why the energy is bounded, over the notebook's horizons on {' and '.join(PARTS)}, both rows in angles: the "
-        "map conserves a modified Hamiltonian, from which the energy H differs by "
-        "O(h^2). H and the modified energy to its first term change with these powers of the step: "
-        f"{words.modified_orders(data)}.",
+        "map conserves a modified Hamiltonian, from which the energy H differs by O(h^2). "
+        f"{words.modified_sentence(data)}",
         "Left, the energy oscillates and the modified energy hardly; right, log-log plots of slopes 2 and 4.",
     )

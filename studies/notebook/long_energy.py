@@ -12,11 +12,11 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import residuals
-from symtop.methods.registry import integrator, split_name
+from symtop.methods.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate
 
-from .tables import SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION, Column
+from .tables import SOLVER, Column
 
 FIRST = 1.0  # s, of the times at which the largest error so far is stored
 TIMES = 320  # of them: neighbours are 2 to 3 % apart
@@ -59,40 +59,3 @@ def energy_until(data: xr.Dataset, scene: str, name: str, time: float) -> float:
     """The largest energy error of a row up to a time."""
     cell = data.sel(scene=scene, integrator=name)
     return float(cell[Column.LONG_ENERGY].values[np.searchsorted(cell[Column.LONG_TIME].values, time)])
-
-
-def answer(data: xr.Dataset, named: tuple[str, ...]) -> list[str]:
-    """Whether the discrete methods that are `named` keep the energy better than the solver, and from when on."""
-    sentences = []
-    for scene in map(str, data["scene"].values):
-        shown = [name for name in named if name in data["integrator"].values]
-        largest = data["energy_largest"].sel(scene=scene)
-        end = notebook_end(data, scene)
-        limit = float(largest.sel(integrator=SOLVER))
-        values = {name: float(largest.sel(integrator=name)) for name in shown}
-        worse, better = ([n for n in shown if (values[n] < limit) is wanted] for wanted in (False, True))
-        verdicts = [f"{word} with {', '.join(f'{name} ({values[name]:.0e})' for name in part)}"
-                    for word, part in (("worse", worse), ("better", better)) if part]  # fmt: skip
-        sentences.append(
-            f"Energy, discrete methods against the notebook's solver: on {scene}, at the notebook's t = {end:g}, it is "
-            f"kept {', and '.join(verdicts)}, against {limit:.0e} of {SOLVER} (tolerance {SOLVER_TOLERANCE:g}; "
-            f"the others take {STEPS_A_NUTATION:.0f} steps a nutation). {_later(data, scene, worse)}".rstrip()
-        )
-    return sentences
-
-
-def _later(data: xr.Dataset, scene: str, names: list[str]) -> str:
-    """From when on the rows that are worse at first are better."""
-    last, end = float(data[Column.LONG_TIME].sel(scene=scene).max()), notebook_end(data, scene)
-    since = {name: better_from(data, scene, name) for name in names}
-    true = [f"{time:.3g} ({name})" for name, time in sorted(since.items(), key=lambda one: one[1])
-            if math.isfinite(time)]  # fmt: skip
-    never = [name for name, time in since.items() if math.isinf(time)]
-    grown = [energy_until(data, scene, name, last) / energy_until(data, scene, name, end) - 1.0 for name in names]
-    level = (
-        f"Up to t = {last:g} their largest error grows by {max(grown, default=0.0):.0%}, and that of "
-        f"{split_name(SOLVER)[0]} to {energy_until(data, scene, SOLVER, last):.0e}"
-    )
-    parts = [f"their error is the smaller one from t = {', '.join(true)} on"] if true else []
-    parts += [f"with {', '.join(never)} it never is"] if never else []
-    return f"{level}; {'; '.join(parts)}." if parts else ""

@@ -9,11 +9,13 @@ import xarray as xr
 from symtop.measure.conservation import CONSTANTS
 from symtop.measure.order import power_law
 from symtop.model.charts import Array, axis_from_angles
+from symtop.report.phrases import few
 from symtop.report.style import number
 from symtop.runner.study import Table
 
 from .derivations import notebook_top
-from .long_energy import answer, better_from
+from .long_energy import better_from
+from .long_words import answer, long_table
 from .tables import ALPHA, MIDPOINT, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION, Column
 
 PARTS = {"spheroid": "first part", "goldstein": "second part"}  # of the notebook
@@ -23,16 +25,18 @@ ORDER_TWO = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]"
 DRAWN = (*ORDER_TWO, "strang[axis]", "cayley[axis]")  # methods of order two that the figures name
 
 HOW_TO_READ = (
-    "Each figure has what the notebook drew, by its own means, beside the truth; captions say what was reproduced, "
-    "what was matched by choice and what was corrected. A discrete Lagrangian L_d(q0, q1) gives a step by p0 = -D1 L_d "
-    "and p1 = D2 L_d. If L_d does not change when phi is shifted at both ends, D1 L_d + D2 L_d = 0 along phi and p_phi "
-    "cannot change: a symmetry of L_d conserves a momentum, at any step. L_d also generates a symplectic map, which "
-    "follows a modified Hamiltonian up to exponentially small terms: the energy may oscillate by O(h^2), not drift."
+    "A row is a method in one chart, method[chart]. Each figure has what the notebook drew, by its own means, beside "
+    "the truth; captions say what was reproduced, what was matched by choice and what was corrected. A discrete "
+    "Lagrangian L_d(q0, q1) gives a step by p0 = -D1 L_d and p1 = D2 L_d. If L_d does not change when phi is shifted "
+    "at both ends, D1 L_d + D2 L_d = 0 along phi and p_phi cannot change (Noether's theorem): a symmetry of L_d "
+    "conserves a momentum, at any step. A splitting conserves it because each of its parts has the symmetry. L_d also "
+    "generates a symplectic map, which follows a modified Hamiltonian up to exponentially small terms: the energy may "
+    "oscillate by O(h^2), not drift."
 )
 MATCHED = (
-    "Matched by choice, not reproduced: the notebook does not state its tolerance. LSODA gets "
+    "Matched by choice, not reproduced: the notebook states no tolerance. LSODA gets "
     f"{SOLVER_TOLERANCE:g} here, at which it keeps the 5 figures of the energy and 6 of each momentum that the "
-    "notebook reports to t = 8; size and direction of its residuals depend on this choice."
+    "notebook reports to t = 8. Size and direction of its residuals depend on this choice."
 )
 
 
@@ -48,13 +52,12 @@ def momenta(data: xr.Dataset) -> str:
     lost, count = [name for name, change in largest.items() if not change < KEPT], len(largest)
     step = f"at the step measured, {STEPS_A_NUTATION:.0f} a nutation"
     kept = f"all {count}" if not lost else f"{count - len(lost)} of {count}"
-    rest = f"; not with {', '.join(lost)}" if lost else "; theory says at any step"
+    rest = f", not with {few(lost)}" if lost else " (theory: at any step)"
     solver = data[list(MOMENTA)].sel(scene="spheroid", integrator=SOLVER)
     return (
         f"With {kept} discrete methods both momenta are constant to rounding {step}{rest}. The largest relative change "
         f"is {max(largest.values()):.0e}, against {float(solver.to_dataarray().max()):.0e} with the solver on the "
-        "first scene. A discrete Lagrangian that does not change with phi and psi obeys Noether's theorem, p_phi = D2 "
-        "L_d = -D1 L_d; a splitting obeys it because each of its parts has the symmetry."
+        "first scene."
     )
 
 
@@ -131,11 +134,10 @@ def energy(data: xr.Dataset) -> str:
     midpoint = data.sel(scene="spheroid", integrator=MIDPOINT)
     gain = float(midpoint[Column.ENERGY_CHANGE][0] / midpoint[Column.MODIFIED_CHANGE][0])
     return (
-        f"The energy error of the discrete methods is bounded, not small: at {STEPS_A_NUTATION:.0f} steps a nutation "
+        "The energy error of the discrete methods is bounded, not small: "
         f"{sum(error < limit for error in errors.values())} of {len(errors)} have a smaller one than the solver "
-        f"({limit:.0e}) on the first scene to t = 8. It is bounded because the map is symplectic and "
-        "conserves a modified Hamiltonian: the first term of that Hamiltonian lowers the energy change of the midpoint "
-        f"rule {gain:.0f}-fold at 40 steps a nutation."
+        f"({limit:.0e}) on the first scene to t = 8. Their map conserves a modified Hamiltonian: at 40 steps a "
+        f"nutation its first term lowers the energy change of the midpoint rule {gain:.0f}-fold."
     )
 
 
@@ -149,32 +151,45 @@ def verdict(data: xr.Dataset) -> list[str]:
         f"derivations agree to {float(data[Column.DERIVATIONS_GAP].max()):.0e} rad, and both energies to "
         f"{float(data[Column.ENERGY_GAP].max()):.0e} (relative) with E1 = E - p_psi^2/2 I3."
     )
-    corrected = (
-        f"Corrected: alpha = {ALPHA:g} contradicts a release at rest (which has alpha = "
+    printed = (
+        f"Corrected: alpha = {ALPHA:g} contradicts a release at rest, which has alpha = "
         f"{float(second[Column.ALPHA_AT_REST]):.6f}; the printed one means |theta'| = "
-        f"{float(second[Column.ALPHA_RATE]):.6f} rad/s); the drawn path is a quarter turn from the axis; the inertia "
-        "is that about the centre of gravity but is used about the pivot, and one letter stands for the polar radius "
-        "and for the lever arm (from_spheroid with a pivot_distance is the physical reading)."
+        f"{float(second[Column.ALPHA_RATE]):.6f} rad/s."
     )
-    return [*hopes(data), reproduced, MATCHED, corrected, momenta(data), energy(data)]
+    drawn = (
+        "Corrected: the drawn path is a quarter turn from the axis. The inertia is that about the centre of gravity "
+        "but is used about the pivot, and one letter is both the polar radius and the lever arm; from_spheroid with a "
+        "pivot_distance is the physical reading."
+    )
+    return [*hopes(data), momenta(data), energy(data), reproduced, MATCHED, printed, drawn]
 
 
-def modified_orders(data: xr.Dataset) -> str:
-    """Slopes of the energy change and of the modified energy's change against the step."""
-    rows = []
-    for scene in data["scene"].values:
-        for name in MODIFIED:
+def modified_orders(data: xr.Dataset) -> dict[tuple[str, str], tuple[float, float]]:
+    """Slopes of the energy change and of the modified energy's change against the step, by scene and row."""
+    slopes = {}
+    for scene in map(str, data["scene"].values):
+        for name in (row for row in MODIFIED if row in data["integrator"].values):
             run = data.sel(scene=scene, integrator=name)
             plain, modified = (
                 power_law(run[Column.MODIFIED_STEP].values, run[column].values).slope
                 for column in (Column.ENERGY_CHANGE, Column.MODIFIED_CHANGE)
             )
-            rows.append(f"{name} on {scene} {plain:.2f} and {modified:.2f}")
-    return "; ".join(rows)
+            slopes[scene, name] = plain, modified
+    return slopes
+
+
+def modified_sentence(data: xr.Dataset) -> str:
+    """Both slopes, from the least to the largest over scenes and rows."""
+    plain, modified = (
+        f"{min(values):.2f} to {max(values):.2f}" for values in zip(*modified_orders(data).values(), strict=True)
+    )
+    return (
+        f"H changes with the step to the power {plain}, the modified energy to its first term to the power {modified}."
+    )
 
 
 def tables(data: xr.Dataset) -> list[Table]:
-    """Largest residuals of every integrator."""
+    """The energy far beyond the notebook's end, and the largest residuals of every integrator."""
     rows = []
     for scene in data["scene"].values:
         for name in data["integrator"].values:
@@ -188,4 +203,7 @@ def tables(data: xr.Dataset) -> list[Table]:
         f"Largest relative residuals over the notebook's own horizons ({STEPS_A_NUTATION:g} steps a nutation; {SOLVER} "
         f"at tolerance {SOLVER_TOLERANCE:g}), and the time from which the energy is kept better than by {SOLVER}"
     )
-    return [Table(title, header, rows)]
+    powers = [[*where, *(f"{slope:.2f}" for slope in both)] for where, both in modified_orders(data).items()]
+    modified = Table("Powers of the step with which the energy and the modified energy change",
+                     ["scene", "row", "energy", "modified energy"], powers)  # fmt: skip
+    return [long_table(data, DRAWN), modified, Table(title, header, rows)]

@@ -79,17 +79,15 @@ def draw(data: xr.DataTree, name: str) -> Picture:
     )
     headline(figure, words.message(data, name))
     tops = "random tops (medians)" if name == POPULATION else f"the scene {name}"
+    where = "random tops (medians, no named scene)" if name == POPULATION else tops
     return Picture(
         "map" if name == POPULATION else name,
         figure,
-        f"The cheapest row, method[chart], or its family, for an allowed error up to a horizon, on {tops}: phase is "
-        "the angle between the axes at the same time; energy is relative to E0 - min V; shape is the distance of "
-        "height and vertical velocity from the true orbit, which a delay does not change. At each cell every row has "
-        "the step or tolerance that suits it. A name is that of the method with the most cells of a region. Hatched: "
-        "the error of the winner is foretold from the measured growth of its own run. "
-        f"{words.level_sentence(data, name)} {words.spot_sentence(data)} {words.part_sentence(data)} Gauss methods "
-        "take no part in energy and shape, which they keep at any step, and closed forms (exact, exact-discrete) in "
-        "nothing: they cost the same at every horizon.",
+        f"The cheapest row, method[chart], or its family, for an allowed error up to a horizon, on {where}; every row "
+        "has the step or tolerance that suits a cell. Phase is the angle between the axes at one time, energy is "
+        "relative to E0 - min V, shape is the distance of height and vertical velocity from the true orbit, whatever "
+        "the delay. A name is that of the method with the most cells of a region. Hatched (foretold, not run): "
+        f"predicted from the measured growth of the winner's own run. {words.level_sentence(data, name)}",
         f"Three maps of the cheapest method over horizon and allowed error on {tops}: phase, energy and shape.",
         lead="Cheapest by error and run length" if name == POPULATION else "",
     )

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from symtop.report.phrases import counted
 from symtop.runner.study import Table
 
 from . import tables as diagrams
@@ -19,19 +20,19 @@ PANELS = {
     "shape": "shape: distance to the true orbit",
 }
 HOW_TO_READ = (
-    "A cell is an allowed error and a horizon; its colour is the row, a method in one chart, of the least cost, or the "
-    "family of that method. A cost is measured: force evaluations a nutation of the coarsest step or tolerance whose "
-    "error stays below the target up to the horizon, interpolated between settings a factor of 2 in the step or 10 in "
-    "the tolerance apart, times the measured time of an evaluation in a run by itself; of the population the median. "
-    "Errors are measured as far as the budget of a run goes, to 10^6 nutations at most, and behind that foretold from "
-    "the growth of the same run: one power of the horizon or the sum of two, and a walk of rounding whose size is an "
-    "order of magnitude. A cell is hatched if its winner's error is foretold. The table says which row is next; a cell "
-    f"is level if that costs less than {TIE:g} times as much. Energy and shape are asked from 4 steps a nutation on, "
-    "and not of the Gauss methods, which keep both at any step in the chart axis. Left out are exact and "
-    "exact-discrete, closed forms whose cost does not depend on the horizon or the error."
+    "A row is a method in one chart. A cell is an allowed error and a horizon; its colour is the row of the least "
+    "cost, or the family of that method. The cost is measured: force evaluations a nutation times the time of one, of "
+    "the population the median. They are those of the coarsest step or tolerance whose error stays below the target up "
+    "to the horizon, interpolated between settings a factor of 2 in the step or 10 in the tolerance apart. "
+    "Errors are measured to 10^6 nutations at most, as far as the budget of a run goes. Beyond, they are predicted "
+    "from the growth of the same run: one power of the horizon or the sum of two, and a walk of rounding known to an "
+    "order of magnitude. Hatched cells are predicted. Energy and shape are asked from 4 steps a nutation on, and not "
+    "of the Gauss methods, which keep both at any step. Left out are exact and exact-discrete, closed forms of "
+    "constant cost."
 )
+NEXT = 3  # rows that the table of shares names after the first
 CELLS = ["tops", "quantity", "target", "nutations", "cheapest", "ns a nutation", "next", "ratio", "kind"]
-SPOTS = ["quantity", "target", "nutations", "cheapest, foretold", "ns a nutation, foretold", "measured",
+SPOTS = ["quantity", "target", "nutations", "cheapest, predicted", "ns a nutation, predicted", "measured",
          "next, measured", "right"]  # fmt: skip
 LAWS = ["tops", "row", "setting", "measured to", *(f"{name}: power" for name in QUANTITIES),
         *(f"{name}: exponent" for name in QUANTITIES)]  # fmt: skip
@@ -81,13 +82,13 @@ def spot_sentence(data: xr.DataTree) -> str:
     """How many checks are right, and the worst."""
     each = spots(data)
     if not each:
-        return "No foretold cell was run: none is cheap enough."
+        return "No predicted cell was run: none is cheap enough."
     off = [abs(one.foretold / one.measured[0] - 1.0) for one in each]
     return (
-        f"Foretold cells run in full on {SCENE}: {len(each)}, to {max(one.horizon for one in each):.2g} nutations. The "
-        f"winner is right in {sum(one.winner for one in each)}; its cost is within {CLOSE:.0%} in "
-        f"{sum(one.close for one in each)}, off by {np.median(off):.1%} in the median and {max(off):.1%} at most; "
-        f"{sum(one.winner or one.close for one in each)} are right by one of the two."
+        f"To check the prediction, {counted(len(each), 'predicted cell')} were run in full on {SCENE}, to "
+        f"{max(one.horizon for one in each):.2g} nutations: {sum(one.winner for one in each)} have the predicted "
+        f"winner, and {sum(one.close for one in each)} its cost within {CLOSE:.0%} (off by {np.median(off):.1%} in the "
+        f"median, {max(off):.1%} at most)."
     )
 
 
@@ -96,20 +97,57 @@ def named(name: str) -> str:
     return "random tops" if name == POPULATION else name
 
 
-def winners_sentence(data: xr.DataTree, quantity: str) -> str:
-    """Which rows own how much of a panel, measured and foretold."""
-    said = []
+class Share(NamedTuple):
+    """Who owns how much of a panel."""
+
+    tops: str  # in words
+    reached: int  # cells that some row reaches
+    foretold: int  # of these
+    close: float  # share of these in which another row costs less than `TIE` times as much
+    owners: list[tuple[str, float]]  # rows with their share of these, the largest first
+
+
+def winners(data: xr.DataTree, quantity: str) -> list[Share]:
+    """Which rows own how much of the panels of an error, measured and predicted."""
+    found = []
     for name in diagrams.tops_run(data):
         panel = diagram(data, name, quantity)
         won = panel.winner >= 0
+        count = max(int(won.sum()), 1)
         owners = Counter(panel.names[k] for k in panel.winner[won].tolist())
-        most = ", ".join(f"{row} {count / max(won.sum(), 1):.0%}" for row, count in owners.most_common(4))
-        level = (panel.ratio[won] < TIE).mean() if won.any() else 0.0
-        said.append(
-            f"{named(name)}: {most} of {won.sum()} cells that some row reaches ({panel.foretold.sum()} foretold, "
-            f"{level:.0%} level)"
-        )
-    return f"Cheapest, {PANELS[quantity]}: {'; '.join(said)}."
+        most = [(row, cells / count) for row, cells in owners.most_common(1 + NEXT)]
+        close = float((panel.ratio[won] < TIE).mean()) if won.any() else 0.0
+        found.append(Share(named(name), int(won.sum()), int(panel.foretold.sum()), close, most))
+    return found
+
+
+def winners_sentence(data: xr.DataTree, quantity: str) -> str:
+    """Which rows are the cheapest in the most cells, of the population and of the scene."""
+    said = [
+        f"on {one.tops} {', then '.join(f'{row} in {share:.0%}' for row, share in one.owners[:2])}"
+        for one in winners(data, quantity)
+        if one.owners
+    ]
+    error, _, meaning = PANELS[quantity].partition(": ")
+    if not said:
+        return f"No row reaches any target of the {error} ({meaning})."
+    return (
+        f"The cheapest rows for the {error} ({meaning.replace(' (', ', ').rstrip(')')}) are {', and '.join(said)} of "
+        "the cells that some row reaches."
+    )
+
+
+def _shares(data: xr.DataTree) -> Table:
+    """The rows that own the most of each panel."""
+    lines = []
+    for quantity in QUANTITIES:
+        for one in winners(data, quantity):
+            cells = [f"{row} {share:.0%}" for row, share in one.owners]
+            lines.append([PANELS[quantity].partition(":")[0], one.tops, str(one.reached), str(one.foretold),
+                          f"{one.close:.0%}", *cells, *[""] * (1 + NEXT - len(cells))])  # fmt: skip
+    header = ["error", "tops", "cells reached", "of them predicted", f"another row within {TIE:g} times",
+              "cheapest in most", *(["next"] * NEXT)]  # fmt: skip
+    return Table("The cheapest rows, by the share of the cells that some row reaches", header, lines)
 
 
 def leaders(data: xr.DataTree, name: str) -> dict[str, tuple[str, float]]:
@@ -148,13 +186,21 @@ def taking_part(data: xr.DataTree) -> list[str]:
 
 
 def part_sentence(data: xr.DataTree) -> str:
-    """Which rows take part, and why another study may have another winner."""
-    rows = taking_part(data)
+    """How many rows take part, and why another study may have another winner."""
     return (
-        f"{len(rows)} rows take part, on the axis if they name no chart: {', '.join(rows)}. All others do not, as "
-        "taylor-longdouble and taylor-quad, which can be the fastest in the study work_precision where errors are "
-        "close to the rounding of double precision."
+        f"{counted(len(taking_part(data)))} take part. Others, as taylor-longdouble and taylor-quad, can be faster "
+        "where errors are close to the rounding of double precision, as the study work_precision shows."
     )
+
+
+def parts_table(data: xr.DataTree) -> Table:
+    """Every row that takes part, and in which panels."""
+    tops = diagrams.tops_run(data)[0]
+    rows = [str(row) for row in data[LADDERS].to_dataset()["integrator"].values]
+    panels = {quantity: set(diagrams.rows_of(data, tops, quantity)) for quantity in QUANTITIES}
+    marks = [[row, *("yes" if row in panels[quantity] else "no" for quantity in QUANTITIES)] for row in rows]
+    names = [PANELS[quantity].partition(":")[0] for quantity in QUANTITIES]
+    return Table("The rows that take part, and in which errors", ["row", *names], marks)
 
 
 def level_sentence(data: xr.DataTree, name: str) -> str:
@@ -174,18 +220,19 @@ def population_sentence(data: xr.DataTree) -> str:
     reach = float(group["reach"].max())
     return (
         f"{group.sizes['integrator']} rows on {members} random tops (seed 1) and on {SCENE}: measured to "
-        f"{reach:.2g} nutations, foretold to {float(group['horizon'].max()):.0e}."
+        f"{reach:.2g} nutations, predicted to {float(group['horizon'].max()):.0e}."
     )
 
 
 def sentences(data: xr.DataTree) -> list[str]:
     """The panels, the checks, and what was run."""
-    return [*(winners_sentence(data, name) for name in QUANTITIES), spot_sentence(data), population_sentence(data)]
+    panels = [winners_sentence(data, name) for name in QUANTITIES]
+    return [*panels, spot_sentence(data), population_sentence(data), part_sentence(data)]
 
 
 def tables(data: xr.DataTree) -> list[Table]:
-    """Every cell, the checks, and the laws of growth."""
-    return [_cells(data), _spots(data), _laws(data)]
+    """Shares of the cells, the checks, who takes part, every cell, and the laws of growth."""
+    return [_shares(data), _spots(data), parts_table(data), _cells(data), _laws(data)]
 
 
 def _cells(data: xr.DataTree) -> Table:
@@ -201,7 +248,7 @@ def _cells(data: xr.DataTree) -> Table:
                 lines.append(
                     [named(name), quantity, f"{TARGETS[t]:.0e}", f"{panel.horizons[h]:.2g}", panel.names[first],
                      f"{1e9 * panel.costs[first, t, h]:.3g}", panel.names[second] if np.isfinite(ratio) else "none",
-                     f"{ratio:.2f}" if np.isfinite(ratio) else "", "foretold" if panel.foretold[t, h] else "measured"]
+                     f"{ratio:.2f}" if np.isfinite(ratio) else "", "predicted" if panel.foretold[t, h] else "measured"]
                 )  # fmt: skip
     return Table("The cheapest row of each cell, whole decades of the error", CELLS, lines)
 
@@ -216,7 +263,7 @@ def _spots(data: xr.DataTree) -> Table:
              f"{one.rows[1]} {costs[1]}", right or "neither"]
         )  # fmt: skip
     return Table(
-        f"Foretold cells run in full on {SCENE}; right: the winner, or the cost within {CLOSE:.0%}", SPOTS, lines
+        f"Predicted cells run in full on {SCENE}; right: the winner, or the cost within {CLOSE:.0%}", SPOTS, lines
     )
 
 

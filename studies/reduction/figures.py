@@ -89,12 +89,11 @@ def draw_unreduced(data: xr.Dataset) -> Picture:
         "twins",
         figure,
         "Reduced kernels, whose rule is discretised first and freed of phi and psi afterwards, against their unreduced "
-        f"forms, which step the same rule and eliminate nothing, {COMPARED_STEPS} steps over eight "
-        f"nutations of {' and '.join(axes)}, both in angles: largest difference so far in any angle. It never "
-        f"exceeds {words.largest_gap(data):.1e} rad: the two are one map, apart from rounding. (The figure before "
-        "compares with what eliminates them first, which for most rules is another method.) Dashed: "
-        f"{SAME_MAP:.0e} rad, chosen beforehand as a bound of rounding: in n steps without compensated sums n^1.5 ulp "
-        "of the change in a step, and more near a pole.",
+        f"forms, which step the same rule and eliminate nothing: {COMPARED_STEPS} steps over eight nutations of "
+        f"{' and '.join(axes)}, both in angles. Drawn is the largest difference so far in any angle; it never exceeds "
+        f"{words.largest_gap(data):.1e} rad: the two are one map, apart from rounding. The figure before eliminates "
+        f"first, which for most rules is another method. Dashed: {SAME_MAP:.0e} rad, a bound of rounding chosen "
+        "beforehand: n^1.5 ulp of the change in a step, and more near a pole.",
         "Log-log plots of the largest difference of the angles against time, growing from 1e-16 to about 1e-12.",
     )
 

@@ -1,11 +1,13 @@
 """Sentences and tables of the reduction study, from its dataset."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from symtop.methods.registry import integrator
+from symtop.report.phrases import few
 from symtop.report.style import number
 from symtop.runner.study import Table
 
@@ -83,19 +85,20 @@ def unreduced_message(data: xr.Dataset, methods: list[str]) -> str:
 def commuting(data: xr.Dataset) -> str:
     """Which rules commute with the reduction, and how fast the others approach it."""
     same: dict[str, float] = {}
-    apart: dict[str, list[str]] = {}
-    for scene, method, cell in cells(data, Column.GAP):
+    apart: dict[str, list[float]] = {}
+    for _, method, cell in cells(data, Column.GAP):
         largest = float(cell[Column.GAP].max())
         if largest < COMMUTES:
             same[method] = max(largest, same.get(method, 0.0))
         else:
-            apart.setdefault(method, []).append(f"h^{commutation_order(cell):.2f} on {scene}")
-    commute = ", ".join(f"{method} (to {gap:.1e} rad)" for method, gap in same.items())
-    rest = "; ".join(f"{method} (as {', '.join(powers)})" for method, powers in apart.items())
-    return (
-        f"Rules for which the order of reducing and discretising does not matter: {commute or 'none'}. Rules for which "
-        f"the results differ: {rest or 'none'}."
-    )
+            apart.setdefault(method, []).append(commutation_order(cell))
+    powers = [power for several in apart.values() for power in several]
+    ends = " to ".join(dict.fromkeys(f"h^{pick(powers):.2f}" for pick in (min, max))) if powers else ""
+    parts = [f"the same method for {few(list(same))}, to {max(same.values()):.1e} rad"] if same else []
+    parts += [f"different ones for {few(list(apart))}, apart as {ends}"] if apart else []
+    if not parts:
+        return ""
+    return f"Eliminating phi and psi (reducing) before or after discretising gives {', and '.join(parts)}."
 
 
 def largest_gap(data: xr.Dataset) -> float:
@@ -103,41 +106,59 @@ def largest_gap(data: xr.Dataset) -> float:
     return max(float(cell[gap].max()) for _, _, cell in cells(data, Column.THETA_GAP) for gap in GAPS)
 
 
-def eliminating(data: xr.Dataset) -> str:
+def eliminating(data: xr.Dataset) -> list[str]:
     """What eliminating phi and psi changes and saves."""
     compared = cells(data, Column.THETA_GAP)
     drift = max(float(cell[p].max()) for *_, cell in compared for p in (Column.P_PHI_DRIFT, Column.P_PSI_DRIFT))
     costs = [cell[Column.SECONDS_A_STEP].values for *_, cell in cells(data, Column.SECONDS_A_STEP)]
     savings, largest = np.concatenate([cost[1] / cost[0] for cost in costs]), largest_gap(data)
     judged = "which is rounding" if largest < SAME_MAP else "which is more than rounding"
-    return (
-        "The reduced and the unreduced form of a discrete Lagrangian give the same trajectory to "
-        f"{largest:.1e} rad in {COMPARED_STEPS} steps, {judged}; the momenta of the unreduced form, which are part of "
-        f"its state, stay within {drift:.1e}. Eliminating phi and psi makes a step {savings.min():.1f} to "
-        f"{savings.max():.1f} times cheaper."
+    same = (
+        f"The reduced and the unreduced form of a discrete Lagrangian differ by {largest:.1e} rad in {COMPARED_STEPS} "
+        f"steps, {judged}. The momenta of the unreduced form, which are part of its state, stay within {drift:.1e}."
     )
+    return [
+        same, f"Eliminating phi and psi makes a step {savings.min():.1f} to {savings.max():.1f} times cheaper.",
+    ]  # fmt: skip
 
 
-def larger_charts(data: xr.Dataset) -> list[str]:
-    """What a larger chart costs, one sentence for each family and chart."""
+class Larger(NamedTuple):
+    """What a larger chart costs the methods of a family."""
+
+    family: str
+    chart: str
+    base: str
+    time: float  # median ratio of the times of a run
+    methods: list[str]
+
+
+def larger_charts(data: xr.Dataset) -> list[Larger]:
+    """What a larger chart costs, for each family and chart."""
     groups: dict[tuple[str, str, str], dict[str, list[float]]] = {}
     for _, method, ratio in ratios(data):
         group = groups.setdefault((integrator(method).family, ratio.chart, ratio.base), {})
         group.setdefault(method, []).append(ratio.time)
-    sentences = []
-    for (family, chart, base), times in groups.items():
-        methods = f"median of {len(times)} {family} methods" if len(times) > 1 else next(iter(times))
-        median = float(np.median([time for several in times.values() for time in several]))
-        sentences.append(
-            f"A run in the {chart} chart takes {median:.2g} times as long as in {base}, with the same steps or "
-            f"tolerances over {CHART_PERIODS:g} nutations ({methods})."
-        )
-    return sentences
+    return [
+        Larger(*names, float(np.median([time for several in times.values() for time in several])), list(times))
+        for names, times in groups.items()
+    ]
+
+
+def larger_sentence(data: xr.Dataset) -> str:
+    """What a larger chart costs, from the least to the most over families and charts; empty without any."""
+    found = sorted(larger_charts(data), key=lambda one: one.time)
+    if not found:
+        return ""
+    said = [f"{one.time:.2g} times as long ({one.chart} over {one.base}, {one.family})" for one in found]
+    return (
+        "A run in a larger chart, with the same steps or tolerances, takes in the median of a family "
+        f"{' to '.join(dict.fromkeys((said[0], said[-1])))} over {CHART_PERIODS:g} nutations."
+    )
 
 
 def verdict(data: xr.Dataset) -> list[str]:
-    """One sentence a comparison."""
-    return [commuting(data), eliminating(data), *larger_charts(data)]
+    """A sentence or two a comparison."""
+    return list(filter(None, [commuting(data), *eliminating(data), larger_sentence(data)]))
 
 
 def tables(data: xr.Dataset) -> list[Table]:
@@ -156,7 +177,12 @@ def tables(data: xr.Dataset) -> list[Table]:
         gap, h = cell[Column.GAP].values, cell[Column.STEP].values
         power = "" if np.nanmax(gap) < COMMUTES else f"{commutation_order(cell):.3f}"
         gaps.append([scene, method, f"{np.nanmax(h):.3g}", f"{gap[0]:.2e}", f"{gap[np.isfinite(gap)][-1]:.2e}", power])
+    larger = [
+        [one.family, one.chart, one.base, f"{one.time:.2g}", str(len(one.methods))] for one in larger_charts(data)
+    ]
+    title = f"A run in a larger chart: median time over that in the smallest, {CHART_PERIODS:g} nutations"
     return [
+        Table(title, ["family", "chart", "against", "time (ratio)", "methods"], larger),
         Table(
             f"A larger chart against the smallest, same steps or tolerances, {CHART_PERIODS:g} nutations",
             CHARTS,

@@ -9,6 +9,8 @@ import xarray as xr
 
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT
 from symtop.methods.registry import split_name
+from symtop.report.phrases import counted, few
+from symtop.runner.study import Table
 
 from .atlas import COMMON, NOTABLE, OutcomeMap, accurate_everywhere, closed_forms, common, maps, pole_effect
 from .tables import PERIODS, Column
@@ -22,6 +24,7 @@ FAILURES = {
     "step_too_small": "stop because their steps become too small",
     "out_of_budget": "exceed their budget of steps",
 }  # what runs do
+NO_LIMIT = "none"  # in the table: small nutations grow at no step of the map
 EXCEPTIONS = 2  # methods at most that a sentence on all others names apart
 
 
@@ -35,7 +38,7 @@ class Advice(NamedTuple):
     @property
     def sentence(self) -> str:
         """Both halves."""
-        return f"Use it {self.use}; {self.fails}."
+        return f"Use it {self.use}. I{self.fails[1:]}."
 
 
 def advice(data: xr.Dataset, family: str) -> dict[str, Advice]:
@@ -71,7 +74,7 @@ def _fails(one: OutcomeMap, over_gap: OutcomeMap | None) -> str:
         parts.append(f"needs {control} within {effect.width:.1g} rad of a pole{beside}")
     if not parts:
         return "it fails nowhere on the map"
-    return "it " + " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
+    return f"it {'. It '.join(parts)}"
 
 
 def _commonly(one: OutcomeMap) -> str:
@@ -156,20 +159,20 @@ def caption(data: xr.Dataset, scene: str, names: Sequence[str]) -> str:
         if shown[ending].early > 0.0
         else "No run ends early: an inaccurate run raises no error here."
     )
-    what = (
-        "one fall (one nutation period) of the scene grazing past a pole that the axis misses by 1.1 delta (rad)"
-        if scene == "grazing"
-        else f"the scene {scene} over {PERIODS:g} nutation periods with another spin r and everything else held fixed; "
-        "r = 1 is the spin from which a top sleeps (spins upright and stays so)"
-    )  # fmt: skip
     control = "step" if shown[names[0]].control == "step_size" else "tolerance"
-    together = ", one map for all without a wrong run" if accurate_everywhere(compared) else ", a map each"
+    what = (
+        f"One fall (one nutation period) of the scene grazing past a pole that the axis misses by 1.1 delta, in rad. "
+        f"Upwards delta grows, to the right the {control}"
+        if scene == "grazing"
+        else f"The scene {scene} over {PERIODS:g} nutation periods. Upwards the spin r grows (from r = 1 on a top "
+        f"sleeps: it spins upright and stays so), to the right the {control}"
+    )
+    together = ", one map for all without a wrong run" if accurate_everywhere(compared) else ""
     return (
-        f"Outcome of every run of {len(names)} rows{together}, named by method and chart, with the share of its map "
-        f"that is accurate: {what}. The {control} grows to the right; an equal {control} is not an equal cost. Bold: "
-        "the largest share and the smallest. "
-        f"{_counted(shown, compared)}Accurate in the largest part of its map: {best}; "
-        f"in the smallest: {worst}. {early}{_without_limit(data, scene, shown) if scene != 'grazing' else ''}"
+        f"Outcome of every run of {counted(len(names))}, a map each, named by method and chart, with the share that is "
+        f"accurate{together}. {what}. All else is held fixed, and an equal {control} is not an equal cost. "
+        f"{_counted(shown, compared)}Accurate in the largest part of its map: {best}; in the smallest: {worst}. {early}"
+        f"{_without_limit(data, scene, shown) if scene != 'grazing' else ''}"
     )
 
 
@@ -182,22 +185,26 @@ def _counted(shown: Mapping[str, OutcomeMap], compared: Mapping[str, OutcomeMap]
 
 
 def _without_limit(data: xr.Dataset, family: str, shown: Mapping[str, OutcomeMap]) -> str:
-    """Which methods of a page show no linear limit although their steps reach a third of a turn."""
-    if Column.LINEAR_LIMIT not in data:
-        return ""
-    cells = {name: data.sel(scene=family, integrator=name) for name in shown}
-    free = [
-        name
-        for name, cell in cells.items()
-        if np.isfinite(cell[Column.THIRD_TURN].values).any() and not np.isfinite(cell[Column.LINEAR_LIMIT].values).any()
-    ]
+    """How many methods of a page show no linear limit although their steps reach a third of a turn."""
+    free = [name for name in shown if _limit(data, family, name) == NO_LIMIT]
     if not free:
         return ""
     longest = max(float(shown[name].settings[-1]) for name in free)
     return (
-        f" Small nutations grow at no spin and no step tried, up to steps of {longest:.2g} nutation periods (h omega = "
-        f"{2.0 * math.pi * longest:.3g}): {', '.join(free)} {'have' if len(free) > 1 else 'has'} no linear limit there."
+        f" With {few(free, most=2)} small nutations grow at no spin and no step up to {longest:.2g} nutation periods "
+        f"(h omega = {2.0 * math.pi * longest:.3g})."
     )
+
+
+def _limit(data: xr.Dataset, family: str, name: str) -> str:
+    """The least step, in nutation periods, beyond which small nutations grow at some spin; empty if not known."""
+    if Column.LINEAR_LIMIT not in data:
+        return ""
+    cell = data.sel(scene=family, integrator=name)
+    limits, thirds = cell[Column.LINEAR_LIMIT].values, cell[Column.THIRD_TURN].values
+    if np.isfinite(limits).any():
+        return f"{np.nanmin(limits):.2g}"
+    return NO_LIMIT if np.isfinite(thirds).any() else ""
 
 
 def _charts(names: Iterable[str]) -> dict[str, list[str]]:
@@ -211,27 +218,69 @@ def _charts(names: Iterable[str]) -> dict[str, list[str]]:
 def summary(data: xr.Dataset, family: str) -> list[str]:
     """How far steps reach on fast and on slow tops, which methods end early, and how many wrong runs raise no error."""
     by_name = maps(data, family)
-    sentences = []
-    for kind in ("fast", "slow"):
-        reach = {name: one.usual_reach[kind] for name, one in by_name.items() if one.control == "step_size"}
-        ranked = sorted((name for name in reach if reach[name] > 0.0), key=lambda name: -reach[name])
-        if ranked:
-            best, worst = (", ".join(f"{name} ({reach[name]:.2g})" for name in part)
-                           for part in (ranked[:4], ranked[:-4:-1]))  # fmt: skip
-            sentences.append(
-                f"On {kind} tops of the family {family}, over {PERIODS:g} nutations, the largest accurate steps, in "
-                f"nutation periods: {best}; the smallest: {worst}."
-            )
-    for method, rows in _charts(by_name).items():
-        listed = ", ".join(f"{by_name[name].shares[0]:.0%} with {name}" for name in rows)
-        sentences.append(f"The chart alone, same steps of {method}: accurate in {listed} of the map of {family}.")
+    sentences = [said for said in (_reaches(data, family, by_name), _charts_apart(by_name, family)) if said]
     never = [name for name, one in by_name.items() if one.early == 0.0]
-    if never:
-        sentences.append(f"{len(never)} of {len(by_name)} rows never end early: {', '.join(never)}.")
     if by_name:
+        median = float(np.median([one.silent for one in by_name.values()]))
         sentences.append(
-            f"For the median row, {np.median([one.silent for one in by_name.values()]):.0%} of inaccurate runs "
-            "end without an error, whether or not they keep the energy; only the comparison with the truth shows "
-            "that they are wrong."
+            f"With the median row {median:.0%} of inaccurate runs end without an error, whether or not they keep the "
+            f"energy, and {len(never)} of {counted(len(by_name))} never end a run early. Only the comparison with the "
+            "truth shows that they are wrong."
         )
     return sentences
+
+
+def _reaches(data: xr.Dataset, family: str, by_name: Mapping[str, OutcomeMap]) -> str:
+    """The longest accurate steps on fast and on slow tops, from the least row to the best; closed forms apart."""
+    apart, parts = closed_forms(data, by_name), []
+    for kind in ("fast", "slow"):
+        reach = {
+            name: one.usual_reach[kind] for name, one in by_name.items()
+            if one.control == "step_size" and name not in apart and one.usual_reach[kind] > 0.0
+        }  # fmt: skip
+        if reach:
+            ends_of = [f"{reach[name]:.2g} ({name})" for name in (pick(reach, key=lambda one: reach[one])
+                                                                  for pick in (min, max))]  # fmt: skip
+            parts.append(f"from {' to '.join(ends_of)} on {kind} tops")
+    if not parts:
+        return ""
+    return (
+        f"The longest accurate step on the family {family}, over {PERIODS:g} nutations, is {', '.join(parts)}, in "
+        f"nutation periods.{f' Not counted: {few(apart)}, exact at any step.' if apart else ''}"
+    )
+
+
+def _charts_apart(by_name: Mapping[str, OutcomeMap], family: str) -> str:
+    """How much of a map the chart alone decides, with the method for which that is most; empty without two charts."""
+    several = _charts(by_name)
+    if not several:
+        return ""
+    shares = {method: {name: float(by_name[name].shares[0]) for name in rows} for method, rows in several.items()}
+    most = max(shares, key=lambda method: max(shares[method].values()) - min(shares[method].values()))
+    listed = " and ".join(f"{share:.0%} with {name}" for name, share in shares[most].items())
+    return (
+        f"The chart alone, same steps or tolerances, matters most for {most}: accurate in {listed} of the map of "
+        f"{family}. {counted(len(shares), 'method')} ran in two charts."
+    )
+
+
+def atlas_tables(data: xr.Dataset, family: str) -> list[Table]:
+    """When to use each row and when it fails, its shares of the map, and what the chart alone changes."""
+    by_name, lines = maps(data, family), []
+    for name, line in advice(data, family).items():
+        one = by_name[name]
+        shares = (f"{share:.0%}" for share in (one.shares[0], one.early, one.silent))
+        lines.append([line.integrator, line.use, line.fails, *shares, _limit(data, family, name)])
+    title = f"The atlas in words: {family} with its spin changed, {PERIODS:g} nutations"
+    header = ["row", "use it", "it fails", "accurate runs", "runs that end early", "inaccurate runs without an error",
+              "small nutations grow beyond a step of (nutation periods)"]  # fmt: skip
+    made = [Table(title, header, lines)]
+    if several := _charts(by_name):
+        charts = list(dict.fromkeys(split_name(name)[1] for rows in several.values() for name in rows))
+        shown = [
+            [method, *(f"{by_name[row].shares[0]:.0%}" if (row := f"{method}[{chart}]") in by_name else ""
+                       for chart in charts)]
+            for method in several
+        ]  # fmt: skip
+        made.append(Table(f"The chart alone: accurate share of the map of {family}", ["method", *charts], shown))
+    return made

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import xarray as xr
 
+from symtop.report.phrases import counted
 from symtop.report.style import headline
 from symtop.runner.study import Picture
 
@@ -11,6 +12,7 @@ from . import mechanism_figures
 from .atlas import common, families, maps
 from .atlas_figures import by_area, enlarged, small_maps
 from .atlas_words import advice, caption, page_message
+from .tables import PERIODS
 
 FAMILIAR = "stormer-verlet[angles]"  # the map that is enlarged, if it is there
 CONTROLLED = {"step_size": "steps", "tolerance": "tolerances"}  # the pages of maps, by what grows to the right
@@ -34,7 +36,8 @@ def _pages(data: xr.Dataset, scene: str, over: str, name: str) -> Iterator[Pictu
         names = by_area(common(shown))
         figure = small_maps(data, scene, names, over)
         headline(figure, page_message(data, scene, shown))
-        alt = f"Small maps of outcomes, in the order of their accurate share: {', '.join(names)}."
+        count = counted(len(names), "small map")
+        alt = f"{count} of outcomes, from {names[0]} with the most accurate runs to {names[-1]}."
         yield Picture(f"{name}-{title}", figure, caption(data, scene, names), alt)
 
 
@@ -45,5 +48,9 @@ def _enlarged(data: xr.Dataset, family: str) -> Picture:
     beside = "" if past is None else f" with its spin changed and in {past.shares[0]:.0%} past a pole"
     message = f"{name} is accurate in {right:.0%} of the runs of {family}{beside}"
     figure = enlarged(data, family, name, message)
-    text = f"How to read a map of the atlas. {advice(data, family)[name].sentence} {caption(data, family, [name])}"
+    what = "" if past is None else ", and right a fall of the scene grazing past a pole"
+    text = (
+        f"How to read a map of the atlas: one row, method[chart], enlarged. Left the scene {family} over {PERIODS:g} "
+        f"nutation periods with another spin{what}; all else is held fixed. {advice(data, family)[name].sentence}"
+    )
     return Picture(f"atlas-{family}-enlarged", figure, text, f"Two maps of the outcomes of {name}, enlarged.")

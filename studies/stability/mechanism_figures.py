@@ -229,10 +229,10 @@ DRAWINGS: dict[str, tuple[str, str, Callable[[Any, xr.Dataset], None]]] = {  # s
     "solver": ("goldstein", Column.TEXTBOOK_ENERGY, _solver),
 }
 ALTS = {
-    "pole": "Log-log plot of the axis error against the gap to a pole.",
-    "resonances": "Plot of the displacement that survives against the step.",
-    "sleeping": "Plot of the least sleeping spin against the step, with two laws.",
-    "separatrix": "Plot of the accurate time against the early error, with a logarithmic law.",
-    "sampling": "Log-log plot of energy errors sampled once a nutation against those of every step.",
-    "solver": "Log-log plot of residuals against the solver's tolerance.",
+    "pole": "Error against the gap to a pole.",
+    "resonances": "Surviving displacement against the step.",
+    "sleeping": "Least sleeping spin against the step.",
+    "separatrix": "Accurate time against the early error.",
+    "sampling": "Energy errors sampled in two ways.",
+    "solver": "Residuals against the solver's tolerance.",
 }

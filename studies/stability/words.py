@@ -10,26 +10,29 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from symtop.report.phrases import counted, few
 from symtop.runner.study import Table
 
 from .atlas import NEAR, families, map_of, methods_of, pole_effect
-from .atlas_words import advice, summary
+from .atlas_words import atlas_tables, summary
 from .failures import LONGEST, LOST, SEEN
-from .tables import PERIODS, Column
+from .tables import Column
 
 HOW_TO_READ = (
-    "A map has one cell a run. To the right the step or the tolerance grows; upwards the spin r, or the gap delta "
-    "between path and pole. Green is accurate. Yellow has bounded energy and a wrong phase. Hatched cells lose energy, "
-    "cross a turning point of the true motion, or end early. Solid lines: the linear limit, the step beyond which "
-    "small nutations about a steady precession grow; a fixed-step method without a solid line has no such limit on the "
-    "map, or none that can be measured. Dashed lines: the step that advances such a nutation by a third of a turn. A "
-    "limit for fast tops (r > 3) or slow tops (r < 1) holds for nine spins in ten. A method is said to fail from a "
-    "step or tolerance on if at least half of all spins fail there and at every larger one: they change their energy "
-    "ever more, cross a turning point of the true motion, or end early. A name method[chart], as rk4[axis], is a "
-    "method in one chart."
+    "A row is a method in one chart, method[chart], as rk4[axis]. A map has one cell a run. To the right the step or "
+    "the tolerance grows; upwards the spin r, or the gap delta between path and pole. Green is accurate. Yellow has "
+    "bounded energy and a wrong phase. Hatched cells fail: they lose energy, cross a turning point of the true motion, "
+    "or end early. Solid lines: the linear limit, the step beyond which small nutations about a steady precession "
+    "grow; without one there is no such limit on the map, or none that can be measured. Dashed lines: the step that "
+    "advances such a nutation by a third of a turn. A limit for fast tops (r > 3) or slow tops (r < 1) holds for nine "
+    "spins in ten. A method fails from a step or tolerance on if at least half of all spins fail there and at every "
+    "larger one."
 )
 VERLET = "stormer-verlet[angles]"
 LOOSE = 10.0  # times the change of the solved equation: lost because the solver's tolerance is too loose
+THIRDS = {  # the step that turns the nutation by a third, as h omega: two rows with a closed form
+    VERLET: "sqrt 3", "midpoint[angles]": "2 sqrt 3",
+}  # fmt: skip
 BARELY = 0.02  # rad: a largest surviving displacement below this counts as none
 REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
 LEAST_SAMPLED = 1e-14  # an energy error that is rounding
@@ -43,8 +46,11 @@ def _rows(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
     return {name: cell for name, cell in cells.items() if np.isfinite(cell[variable].values).any()}
 
 
-def _listed(values: Mapping[str, float]) -> str:
-    return ", ".join(f"{value:.4f} for {name}" for name, value in sorted(values.items(), key=lambda one: one[1]))
+def _ends(values: Mapping[str, float]) -> str:
+    """The least and the largest of some numbers, with their rows."""
+    ranked = sorted(values, key=lambda name: values[name])
+    said = [f"{values[name]:.4g} ({name})" for name in dict.fromkeys((ranked[0], ranked[-1]))]
+    return f"from {' to '.join(said)}" if len(said) > 1 else f"at {said[0]}"
 
 
 def held_fixed(data: xr.Dataset, mechanism: str) -> str:
@@ -69,7 +75,7 @@ def held_fixed(data: xr.Dataset, mechanism: str) -> str:
     else:
         step_size, steps = of("goldstein", Column.SOLVER_STEP, Column.SOLVER_STEPS)
         text = f"Scene goldstein, step {step_size:g} s, {steps:.0f} steps"
-    return f"{text}. The name of a row is method[chart]."
+    return f"{text}. A row is method[chart]."
 
 
 def halved_at_pole(part: xr.Dataset) -> dict[bool, list[bool]]:
@@ -90,19 +96,25 @@ def poles(part: xr.Dataset) -> str:
     return (
         f"A pole closer than {NEAR:g} rad to the path at least halves the accurate step of {sum(halved[True])} of "
         f"{len(halved[True])} rows of fixed step in the angles chart, and of {sum(halved[False])} of "
-        f"{len(halved[False])} in charts without poles (one fall past the pole, the rest of the start held fixed)."
+        f"{len(halved[False])} in charts without poles. Each run is one fall past the pole, all else is held fixed."
     )
 
 
 def limits(part: xr.Dataset) -> str:
     """Linear limits of the step, and the methods that have none."""
     phases = {name: float(cell[Column.LIMIT_PHASE]) for name, cell in _rows(part, Column.LIMIT_PHASE).items()}
-    growing = "Small nutations about a steady precession grow from h omega (step times nutation frequency) = "
-    text = f"{growing}{_listed(phases)}." if phases else ""
-    free = unlimited(part)
+    free, subject, parts = unlimited(part), "Small nutations about a steady precession", []
+    if phases:
+        parts.append(
+            f"{subject} grow beyond a step limit with {few(list(phases), most=2)}. As h omega, step times "
+            f"nutation frequency, the limits reach {_ends(phases)}."
+        )
     if free:
-        text += f" They grow at no step up to h omega = {max(free.values()):g} with {', '.join(free)}."
-    return text.strip()
+        parts.append(
+            f"{'They' if phases else subject} grow at no step up to h omega = {max(free.values()):g} with "
+            f"{few(list(free))}."
+        )
+    return " ".join(parts)
 
 
 def unlimited(part: xr.Dataset) -> dict[str, float]:
@@ -136,10 +148,12 @@ def resonances(part: xr.Dataset) -> str:
     steps = resonant(part)
     if not steps:
         return ""
+    tried = int(np.isfinite(part[Column.THIRD_TURN_PHASE]).sum())
+    known = [f"{steps[name]:.4f} with {name} (theory: {theory})" for name, theory in THIRDS.items() if name in steps]
     return (
-        f"A step that advances the nutation by a third of a turn is linearly stable, but a top displaced by "
-        f"{BARELY:g} rad or more leaves its steady precession. This step is h omega = {_listed(steps)} (theory: "
-        "sqrt 3 = 1.7321 for Verlet, 2 sqrt 3 = 3.4641 for the midpoint rule)."
+        "A step that turns the nutation by a third is linearly stable, but with "
+        f"{len(steps)} of {counted(tried)} a top displaced by {BARELY:g} rad or more does not stay. "
+        f"There h omega is {', '.join(known) or _ends(steps)}."
     )
 
 
@@ -156,7 +170,7 @@ def sleepers(part: xr.Dataset) -> str:
         return ""
     return (
         "The true top sleeps (spins upright and stays so) from a spin I3 w3 of 2 on, if I1 = mgl = 1. A step moves "
-        f"this threshold, to {'; to '.join(moved)}."
+        f"this threshold to {' and to '.join(moved)}."
     )
 
 
@@ -191,15 +205,20 @@ def horizons(part: xr.Dataset) -> str:
     gap = misses(part)
     if not gap.size:
         return ""
-    text = (
-        "The separatrix is the motion that rises towards the upright for ever; its time scale is 1/λ = sqrt(I1/mgl). "
-        f"Next to it errors grow as exp(λ t/2). From the error at time {SEEN:g}/λ this predicts when {gap.size} runs "
-        f"reach an axis error of {LOST:g} rad; the median miss is {np.median(gap):.2f}/λ, the largest "
-        f"{np.max(gap):.1f}/λ, and the longest run takes {float(foreseen(part)[Column.HORIZON].max()):.0f}/λ. Methods "
-        "that conserve the energy are not among them"
+    longest = float(foreseen(part)[Column.HORIZON].max())
+    return (
+        "Next to the separatrix, the motion that rises for ever, errors grow as exp(λ t/2), λ = "
+        f"sqrt(mgl/I1). An error at {SEEN:g}/λ predicts when {gap.size} runs, the longest after {longest:.0f}/λ, "
+        f"reach {LOST:g} rad: to {np.median(gap):.2f}/λ in the median, {np.max(gap):.1f}/λ at most.{_longer(part)}"
     )
+
+
+def _longer(part: xr.Dataset) -> str:
+    """Which rows outlast the prediction; empty if none does."""
     apart = outlasting(part)
-    return f"{text}; the prediction is outlasted by more than {OUTLASTS:g}/λ with {', '.join(apart) or 'none'}."
+    if not apart:
+        return ""
+    return f" {few(apart)} {'last' if len(apart) > 1 else 'lasts'} more than {OUTLASTS:g}/λ longer."
 
 
 def sampling(part: xr.Dataset) -> str:
@@ -209,20 +228,18 @@ def sampling(part: xr.Dataset) -> str:
     if not good.any():
         return ""
     names, seen = part["integrator"].values, good & (once > LEAST_SAMPLED)
-    unseen = zip(names[good & ~seen], every[good & ~seen], strict=True)
-    hidden = ", ".join(f"{name} ({error:.0e})" for name, error in unseen)
-    text = f"Sampled once a nutation, the energy error of {hidden} is below rounding" if hidden else ""
+    hidden = int((good & ~seen).sum())
+    parts = [f"that of {counted(hidden)} falls below rounding"] if hidden else []
     if seen.any():
         ratio = np.where(seen, every / np.where(seen, once, 1.0), 0.0)
         worst = int(np.argmax(ratio))
-        text += "; others appear" if hidden else "An energy error that is sampled once a nutation appears"
-        text += f" up to {ratio[worst]:.0e} times too small ({names[worst]})"
+        parts.append(f"the others look up to {ratio[worst]:.0e} times too small ({names[worst]})")
+    text = f"An energy error that is sampled once a nutation looks too small: {', '.join(parts)}."
     if VERLET in part["integrator"].values:
         verlet = part.sel(integrator=VERLET)
-        true, seen = float(verlet[Column.ENERGY_EVERY]), float(verlet[Column.ENERGY_ONCE])
-        text += f"; that of {VERLET} is {true:.2g} and appears as {seen:.1g}"
-    scene = f"on {part['scene'].values}, " if "scene" in part.coords else ""
-    return f"{text} ({scene}the same steps a nutation for all)."
+        true, shown = float(verlet[Column.ENERGY_EVERY]), float(verlet[Column.ENERGY_ONCE])
+        text += f" With {VERLET} it is {true:.2g} and looks like {shown:.1g}."
+    return text
 
 
 def solver(part: xr.Dataset) -> str:
@@ -231,14 +248,14 @@ def solver(part: xr.Dataset) -> str:
         solved, one = float(row[Column.TEXTBOOK_ENERGY][-1]), float(row[Column.ONE_ITERATION_ENERGY])
         energy, momenta = row[Column.SOLVER_ENERGY].values, row[Column.SOLVER_MOMENTUM].values
         first = f"grows to {one:.1e}" if one > LOOSE * solved else f"stays at {one:.1e}"
-        cause = ": the difference comes from the solver" if one > LOOSE * solved else ""
+        cause = ": the solver makes the difference" if one > LOOSE * solved else ""
         lost = {"energy": energy[0] > LOOSE * energy[-1], "momenta": momenta[0] > LOOSE * momenta[-1]}
         verbs = {name: f"{'loses' if gone else 'conserves'} the {name}" for name, gone in lost.items()}
         return (
-            f"With one Newton iteration a step the energy error of {name} {first}; with its equation solved it stays "
-            f"within {solved:.1e}{cause}. The kernel of this package, stopped after one iteration, {verbs['energy']} "
-            f"({energy[0]:.1e}, and {energy[-1]:.1e} when solved) {'and' if len(set(lost.values())) == 1 else 'but'} "
-            f"{verbs['momenta']} ({momenta[0]:.0e}, and {momenta[-1]:.0e} when solved)."
+            f"With one Newton iteration a step the energy error of {name} {first}, with its equation solved it stays "
+            f"within {solved:.1e}{cause}. This package's kernel, stopped after one iteration, {verbs['energy']} "
+            f"({energy[0]:.1e}; solved: {energy[-1]:.1e}) {'and' if len(set(lost.values())) == 1 else 'but'} "
+            f"{verbs['momenta']} ({momenta[0]:.0e}; solved: {momenta[-1]:.0e})."
         )
     return ""
 
@@ -279,11 +296,7 @@ LIMITS = (  # scene, variable, header, format
 
 def tables(data: xr.Dataset) -> list[Table]:
     """The atlas in words, and the limits in numbers."""
-    shown = [
-        Table(f"The atlas in words: {family} with its spin changed, {PERIODS:g} nutations",
-              ["row", "use it", "it fails"], [list(line) for line in advice(data, family).values()])
-        for family in families(data)
-    ]  # fmt: skip
+    shown = [table for family in families(data) for table in atlas_tables(data, family)]
     columns = [one for one in LIMITS if one[0] in data["scene"].values and one[1] in data]
     rows, limit = [], LIMITS[0]
     free = unlimited(data.sel(scene=limit[0])) if limit in columns else {}

@@ -14,7 +14,7 @@ from .tables import BOUND, DIGITS, ERROR, SECONDS, bound_ratios
 
 def verdict(data: xr.Dataset) -> list[str]:
     """Whether bounds hold, what the published values show, and how the closed form is known."""
-    return [bounds(data), published(published_values()), *closed_form(data)]
+    return [bounds(data), *published(published_values()), *closed_form(data)]
 
 
 def bounds(data: xr.Dataset) -> str:
@@ -50,19 +50,22 @@ def measured_against(data: xr.Dataset) -> str:
     return f"{text}; integration in quadruple precision, which knows nothing of it,\nagrees with it to {agreed} rad."
 
 
-def published(values: list[Published]) -> str:
+def published(values: list[Published]) -> list[str]:
     """How many published values are reproduced, and what they test."""
     printed, others = ([entry for entry in values if (entry.kind == "printed") is wanted] for wanted in (True, False))
     right, agreeing = (f"{sum(entry.reproduced for entry in part)} of {len(part)}" for part in (printed, others))
     tests, other_tests = ([entry.tests for entry in part] for part in (printed, others))
     sources = ", ".join(dict.fromkeys(entry.source for entry in printed if entry.tests == TRAJECTORY))
-    return (
+    first = (
         f"{right} printed values are reproduced to the last digit. Only {tests.count(TRAJECTORY)} of them test a "
         f"trajectory of the top ({sources or 'none'}); {tests.count(START)} tests the energy of a start, and "
-        f"{tests.count(OTHER_BODY)} belong to an asymmetric free body, which SciPy integrates here, not symtop. Of the "
-        f"values that follow from a formula, or from the numbers that a source was built from, {agreeing} agree; "
-        f"{other_tests.count(TRAJECTORY)} of them test a trajectory and {other_tests.count(START)} a start."
+        f"{tests.count(OTHER_BODY)} belong to an asymmetric free body, which SciPy integrates here, not symtop."
     )
+    second = (
+        f"Of the values that follow from a formula, or from the numbers that a source was built from, {agreeing} "
+        f"agree; {other_tests.count(TRAJECTORY)} of them test a trajectory and {other_tests.count(START)} a start."
+    )
+    return [first, second]
 
 
 def closed_form(data: xr.Dataset) -> list[str]:

@@ -157,7 +157,9 @@ def test_the_caption_of_a_page_names_the_methods_without_a_limit():
         for variable, value in ((Column.LINEAR_LIMIT, limit), (Column.THIRD_TURN, 0.55)):
             data[variable] = (("scene", "integrator", "curve"), [[[value, value]]])
         caption = atlas_words.caption(data, "cusp", ["midpoint"])
-        assert ("up to steps of 1 nutation periods (h omega = 6.28): midpoint has no linear limit" in caption) is said
+        assert ("With midpoint small nutations grow at no spin and no step up to 1 nutation periods" in caption) is said
+        (table,) = atlas_words.atlas_tables(data, "cusp")
+        assert table.rows[0][-1] == ("none" if said else "0.3")
 
 
 def hand_made(
@@ -186,7 +188,7 @@ def test_advice_reads_reach_and_failures_off_the_map():
     assert (
         line.fails
         == "it fails at h = 1 nutation periods and every larger step in at least 75% of 4 starts (of these runs 100% "
-        "leave their chart) and is wrong with bounded energy in 25% of its map"
+        "leave their chart). It is wrong with bounded energy in 25% of its map"
     )
     assert line.sentence.startswith("Use it with steps up to 0.1")
 
@@ -234,7 +236,12 @@ def test_the_two_charts_of_a_method_are_compared_and_one_alone_is_not():
     cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", integrator="midpoint", drop=True))
              for name, rows in (("rk4[angles]", [[A, L, L]] * 4), ("rk4[axis]", [[A, A, L]] * 4))]  # fmt: skip
     said = " ".join(atlas_words.summary(store.combine(cells), "cusp"))
-    assert "The chart alone, same steps of rk4: accurate in 33% with rk4[angles], 67% with rk4[axis] of the map" in said
+    assert "matters most for rk4: accurate in 33% with rk4[angles] and 67% with rk4[axis] of the map of cusp" in said
+    assert "0 of 2 rows never end a run early" in said
+    every, charts = atlas_words.atlas_tables(store.combine(cells), "cusp")
+    assert list(charts.rows) == [["rk4", "33%", "67%"]]
+    assert [row[3:6] for row in every.rows] == [["33%", "67%", "0%"], ["67%", "33%", "0%"]]
+    assert {len(row) for row in every.rows} == {len(every.header)}
     assert "The chart alone" not in " ".join(atlas_words.summary(store.combine(cells[:1]), "cusp"))
 
 
@@ -299,7 +306,7 @@ def test_a_page_of_small_maps_shows_every_row_once_in_the_order_of_its_accurate_
     assert "2 rows" in drawn["atlas-cusp-steps"].caption
     (title,) = (axis.get_title() for axis in drawn["atlas-cusp-tolerances"].figure.axes if axis.get_visible())
     assert title == "rk45\n[axis] 33%"
-    assert "The tolerance grows to the right" in drawn["atlas-cusp-tolerances"].caption
+    assert "to the right the tolerance" in drawn["atlas-cusp-tolerances"].caption
 
 
 def test_the_enlarged_map_is_that_of_a_familiar_row_and_names_its_regions():
@@ -354,7 +361,7 @@ def test_the_runs_that_outlast_the_law_of_the_separatrix_are_named_and_not_count
     assert words.outlasting(part) == ["gauss-4[axis]"]
     assert words.misses(part) == pytest.approx([0.5, 0.2])
     assert messages.of_mechanism("separatrix", part).endswith("to 0.35/λ in the median; 1 method lasts longer")
-    assert "outlasted by more than 10/λ with gauss-4[axis]." in words.horizons(part)
+    assert words.horizons(part).endswith("gauss-4[axis] lasts more than 10/λ longer.")
 
 
 def slope(pixels):

@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.optimize import root
 from symtop_studies.reduction import commutation, words
 from symtop_studies.reduction.commutation import gap, kernel_path, path, reduced_first
-from symtop_studies.reduction.tables import Column, commutation_table, unreduced_forms
+from symtop_studies.reduction.tables import Column, Ratio, commutation_table, unreduced_forms
 
 import symtop
 from symtop.measure.order import power_law
@@ -138,3 +138,16 @@ def test_the_title_of_the_twins_says_which_order_and_whether_the_difference_is_r
 def test_a_method_that_has_no_reduced_twin_is_refused_in_one_sentence():
     with pytest.raises(symtop.SymtopError, match="must be a reduced discrete Lagrangian, not 'rk45'"):
         commutation_table(symtop.scene("spheroid"), symtop.integrator("rk45"), 1.0, (10,))
+
+
+def test_what_a_larger_chart_costs_is_said_by_its_ends_and_listed_by_family(monkeypatch):
+    times = {"strang": 1.1, "yoshida-4": 0.9, "rk4": 2.4}
+    ratios = [("spheroid", name, Ratio("attitude", "axis", time, 1.0)) for name, time in times.items()]
+    monkeypatch.setattr(words, "ratios", lambda _: ratios)
+    assert [(one.family, one.time, one.methods) for one in words.larger_charts(None)] == [
+        ("splitting", 1.0, ["strang", "yoshida-4"]), ("runge-kutta", 2.4, ["rk4"]),
+    ]  # fmt: skip
+    said = words.larger_sentence(None)
+    assert "1 times as long (attitude over axis, splitting) to 2.4 times as long (attitude over axis, runge" in said
+    monkeypatch.setattr(words, "ratios", lambda _: [])
+    assert words.larger_sentence(None) == ""

@@ -72,13 +72,18 @@ def test_orders_walls_and_floors_are_read_off(measured):
     assert words.facts(measured, "rapier-float32[attitude]").best > 1e-3
 
 
-def test_each_engine_has_a_sentence_and_what_is_beside_them_has_none(measured):
+def test_what_is_said_of_engines_is_short_and_every_map_has_a_line_of_a_table(measured):
     said = words.verdict(measured)
-    assert len(said) == 2 + 1 + 3 + 1  # the field twice, the spherical top, the engines, what it does not say
-    assert "at every step" in words.sentence(measured, "no-gyro[axis]")
-    assert "at every step" not in words.sentence(measured, "mujoco-euler[axis]")
-    assert not any(one.startswith("strang") for one in said)
+    assert max(map(len, said)) <= 320
+    assert words.by_order(measured) == {0: ["no-gyro[axis]"], 1: ["mujoco-euler[axis]"]}  # single precision apart
+    assert words.ordered(measured).endswith("(1 row).")
+    assert " Without a gyroscopic term: " in words.ordered(measured)
+    assert " Order 1: " in words.ordered(measured)
+    assert words.in_single_precision(measured).startswith("In single precision shorter steps stop helping")
     assert said[-1].startswith("What this does not say")
+    by_order, every, *_ = listed.tables(measured)
+    assert [line[:2] for line in by_order.rows] == [["0 (no gyroscopic term)", "1"], ["1", "1"]]
+    assert [line[0] for line in every.rows] == words.rows(measured)
 
 
 @pytest.mark.parametrize("rate", [2.5, -0.7])
@@ -114,9 +119,10 @@ def test_at_the_same_cost_a_method_of_four_evaluations_takes_a_quarter_of_the_st
 
 
 def test_without_the_term_the_spherical_top_is_followed_by_order_h_and_with_it_not_at_all(measured):
-    (said,) = words.spherical(measured)
-    assert said.startswith("no-gyro[axis]")
-    assert "a difference of order 1.00" in said
+    assert "no-gyro[axis] are off it by" in words.spherical(measured)
+    assert "which shrinks with order 1.00" in words.spherical(measured)
+    (table,) = listed.spherical(measured)
+    assert [line[0] for line in table.rows] == ["no-gyro[axis]"]
     off = [
         [words.frame(measured, row, "spherical", rate) for rate in tables.FREQUENCIES] for row in words.rows(measured)
     ]

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from symtop_studies.notebook import words as notebook_words
 from symtop_studies.notebook.long_energy import better_from
+from symtop_studies.notebook.long_words import long_table
 from symtop_studies.notebook.tables import SOLVER, Column
 
 
@@ -48,16 +49,15 @@ def test_the_notebooks_question_is_answered_and_the_time_from_which_its_hope_is_
     late = long_runs(3e-5, 1e-7)
     assert better_from(late, "spheroid", "midpoint[angles]") == pytest.approx(300.0, rel=0.03)
     (said,) = notebook_words.hopes(late)
-    assert (
-        "at the notebook's t = 8, it is kept worse with midpoint[angles] (3e-05), against 8e-07 of lsoda[angles]"
-        in said
-    )
-    assert "their error is the smaller one from t = 302 (midpoint[angles]) on" in said
+    assert "t = 8, lsoda[angles] keeps the energy to 8e-07, better than midpoint[angles] (3e-05)." in said
+    assert said.endswith("that of the rows it beat by 0%; theirs is smaller from t = 302 on.")
+    table = long_table(late, ["midpoint[angles]"])
+    assert list(table.rows[-1]) == ["spheroid", "midpoint[angles]", "8", "3e-05", "3e-05", "302"]
     never, always = long_runs(3e-5, 1e-9), long_runs(1e-9, 1e-7)
     assert better_from(never, "spheroid", "midpoint[angles]") == math.inf
     assert "with midpoint[angles] it never is" in notebook_words.hopes(never)[0]
     assert better_from(always, "spheroid", "midpoint[angles]") == 0.0
-    assert "better with midpoint[angles]" in notebook_words.hopes(always)[0]
+    assert "worse than midpoint[angles]" in notebook_words.hopes(always)[0]
 
 
 def test_the_titles_of_the_notebook_say_where_the_discrete_method_is_the_worse_one():

@@ -105,10 +105,18 @@ def test_step_times_number_is_exact():
 
 
 def test_the_diagram_says_which_rows_take_part():
-    ladders = xr.Dataset(coords={"integrator": ["series[axis]", "midpoint[angles]"]})
-    said = words.part_sentence(xr.DataTree.from_dict({tables.LADDERS: ladders}))
-    assert said.startswith("2 rows take part, on the axis if they name no chart: series, midpoint[angles].")
+    names = ["series[axis]", "midpoint[angles]", "gauss-8[axis]"]
+    ladders = xr.Dataset({"conserves_energy": (("scene", "integrator"), [[0.0, 0.0, 1.0]])},
+                         coords={"scene": ["spheroid"], "integrator": names})  # fmt: skip
+    tree = xr.DataTree.from_dict({tables.LADDERS: ladders})
+    said = words.part_sentence(tree)
+    assert said.startswith("3 rows take part.")
     assert "as taylor-longdouble and taylor-quad" in said
+    assert words.parts_table(tree).rows == [
+        [names[0], *["yes"] * 3],
+        [names[1], *["yes"] * 3],
+        [names[2], "yes", "no", "no"],
+    ]
     assert not any(name.startswith(("taylor-longdouble", "taylor-quad")) for name in study.CANDIDATES)
 
 
@@ -155,7 +163,7 @@ def test_checked_cells_are_foretold_and_their_runs_are_told(data):
         panel = diagram(data, "spheroid", one["quantity"])
         assert panel.foretold[panel.place(one["target"], one["horizon"])]
         assert one["integrators"][0] == panel.names[panel.winner[panel.place(one["target"], one["horizon"])]]
-    assert f"{checks.COUNT}, to" in words.spot_sentence(data)
+    assert f"{checks.COUNT} predicted cells were run in full" in words.spot_sentence(data)
 
 
 def test_a_check_whose_coarser_run_fails_takes_the_finer_one():

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.drift import messages, rows, tables, words
+from symtop_studies.drift import behaviours, messages, rows, tables, words
 from symtop_studies.drift.histories import run_history
 from symtop_studies.drift.study import TOLERANCE, cases
 from symtop_studies.stability import words as stability_words
@@ -41,7 +41,8 @@ def test_runs_over_a_part_of_the_horizon_are_named():
     time = np.linspace(0.0, 1.0, 5) * np.array([1.0, 0.2, 0.5])[:, None]
     data = xr.Dataset({"sample_time": (("scene", "integrator", "sample"), time[None])},
                       coords={"scene": ["spheroid"], "integrator": ["rk4", "rk45", "radau"]})  # fmt: skip
-    assert words.shortened(data).endswith("judged on it: radau 50 %, rk45 20 %.")
+    said = "radau, rk45 ran over 20 % (rk45) to 50 % of the horizon only, and are judged on that part."
+    assert words.shortened(data).endswith(said)
     assert words.shortened(data.sel(integrator=["rk4"])) == ""
 
 
@@ -62,15 +63,18 @@ def test_what_a_chart_does_is_not_said_of_the_method():
     said = rows.charts_apart(histories(rk4_angles=1.5e-4, rk4_axis=0.0))
     assert "p_phi changes by 1.5e-04 with rk4[angles] and by exactly 0 with rk4[axis]" in said
     assert "strang" not in said
-    assert "The other 1 methods" in said
+    assert said.endswith("It matters more than 2-fold for 1 of 2 methods that have two charts.")
+    (table,) = rows.charts_table(histories(rk4_angles=1.5e-4, rk4_axis=0.0))
+    assert list(table.rows) == [["p_phi", "rk4", "1.5e-04", "exactly 0", ""]]
     for alike in ({"rk4_angles": 1.5e-4, "rk4_axis": 1.2e-4}, {"rk4_angles": 1e-14, "rk4_axis": 0.0}):
         assert "The chart alone" not in rows.charts_apart(histories(**alike))
+        assert rows.charts_table(histories(**alike)) == []
 
 
 def test_every_tolerance_is_stated_and_a_default_says_that_it_is_one():
     said = rows.setting(histories())
-    assert "100 nutations of spheroid, and 118 steps a nutation or tolerance 1e-08 (rk45[angles])" in said
-    assert "default tolerance, which is the rounding of the arithmetic: taylor[axis] 2.2e-18" in said
+    assert "100 nutations of spheroid, 118 steps a nutation or tolerance 1e-08 (rk45[angles])." in said
+    assert said.endswith("taylor[axis] keeps its default tolerance, the rounding of the arithmetic.")
     cells = [
         histories().sel(scene="spheroid", integrator=name) for name in ("rk4[axis]", "rk45[angles]", "taylor[axis]")
     ]
@@ -137,12 +141,18 @@ def test_what_is_said_of_the_phase_follows_from_its_exponents():
         },
         coords={"integrator": list(exponents), "scene": ["spheroid", "goldstein"]},
     )
-    steady, faster, unclear, rounded = words.phase_growth(data)
-    assert steady == "The phase error grows as t with strang."
-    assert "rk4 (t^2.09 and t^1.90, to 1 rad), taylor (t^1.94 and t^2.03, to 7e-10 rad)." in faster
-    assert "mixed" in unclear
-    assert "below 1e-09 rad rounding" in rounded.lower()
-    assert "exact" not in f"{steady} {faster} {unclear}"
+    said = behaviours.phase_sentence(data)
+    assert said.startswith(
+        "The phase error grows as t with strang. It grows faster, as it does where the energy drifts"
+    )
+    assert "with rk4, taylor: most with rk4 (t^2.09 and t^1.90, to 1 rad)." in said
+    assert said.endswith("With mixed no one power fits all scenes.")
+    assert "exact" not in said
+    groups = behaviours.phases(data)
+    assert {word: [one.row for one in group] for word, group in groups.items()} == {
+        behaviours.STEADY: ["strang"], behaviours.FASTER: ["rk4", "taylor"], behaviours.UNCLEAR: ["mixed"],
+    }  # fmt: skip
+    assert groups[behaviours.FASTER][1].said == "taylor (t^1.94 and t^2.03, to 7e-10 rad)"
 
 
 def test_the_same_run_has_one_behaviour_in_every_study():
@@ -164,17 +174,22 @@ def test_an_energy_error_that_no_sample_sees_is_below_rounding_and_no_ratio_of_a
         coords={"integrator": ["yoshida-4", "stormer-verlet"]},
     )  # fmt: skip
     sentence = stability_words.sampling(part)
-    assert "of yoshida-4 (4e-08) is below rounding" in sentence
-    assert "up to 5e+04 times too small (stormer-verlet)" in sentence
+    assert (
+        "that of 1 row falls below rounding, the others look up to 5e+04 times too small (stormer-verlet)" in sentence
+    )
     assert "e+08" not in sentence
 
 
-@pytest.mark.parametrize(("power", "says"), [(0.45, "(agrees with"), (0.8, "(does not agree with")])
-def test_a_walk_of_rounding_is_held_against_one_half(power, says):
-    cell = xr.Dataset({"exponent": power, "exponent_interval": 0.06, "late": 1e-15, "plain_late": 1e-13})
-    sentence = words.walk("strang", cell)
-    assert f"strang drifts as n^{power:.2f} +- 0.06 {says}" in sentence
-    assert "1.0e-15, and 1.0e-13 from the same starts with plain sums, 100 times more" in sentence
+@pytest.mark.parametrize(("power", "agreeing"), [(0.45, 2), (0.8, 1)])
+def test_a_walk_of_rounding_is_held_against_one_half(power, agreeing):
+    cells = {
+        name: xr.Dataset({"exponent": exponent, "exponent_interval": 0.06, "gain": gain})
+        for name, exponent, gain in (("strang", power, 100.0), ("cayley", 0.5, 40.0))
+    }
+    sentence = words.walks(cells)
+    assert f"as n^{min(power, 0.5):.2f} to n^{max(power, 0.5):.2f} in n steps" in sentence
+    assert f"with {agreeing} of 2 rows that agrees with the 1/2 of a random walk" in sentence
+    assert "drift 40 to 100 times as far" in sentence
 
 
 def test_the_shift_of_the_mean_energy_is_relative_to_its_band():
@@ -183,8 +198,8 @@ def test_the_shift_of_the_mean_energy_is_relative_to_its_band():
                         "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
     sentence = words.moved(cells)
     assert "at most 3e-01 of the width of its oscillation from the first window to the last" in sentence
-    assert "and by at most 3e-01 to any other" in sentence
-    assert "to the last by at most 3e-15 of" in sentence
+    assert "off by up to 3e-01 of that width" in words.scatter(cells)
+    assert "the mean modified energy by at most 3e-15 of" in sentence
     there_and_back = cells.assign(energy_mean=means.copy(data=[[0.0, 4e-5, 1e-6, np.nan]]))
     assert messages.strayed(there_and_back) == pytest.approx((0.01, 0.4))
     said = messages.windows(there_and_back.assign(steps=means * 0.0 + 1e8))
@@ -221,7 +236,8 @@ def test_a_loss_that_is_off_by_a_fifth_was_not_predicted():
     assert "right to 3 % for 2 of 2" in sentence(1.01, 0.97)
     assert "Off by more" not in sentence(1.01, 0.97)
     assert "for 1 of 2 rows. Off by more than 10%: method-1 (20% off)" in sentence(1.01, 1.2)
-    assert "is right" not in sentence(1.3)
+    assert "predicts when the phase error reaches 0.01 rad, 2.5 times as late" in sentence(1.01)
+    assert "right to" not in sentence(1.3)
     assert "method-0 (not reached)" in sentence(math.nan)
 
 
@@ -250,14 +266,14 @@ def test_the_truth_study_says_what_the_printed_values_test():
         return published.Published("somebody", "something", 1.0, ours, 1e-3, kind, tests=tests)
 
     values = [value(1.0, published.TRAJECTORY), value(1.1, published.TRAJECTORY), value(1.0, published.START)]
-    sentence = truth_words.published([*values, value(1.0, published.START, "formula")])
+    sentence = " ".join(truth_words.published([*values, value(1.0, published.START, "formula")]))
     assert "2 of 3 printed values" in sentence
     assert (
         "Only 2 of them test a trajectory of the top (somebody); 1 tests the energy of a start, and 0 belong"
         in sentence
     )
     assert "1 of 1 agree; 0 of them test a trajectory and 1 a start." in sentence
-    everything = truth_words.published(published.published_values())
+    everything = " ".join(truth_words.published(published.published_values()))
     assert "7 of 7 printed values" in everything
     assert "Only 3 of them test a trajectory" in everything
     assert "6 of 6 agree; 4 of them test a trajectory and 2 a start." in everything
@@ -293,3 +309,29 @@ def test_the_truth_study_counts_the_bounds_that_an_error_exceeds(bound, holding)
         truth_tables.BOUND: ("horizon", [4e-9, bound, 1e-9, np.nan]),
     })  # fmt: skip
     assert f"Of 2 claimed bounds {holding} hold" in truth_words.bounds(data)
+
+
+def test_the_fates_of_all_rows_are_counted_in_a_sentence_and_listed_in_tables():
+    """Two rows at rounding, one that bounds its error, one that loses the constant: a sentence of one line for many."""
+    sizes = {"strang": (1e-15, 0.5), "cayley": (2e-15, 0.5), "verlet": (1e-4, 0.0), "rk4": (1e-2, 1.0)}
+    columns = {}
+    for constant in conservation.CONSTANTS:
+        for part, values in (("largest", [size for size, _ in sizes.values()]), ("exponent_interval", [0.01] * 4),
+                             ("exponent", [power for _, power in sizes.values()])):  # fmt: skip
+            columns[f"{constant}_{part}"] = (("integrator", "scene"), np.array(values)[:, None])
+    columns |= {
+        f"phase_{part}": (("integrator", "scene"), np.full((4, 1), value))
+        for part, value in (("largest", 1e-3), ("exponent", 1.0), ("exponent_interval", 0.01))
+    }
+    data = xr.Dataset(columns, coords={"integrator": list(sizes), "scene": ["spheroid"]})
+    data = data.assign(outcome=(("integrator", "scene"), [["ok"]] * 4))
+    assert behaviours.constant_sentence(data, "p_phi") == (
+        "Of 4 rows, the relative change of p_phi stays at rounding with 2 (up to 2.0e-15), is bounded with 1 (up to "
+        "1.0e-04, verlet), grows in time with 1 (up to 1.0e-02, rk4)."
+    )
+    counts, every = behaviours.tables(data)
+    assert list(counts.rows[0]) == ["energy", "at rounding", "2", "1.0e-15", "strang", "2.0e-15", "cayley"]
+    assert [row[0] for row in every.rows] == list(sizes)
+    assert {len(row) for row in every.rows} == {len(every.header)}
+    ended = data.assign(outcome=data["outcome"].where(data["integrator"] != "rk4", "left_chart"))
+    assert behaviours.constant_sentence(ended, "energy").endswith("is unknown with 1 whose run ended early.")

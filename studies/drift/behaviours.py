@@ -1,0 +1,139 @@
+"""What became of every row over a million steps: a sentence a constant, one on the phase, and their tables."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure.conservation import CONSTANTS
+from symtop.report.phrases import counted, few
+from symtop.runner.study import Table
+
+from .tables import FAILED, worst_behaviour
+
+SEEN_PHASE = 1e-11  # rad
+PHASE_SLACK = 0.1  # of an exponent
+STEADY, FASTER, UNCLEAR = "as t", "faster than t", "by no one power on all scenes"
+MEANING = {  # behaviours, from the best to the worst
+    "kept": "at rounding", "bounded": "bounded error", "random walk": "walks randomly",
+    "growing": "grows by no single law", "drift": "drifts steadily", FAILED: "a run ended early",
+}  # fmt: skip
+
+
+class Fate(NamedTuple):
+    """What became of one constant with one row."""
+
+    largest: float  # relative change, on any scene
+    row: str
+    exponent: float  # of time, on the scene where it is largest
+
+
+class Phase(NamedTuple):
+    """How the phase error of one row grows."""
+
+    largest: float  # rad, on any scene
+    row: str
+    powers: str  # of time, scene by scene
+
+    @property
+    def said(self) -> str:
+        """All three in a list."""
+        return f"{self.row} ({self.powers}, to {self.largest:.1g} rad)"
+
+
+def fates(histories: xr.Dataset, constant: str) -> dict[str, list[Fate]]:
+    """The rows by what became of a constant on the scene where it fared worst, a key of `MEANING`."""
+    groups: dict[str, list[Fate]] = {word: [] for word in MEANING}
+    for row in map(str, histories["integrator"].values):
+        cell = histories.sel(integrator=row)
+        largest, rate = (float(cell[f"{constant}_{part}"].max()) for part in ("largest", "exponent"))
+        groups[worst_behaviour(cell, constant)].append(Fate(largest, row, rate))
+    return {word: sorted(group) for word, group in groups.items() if group}
+
+
+def constant_sentence(histories: xr.Dataset, constant: str) -> str:
+    """How many rows keep a constant, bound its error, or lose it, with the worst of each."""
+    groups = fates(histories, constant)
+    kept, held, failed = (groups.get(word, []) for word in ("kept", "bounded", FAILED))
+    lost = sorted(one for word in ("random walk", "growing", "drift") for one in groups.get(word, []))
+    parts = [f"stays at rounding with {len(kept)} (up to {kept[-1].largest:.1e})"] if kept else []
+    for group, does in ((held, "is bounded"), (lost, "grows in time")):
+        if group:
+            parts.append(f"{does} with {len(group)} (up to {group[-1].largest:.1e}, {group[-1].row})")
+    parts += [f"is unknown with {len(failed)} whose run ended early"] if failed else []
+    count = sum(map(len, groups.values()))
+    return f"Of {counted(count)}, the relative change of {_the(constant)} {', '.join(parts)}."
+
+
+def _the(constant: str) -> str:
+    return f"the {constant}" if constant == "energy" else constant
+
+
+def phases(histories: xr.Dataset) -> dict[str, list[Phase]]:
+    """The rows by how their phase error grows: as t, faster, or by no one power on all scenes; the largest first.
+
+    It grows as t if the interval of the exponent, or `PHASE_SLACK`, reaches 1 on every scene, and faster if it lies
+    above 1 by more on every scene. Phases below `SEEN_PHASE` are left out.
+    """
+    groups: dict[str, list[Phase]] = {STEADY: [], FASTER: [], UNCLEAR: []}
+    for row in map(str, histories["integrator"].values):
+        cell = histories.sel(integrator=row)
+        seen = cell["phase_largest"].values > SEEN_PHASE
+        sizes, slopes, doubts = (
+            cell[f"phase_{part}"].values[seen] for part in ("largest", "exponent", "exponent_interval")
+        )
+        if not slopes.size or not np.isfinite(slopes).all():
+            continue
+        doubt = np.maximum(doubts, PHASE_SLACK)
+        steady, faster = bool(np.all(np.abs(slopes - 1.0) <= doubt)), bool(np.all(slopes - doubt > 1.0))
+        powers = " and ".join(dict.fromkeys(f"t^{slope:.2f}" for slope in slopes))
+        word = STEADY if steady else FASTER if faster else UNCLEAR
+        groups[word].append(Phase(float(sizes.max()), row, powers))
+    return {word: sorted(group, reverse=True) for word, group in groups.items() if group}
+
+
+def phase_sentence(histories: xr.Dataset) -> str:
+    """By what power of time the phase error grows, from the measured exponents; empty if none was seen."""
+    groups = phases(histories)
+    steady, faster, unclear = (groups.get(word, []) for word in (STEADY, FASTER, UNCLEAR))
+    parts = [f"The phase error grows as t with {_rows(steady)}."] if steady else []
+    if faster:
+        subject = "It" if steady else "The phase error"
+        parts.append(
+            f"{subject} grows faster, as it does where the energy drifts, with {_rows(faster)}: most with "
+            f"{faster[0].said}."
+        )
+    if unclear:
+        parts.append(f"With {_rows(unclear)} no one power fits all scenes.")
+    return " ".join(parts)
+
+
+def _rows(group: Sequence[Phase]) -> str:
+    """One or two rows by name, more by their number."""
+    return few([one.row for one in group], most=2)
+
+
+def tables(histories: xr.Dataset) -> list[Table]:
+    """How many rows fare how, and every row: what became of its constants and of its phase."""
+    counts = [
+        [constant, MEANING[word], str(len(group)), f"{group[0].largest:.1e}", group[0].row, f"{group[-1].largest:.1e}",
+         group[-1].row]
+        for constant in CONSTANTS for word, group in fates(histories, constant).items()
+    ]  # fmt: skip
+    header = ["constant", "what became of it", "rows", "least change", "with", "largest change", "with this row"]
+    shown = Table("What became of energy and momenta: largest relative change, on the scene where a row fares worst",
+                  header, counts)  # fmt: skip
+    grown = {one.row: (one, word) for word, group in phases(histories).items() for one in group}
+    cells: dict[str, list[str]] = {row: [row] for row in map(str, histories["integrator"].values)}
+    for constant in CONSTANTS:
+        for word, group in fates(histories, constant).items():
+            for one in group:
+                cells[one.row] += [f"{one.largest:.1e}", f"{MEANING[word]}, t^{one.exponent:.2f}"]
+    for row, cell in cells.items():
+        phase, word = grown.get(row, (None, "not seen"))
+        cell.extend([f"{phase.largest:.1g}", phase.powers, word] if phase else ["", "", word])
+    columns = [head for one in CONSTANTS for head in (f"largest change of {one}", f"behaviour of {one}")]
+    every = Table("Every row, over all scenes", ["row", *columns, "phase error (rad)", "its powers", "it grows"],
+                  list(cells.values()))  # fmt: skip
+    return [shown, every]
