@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.timing import NOISY
+from symtop.report.sentences import joined
 from symtop.runner.study import Table
 
 from .cells import COMPILED, FAMILIES, KERNEL, SAMPLES, SCIPY_PYTHON, SCIPYS, SIMULATE, SOLVE_IVP
@@ -61,11 +62,6 @@ def duration(value: float) -> str:
 def times_faster(value: float) -> str:
     """A ratio with two or three digits, without exponents."""
     return f"{value:,.0f}" if value >= 99.5 else f"{value:.3g}"
-
-
-def joined(words: Sequence[str]) -> str:
-    """A list as a sentence has it."""
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + f" and {words[-1]}" if words else "none"
 
 
 def waterfalls(data: xr.Dataset, *, call_first: bool = False) -> list[tuple[str, float, float, list[Bar]]]:
