@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.ticker import LogLocator, NullLocator
 
 from symtop.report import style
+from symtop.report.sentences import joined
 from symtop.runner.study import Picture
 
 from . import words
@@ -127,7 +128,7 @@ def draw_charts(data: xr.Dataset) -> Picture:
     style.legend_below(figure, axes)
     style.headline(figure, words.charts_message(data))
     sentences = " ".join(words.family_sentences(data))
-    scenes = words.joined([str(name) for name in data["scene"].values])
+    scenes = joined([str(name) for name in data["scene"].values])
     return Picture(
         "charts",
         figure,

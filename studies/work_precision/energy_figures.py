@@ -47,8 +47,8 @@ def draw(data: xr.Dataset, chart: str) -> Picture:
     return Picture(
         f"energy-{chart}",
         figure,
-        f"Above, largest energy error {words.spans(data)[-1]} of {scene} against the time of a run, step or tolerance "
-        "varying along a line. Grey: rows that preserve structure, being symplectic or symmetric. Below, all "
+        f"Above, largest energy error {words.spans(data)[-1]} of {scene} against the time of a run, with finer steps "
+        "along a line. Grey: rows that preserve structure, being symplectic or symmetric. Below, all "
         f"comparisons, within one chart. {lost}{energy.sentence(data, chart)}",
         f"Energy error against time for rows of the chart {chart}, and bars that count who has less error.",
     )

@@ -61,7 +61,7 @@ def lead(won: ranking.Win) -> str:
     """The fastest row at a target, its time, and the rows that are level with it or else its lead."""
     parts = [won.best.integrator, seconds(won.best.cost)]
     if won.level:
-        parts.append(f"level with {few(won.level, LEVEL)}")
+        parts.append(f"tied with {few(won.level, LEVEL)}")
     elif won.behind:
         parts.append(f"{won.ratio:.1f} times faster than {won.behind.integrator}")
     return ", ".join(parts)
