@@ -30,13 +30,13 @@ from .tables import (
 
 HOW_TO_READ = (
     "Four factors make the time of a run: the method, the chart that its equations are written in, the language that "
-    "executes them and the call around them. Every row has its own step or tolerance, the coarsest found that meets "
-    "the stated error of the axis, so that times compare at equal accuracy. A factor's effect is the ratio of two "
-    "measured times that differ in this factor alone. The waterfall changes one factor after the other; the table "
-    "below it has the same factor's effect in every other surrounding, because factors do not simply multiply: a "
-    "smaller chart helps a compiled loop more than a Python one. A kernel is the bare solver with two samples; "
-    f"simulate and solve_ivp are what a user calls, with {SAMPLES} samples. SciPy's loop is Python, whatever the "
-    "language of its right-hand side. The closed form does not take part."
+    "executes them and the call around them. A row is a method in one chart. Every row has its own step or tolerance, "
+    "the coarsest found that meets the stated error of the axis, so that times compare at equal accuracy. A factor's "
+    "effect is the ratio of two measured times that differ in this factor alone. The waterfall changes one factor "
+    "after the other. A table has the same factor's effect in every other surrounding, because factors do not simply "
+    "multiply: a smaller chart helps a compiled loop more than a Python one. A kernel is the bare solver with two "
+    f"samples; simulate and solve_ivp are what a user calls, with {SAMPLES} samples. SciPy's loop is Python, whatever "
+    "the language of its right-hand side. The closed form does not take part."
 )
 
 WATERFALL = ["scene", "nutations", "axis error", "changed", "run", "call", "time", "ratio", "product so far", "noise"]
