@@ -175,15 +175,13 @@ def families_sentence(data: xr.Dataset) -> str:
     for chart in CHARTS_BESIDE:
         middles = {family: float(np.median(ratios)) for (family, one), ratios in costs.items() if one == chart}
         if middles:
-            ends = [pick(middles, key=lambda name: middles[name]) for pick in (min, max)]
-            said = " to ".join(f"{middles[name]:.2f} ({name})" for name in dict.fromkeys(ends))
-            parts.append(f"{said} times as long in {chart}")
+            ends = dict.fromkeys(pick(middles, key=lambda name: middles[name]) for pick in (min, max))
+            said = " to ".join(f"{middles[name]:.2f} ({name})" for name in ends)
+            who = "it takes" if parts else "a compiled run takes"
+            parts.append(f"In {chart} {who} {said} times as long{'' if parts else ' as on the axis alone'}.")
     if not parts:
         return ""
-    return (
-        f"At equal error of the axis a compiled run takes {joined(parts)} as on the axis alone, in the median of a "
-        "family of methods."
-    )
+    return f"{' '.join(parts)} These are medians of families of methods, at equal error of the axis."
 
 
 def charts_message(data: xr.Dataset) -> str:
@@ -223,13 +221,14 @@ def factors_sentence(data: xr.Dataset) -> str:
         if change.factor != "method" and (known is None or np.median(change.ratios) > np.median(known.ratios)):
             largest[change.factor] = change
     parts = [
-        f"{times_faster(float(np.median(one.ratios)))} times faster by the {factor} ({one.before} to {one.after})"
+        f"the {factor} ({one.before} to {one.after}) {times_faster(float(np.median(one.ratios)))} times"
         for factor, one in largest.items()
     ]
     if not parts:
         return ""
     return (
-        f"One factor alone, with the others held, makes a run up to {joined(parts)}, in the median of all such pairs."
+        f"Changed alone, these factors make a run faster: {joined(parts)}. Each is the largest effect of its factor, "
+        "the median over all pairs of times that differ in nothing else."
     )
 
 

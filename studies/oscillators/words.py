@@ -104,8 +104,8 @@ def verdict(data: xr.Dataset) -> list[str]:
     both = [order(data, name, method, Column.POSITION_ERROR).slope for name in OSCILLATORS for method in RULES]
     one = [order(data, name, ONE_SIDED, Column.POSITION_ERROR).slope for name in damped]
     orders = (
-        f"Both rules have orders between {min(both):.3f} and {max(both):.3f} against the analytic solution in every "
-        "regime, from undamped to overdamped; with the whole force at one end of the step the order is "
+        f"{' and '.join(RULES)} have orders between {min(both):.3f} and {max(both):.3f} against the analytic solution "
+        "in every regime, from undamped to overdamped. With the whole force at one end of the step the order is "
         f"{min(one):.2f} to {max(one):.2f}."
     )
     update = (

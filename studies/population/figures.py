@@ -116,8 +116,8 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
     return Picture(
         f"run-lengths-{unit}",
         figure,
-        "Share of random tops on which a row has met the axis error within a cost. A line further left is faster; one "
-        f"that ends higher solves more tops within {words.budget(data, horizon)} force evaluations a "
+        "Share of random tops on which a row has met the axis error within a cost. Further left is faster; a line that "
+        f"ends higher solves more tops within {words.budget(data, horizon)} force evaluations a "
         f"nutation. {words.span(data, horizon)}, of which {asked:,} have a nutation wider than the coarsest error. "
         f"Cost in {UNITS[unit]}, with the step or tolerance that suits the top. Thick: rows that win on the most tops; "
         "thin: familiar ones; grey: all others. Ring: where the first row has solved half of the tops. To "

@@ -85,12 +85,13 @@ def quantity_sentence(data: xr.DataTree, quantity: str) -> str:
     told = []
     for name, won in sorted(shares.items(), key=lambda one: -len(one[1])):
         ends = [percent(pick(won, key=lambda share: share.value)) for pick in (min, max)]
-        told.append((name, len(won), f"(on {' to '.join(dict.fromkeys(ends))} of the tops)"))
+        told.append((name, len(won), " to ".join(dict.fromkeys(ends))))
     (first, most, share), *others = told
-    rest = f", and {few([f'{name} in {count} {on}' for name, count, on in others])}" if others else ""
+    rest = f" Otherwise it is {few([f'{name}, with {part}' for name, _, part in others])}." if others else ""
     return (
         f"For the {quantity}, {first} is the cheapest row on the most tops in {most} of the "
-        f"{sum(map(len, shares.values()))} combinations of run length and error that some row reaches {share}{rest}."
+        f"{sum(map(len, shares.values()))} combinations of run length and error that some row reaches, with {share} of "
+        f"the tops.{rest}"
     )
 
 
@@ -175,12 +176,12 @@ def guard_sentence(data: xr.DataTree) -> str:
     for horizon in verdicts.horizons(data):
         hits, alarms = verdicts.caught(data, horizon)
         said.append(
-            f"of {hits.count:,} of {hits.total:,} wrong runs and {percent(alarms)} of {alarms.total:,} right ones over "
-            f"{verdicts.nutations(data, horizon):g} nutations"
+            f"Over {verdicts.nutations(data, horizon):g} nutations it warned of {hits.count:,} of {hits.total:,} wrong "
+            f"runs and of {percent(alarms)} of {alarms.total:,} right ones."
         )
     return (
-        f"The guard, which tries a method on two nutations before a run, warned {joined(said)}. A wrong run ends more "
-        f"than {WRONG:g} rad off, a right one within {EXPECTED:g} rad."
+        f"The guard tries a method on two nutations before a run. {' '.join(said)} A wrong run ends more than "
+        f"{WRONG:g} rad off, a right one within {EXPECTED:g} rad."
     )
 
 

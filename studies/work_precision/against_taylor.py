@@ -60,7 +60,7 @@ def headline(data: xr.Dataset, spans: list[str]) -> str:
     ahead = sum(ratio.value <= 1.0 for ratio in both.values())
     alone = sum(np.isfinite(ratio.seconds) and not np.isfinite(ratio.rival) for ratio in ratios.values())
     said = (
-        f"The fastest row that is none of heyoka's takes no more time than heyoka's {RIVAL} in {ahead} of {len(both)} "
+        f"The fastest of symtop's own rows takes no more time than heyoka's {RIVAL} in {ahead} of {len(both)} "
         "combinations of scene, run length and error that both meet"
     ) + (f", and meets {alone} more." if alone else ".")
     parts = []

@@ -164,8 +164,8 @@ def sentence(data: xr.Dataset, chart: str) -> str:
         for k, (classic, tally) in enumerate(counted.items())
     ]
     return (
-        f"Structure-preserving rows in {CHARTS[chart]} have less energy error at every run time that both rows "
-        f"have in {joined(said)}. A comparison is two rows on one scene over "
+        f"Structure-preserving rows in {CHARTS[chart]} have less energy error at every common run time in "
+        f"{joined(said)}. A comparison is two rows on one scene over "
         f"{float(data['horizon'].values[-1]):g} nutation periods."
     )
 

@@ -124,8 +124,8 @@ def test_own_rows_are_compared_with_taylor():
     assert row == ["x", "over ten", "0.50 (series[axis])", "2.00 (rk4[axis])", "rk4[axis] alone", "neither"]
     said = against_taylor.headline(data, ["over ten"])
     assert said == (
-        "The fastest row that is none of heyoka's takes no more time than heyoka's taylor in 1 of 2 combinations of "
-        "scene, run length and error that both meet, and meets 1 more."
+        "The fastest of symtop's own rows takes no more time than heyoka's taylor in 1 of 2 combinations of scene, run "
+        "length and error that both meet, and meets 1 more."
     )
     only = data.sel(integrator=["series[axis]", "rk4[axis]"])
     assert (against_taylor.compared(only), against_taylor.headline(only, ["over ten"])) == ({}, "")
