@@ -12,20 +12,18 @@ from symtop.report.figures import SMALLEST, error_band
 from symtop.report.style import FIRM, LEAST_TEXT, few_ticks, headline, legend_below, line, look, number, panels
 from symtop.runner.study import Picture
 
+from .named import TARGET, least_work, named_rows
 from .tables import (
     HISTORY_STEPS,
     LARGE,
     MAIN,
     NAMED,
-    TARGET,
     Efficiency,
     adaptive,
     declared_order,
     efficiencies,
     evaluations_a_nutation,
-    least_work,
     merged,
-    named_rows,
     stepping,
     tolerance_fits,
 )

@@ -4,7 +4,6 @@ The dataset has the columns of `symtop.measure.accuracy.error_table`, over ``sce
 ``rk4[axis]``) and ``setting``, and ``horizon`` over the first two.
 """
 
-from collections.abc import Mapping
 from itertools import product
 from typing import NamedTuple
 
@@ -25,7 +24,6 @@ NAMED = ("midpoint", "trapezoidal", "stormer-verlet", "rk45", "taylor")  # the f
 HISTORY_STEPS, HISTORY_TOLERANCE = 100.0, 1e-6  # a nutation; of their runs for the energy over time
 LARGE = LARGEST_ERROR  # radians: larger errors follow no power of the step
 ABOVE_BOUND = 100.0  # times the reference's own error bound: smaller errors may be the reference's
-TARGET = 1e-6  # rad, the axis error at which costs are compared
 SAME = 0.02  # rows of a method whose errors differ by less are drawn as one
 
 Pairs = dict[tuple[str, str], Fit]  # by scene and row
@@ -142,27 +140,6 @@ def energy_history(on: Scene, row: Integrator, nutations: float) -> xr.Dataset:
             "history_tolerance": np.nan if row.fixed_step else tolerance,
         }
     )
-
-
-def named_rows(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
-    """The five named methods on the first scene, without a chart that another covers, and their labels."""
-    named = [name for name in map(str, data["integrator"].values) if split_name(name)[0] in NAMED]
-    names = [name for name in named if name.replace("[attitude]", "[axis]") not in named or "[attitude]" not in name]
-    return data.sel(integrator=names).isel(scene=0), merged(data.sel(integrator=names), MAIN)
-
-
-def least_work(part: xr.Dataset, labels: Mapping[str, str]) -> list[tuple[str, float]]:
-    """What each row pays for an error below `TARGET`: force evaluations per nutation, the least first.
-
-    `part` is one scene.
-    """
-    paid, scene = {}, str(part["scene"].values)
-    for name in labels:
-        cell = part.sel(integrator=name)
-        work = evaluations_a_nutation(cell, scene)[cell[MAIN].values <= TARGET]
-        if work.size:
-            paid[name] = float(np.min(work))
-    return sorted(paid.items(), key=lambda one: one[1])
 
 
 class Efficiency(NamedTuple):

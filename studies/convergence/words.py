@@ -11,20 +11,8 @@ from symtop.methods.registry import split_name
 from symtop.report.sentences import few, joined
 from symtop.runner.study import Table
 
-from .tables import (
-    MAIN,
-    OTHERS,
-    TARGET,
-    Judged,
-    Pairs,
-    adaptive,
-    declared_order,
-    fits,
-    judged,
-    least_work,
-    named_rows,
-    tolerance_fits,
-)
+from .named import TARGET, least_work, named_rows
+from .tables import MAIN, OTHERS, Judged, Pairs, adaptive, declared_order, fits, judged, tolerance_fits
 
 QUOTED = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]")  # whose error constants are quoted
 QUOTED_ON = "spheroid"

@@ -128,8 +128,8 @@ def draw_charts(data: xr.Dataset) -> Picture:
     return Picture(
         "charts",
         figure,
-        "Time of a run in Euler angles, and with the whole attitude, over that of the same method on the axis alone "
-        f"(the axis e and the angular momentum L): a dot a pair, on {scenes}, for each run length and error. All runs "
+        "Time of a run in Euler angles, and with the whole attitude, over that of the same method on the axis alone: "
+        f"a dot a pair, on {scenes}, for each run length and error. All runs "
         "are bare compiled kernels at the coarsest step or tolerance found that meets the error. Missing pairs "
         f"need more than the study's budget. {words.families_sentence(data)}",
         "Two dot plots of ratios of time, a row a method: splitting methods above all others, a line at ratio one.",

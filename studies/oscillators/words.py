@@ -6,7 +6,7 @@ import xarray as xr
 from symtop.report.style import number
 from symtop.runner.study import Table
 
-from . import quartic_tables
+from . import quartic_words
 from .oscillator import ONE_SIDED, Oscillator
 from .tables import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOP_TOLERANCE, Column, order, tops
 
@@ -118,7 +118,7 @@ def verdict(data: xr.Dataset) -> list[str]:
         f"most {largest_balance(data, RULES):.1e}, against {largest_balance(data, (RK45,)):.1e} with RK45 at tolerance "
         f"{TOP_TOLERANCE:g}."
     )
-    return [orders, update, energy(data), FRICTION_BREAKS, balance, *quartic_tables.sentences(data)]
+    return [orders, update, energy(data), FRICTION_BREAKS, balance, *quartic_words.sentences(data)]
 
 
 def tables(data: xr.Dataset) -> list[Table]:
@@ -143,4 +143,4 @@ def tables(data: xr.Dataset) -> list[Table]:
         ["method", *(title(OSCILLATORS[name]) for name in known)],
         [[method, *(f"{errors[method]:.1e}" for errors in known.values())] for method in (*RULES, RK45)],
     )
-    return [kept, damped, *quartic_tables.tables(data)]
+    return [kept, damped, *quartic_words.tables(data)]

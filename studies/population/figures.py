@@ -332,6 +332,6 @@ def draw_guard(data: xr.DataTree) -> Picture:
         f"guard's forecast, made before the run (dot: {EXPECTED:g} rad, where it warns). Orange: by the larger error "
         f"of energy and momenta, seen after the run (dot: {KEPT:.0%}). All rows, at every step and tolerance, on "
         f"{' and on '.join(messages.guarded(data, one) for one in spans)}. The higher a line, the more wrong runs are "
-        "found for the same false alarms. The silent failures are counted on all tops instead.",
+        "found at equal false alarms. The silent failures are counted on all tops instead.",
         "Receiver operating characteristics of the guard and of the conserved quantities, with their thresholds.",
     )
