@@ -143,8 +143,10 @@ def least_times(data: xr.Dataset) -> str:
     parts = [f"{seconds(min(values))} to {seconds(max(values))} {spans(data)[far]}" for far, values in times.items()]
     if not parts:
         return ""
-    ahead = f" Where its lead is sure, the next row takes {min(leads):.1f} to {max(leads):.1f} times as long."
-    return f"The fastest row takes {joined(parts)}, by scene and error." + (ahead if leads else "")
+    said = f"The fastest row takes {joined(parts)}, by scene and error."
+    if leads:
+        said += f" Where its lead is sure, the next row takes {min(leads):.1f} to {max(leads):.1f} times as long."
+    return said
 
 
 def plain_python(data: xr.Dataset) -> str:

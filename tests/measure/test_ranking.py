@@ -131,6 +131,23 @@ def test_own_rows_are_compared_with_taylor():
     assert (against_taylor.compared(only), against_taylor.headline(only, ["over ten"])) == ({}, "")
 
 
+def test_the_fastest_row_its_times_and_its_leads_are_told_where_there_are_any():
+    clear = cell([[1.0, 1.0, 1.0], [1.3, 1.3, 1.3]]).expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
+    assert work_words.fastest(clear, [won for won in ranking.winners(clear).values() if won]) == (
+        "a is the fastest row in 2 of the 2 combinations of scene, run length and error that a compiled row meets. In "
+        "2 the lead is larger than the noise."
+    )
+    assert work_words.least_times(clear) == (
+        "The fastest row takes 1 s to 1 s over 10 nutation periods, by scene and error. Where its lead is sure, the "
+        "next row takes 1.3 to 1.3 times as long."
+    )
+    tied = clear.assign({name: xr.ones_like(clear[name]) for name in ("seconds", "seconds_samples")})
+    assert work_words.least_times(tied).endswith("by scene and error.")
+    missed = clear.assign(axis=clear["axis"] * 1e6)
+    assert work_words.fastest(missed, []) == "No compiled row meets any of the errors."
+    assert work_words.least_times(missed) == ""
+
+
 def test_a_target_wider_than_the_nutation_has_no_winner_and_does_not_count():
     data = cell([[1.0] * 3, [2.0] * 3]).expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
     assert list(ranking.winners(data)) == [("x", 0, target) for target in TARGETS]
