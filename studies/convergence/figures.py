@@ -182,7 +182,7 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
         f"best of order {declared_order(low)}, {times} times as many",
     )
     caption = (
-        "Force evaluations per nutation that each row needs for an axis error of "
+        "Force evaluations per nutation that each row, method[chart], needs for an axis error of "
         f"{TARGET:g} rad {HORIZON}, by its law error = C h^p. p is the declared order, and C the median of error / h^p "
         f"over the steps of the fit. Bar: from the least to the largest of the scenes {', '.join(scenes)}. Marker: "
         f"their median, open if {TARGET:g} rad lies outside the errors that were fitted on most of them. Charts of a "
@@ -268,9 +268,9 @@ def _by_tolerance(data: xr.Dataset) -> Picture:
     )
     caption = (
         f"Largest axis error {HORIZON} of the adaptive methods over the tolerance that was asked for; relative and "
-        "absolute tolerance of the Runge-Kutta methods are equal. A dot is a run, a mark the median of its row. Right "
-        "of the wide line a run loses more than it was asked for. Left out are errors that do not follow the "
-        f"tolerance: above {LARGE:g} rad, and near the error bound of the reference, where they are rounding."
+        "absolute tolerance of the Runge-Kutta methods are equal. A dot is a run, a mark the median of its row, "
+        "method[chart]. Right of the wide line a run loses more than it was asked for. Left out are errors that do not "
+        f"follow the tolerance: above {LARGE:g} rad, and near the error bound of the reference, where rounding rules."
     )
     if met:
         caption += f" The largest ratio is on {one.worst_on}."

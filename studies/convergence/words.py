@@ -8,7 +8,7 @@ import xarray as xr
 
 from symtop.measure.order import BESIDE
 from symtop.methods.registry import split_name
-from symtop.report.sentences import few, joined
+from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 
 from .named import TARGET, least_work, named_rows
@@ -112,7 +112,7 @@ def verdict(data: xr.Dataset) -> list[str]:
     sentences = [share]
     for word, said in (("refuted", "is refuted"), ("undecided", "is left undecided")):
         if names := by_word.get(word):
-            rows = few(list(dict.fromkeys(names)))
+            rows = abridged(list(dict.fromkeys(names)))
             sentences.append(f"The declared order {said} in {len(names)} pairs, with {rows}; a table has their scenes.")
     return [
         *sentences, spans(fits(data, MAIN)), *cheapest_sentence(data), *constants_sentence(data),

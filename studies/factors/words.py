@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.timing import NOISY
-from symtop.report.sentences import few, joined
+from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 
 from .cells import COMPILED, FAMILIES, KERNEL, SAMPLES, SCIPY_PYTHON, SCIPYS, SIMULATE, SOLVE_IVP
@@ -149,10 +149,10 @@ def scipy_sentence(data: xr.Dataset) -> str:
         return ""
     user, author = (sorted(values) for values in zip(*((pair.user, pair.author) for pair in pairs), strict=True))
     return (
-        f"SciPy's {few(list(dict.fromkeys(pair.public.method for pair in pairs)))} take {times_faster(user[0])} to "
-        f"{times_faster(user[-1])} times as long as the fastest compiled row where a user measures, solve_ivp against "
-        f"simulate. They take {times_faster(author[0])} to {times_faster(author[-1])} times as long in the inner loop, "
-        "kernel against kernel."
+        f"SciPy's {abridged(list(dict.fromkeys(pair.public.method for pair in pairs)))} take {times_faster(user[0])} "
+        f"to {times_faster(user[-1])} times as long as the fastest compiled row where a user measures, solve_ivp "
+        f"against simulate. They take {times_faster(author[0])} to {times_faster(author[-1])} times as long in the "
+        "inner loop, kernel against kernel."
     )
 
 

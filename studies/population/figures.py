@@ -116,11 +116,11 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
     return Picture(
         f"run-lengths-{unit}",
         figure,
-        "Share of random tops on which a row has met the axis error within a cost. Further left is faster; a line that "
-        f"ends higher solves more tops within {words.budget(data, horizon)} force evaluations a "
-        f"nutation. {words.span(data, horizon)}, of which {asked:,} have a nutation wider than the coarsest error. "
+        "Share of random tops, no named scene, on which a row, method[chart], has met the axis error within a cost. "
+        f"Further left is faster; a line that ends higher solves more tops within {words.budget(data, horizon)} force "
+        f"evaluations a nutation. {words.span(data, horizon)}, {asked:,} with a nutation wider than the largest error. "
         f"Cost in {UNITS[unit]}, with the step or tolerance that suits the top. Thick: rows that win on the most tops; "
-        "thin: familiar ones; grey: all others. Ring: where the first row has solved half of the tops. To "
+        "thin: familiar ones; grey: all others. Ring: first to half of the tops. To "
         f"{targets[0]:.0e}: {words.winner_words(data, Cell(horizon, 'axis', targets[0]), unit)}.",
         f"Empirical distribution functions of the cost, one panel for each axis error, {len(rows)} lines with a name.",
     )
@@ -174,12 +174,11 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
     return Picture(
         f"slowdowns-{horizon}",
         figure,
-        f"The {len(names)} rows with the most wins at all accuracies together, in the same order in each panel. "
-        "Marker: median of the slowdown against the cheapest row on the same top, missing if half of the tops are. "
-        "Bar: from the 10 % to the 90 % quantile; arrow: not reached within the budget. Beside it the share of tops "
-        f"on which the row is the cheapest; last, the tops on which two are closer. "
-        f"{messages.asked_sentence(data, horizon)} {words.span(data, horizon)}; cost in {UNITS[words.UNIT]}. A bar "
-        "that stays near 1 is a safe choice.",
+        f"The {len(names)} rows, method[chart], with the most wins, each at its own step or tolerance. Marker: median "
+        "of the slowdown against the cheapest row on the same top. Bar: from the 10 % to the 90 % quantile; arrow: not "
+        "reached within the budget. Beside it the share of tops on which the row is the cheapest; last, the tops on "
+        f"which two are closer. {messages.asked_sentence(data, horizon)} {words.span(data, horizon)}, no named scene; "
+        f"cost in {UNITS[words.UNIT]}. A bar that stays near 1 is a safe choice.",
         "Dot plots of slowdown with bars from the 10 to the 90 % quantile, one panel for each axis error.",
     )
 
@@ -284,9 +283,9 @@ def draw_silent(data: xr.DataTree) -> Picture:
     return Picture(
         "silent",
         figure,
-        "Wrong runs, and the share of them that look healthy: of all rows; of the rows with a fixed step, with at "
-        f"least {words.FINE:g} steps a nutation and at each number of them. {words.span(data, 'short')}. "
-        f"{words.silent_sentence(data)} A conserved energy is no sign of a right answer.",
+        "Wrong runs, and the share of them that look healthy: of all rows, method[chart]; of the rows with a fixed "
+        f"step, with at least {words.FINE:g} steps a nutation and at each number of them. {words.span(data, 'short')}, "
+        f"no named scene. {words.silent_sentence(data)} A conserved energy is no sign of a right answer.",
         "Bars of the share of wrong runs that look healthy: of all, of those with small steps, by steps a nutation.",
         lead="How often a run is wrong without a sign",
     )
@@ -328,10 +327,10 @@ def draw_guard(data: xr.DataTree) -> Picture:
     return Picture(
         "guard",
         figure,
-        "Wrong runs that are noticed against right ones that are suspected, as the threshold varies. Black: by the "
-        f"guard's forecast, made before the run (dot: {EXPECTED:g} rad, where it warns). Orange: by the larger error "
-        f"of energy and momenta, seen after the run (dot: {KEPT:.0%}). All rows, at every step and tolerance, on "
-        f"{' and on '.join(messages.guarded(data, one) for one in spans)}. The higher a line, the more wrong runs are "
-        "found at equal false alarms. The silent failures are counted on all tops instead.",
+        "Wrong runs that are noticed against right ones that are suspected. Black: by the guard's "
+        f"forecast before the run (dot: it warns at {EXPECTED:g} rad). Orange: by the larger error of energy and "
+        f"momenta after the run (dot: {KEPT:.0%}). All rows, method[chart], at every step and tolerance, on "
+        f"{' and on '.join(messages.guarded(data, one) for one in spans)}; no named scene. The higher a line, the more "
+        "wrong runs are found at equal false alarms. Silent failures are counted on all tops instead.",
         "Receiver operating characteristics of the guard and of the conserved quantities, with their thresholds.",
     )

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.report.sentences import few, joined
+from symtop.report.sentences import abridged, joined
 from symtop.run.guard import EXPECTED
 
 from . import verdicts
@@ -87,7 +87,7 @@ def quantity_sentence(data: xr.DataTree, quantity: str) -> str:
         ends = [percent(pick(won, key=lambda share: share.value)) for pick in (min, max)]
         told.append((name, len(won), " to ".join(dict.fromkeys(ends))))
     (first, most, share), *others = told
-    rest = f" Otherwise it is {few([f'{name}, with {part}' for name, _, part in others])}." if others else ""
+    rest = f" Otherwise it is {abridged([f'{name}, with {part}' for name, _, part in others])}." if others else ""
     return (
         f"For the {quantity}, {first} is the cheapest row on the most tops in {most} of the "
         f"{sum(map(len, shares.values()))} combinations of run length and error that some row reaches, with {share} of "

@@ -15,7 +15,7 @@ import xarray as xr
 
 from symtop.measure import ranking
 from symtop.methods.registry import split_name
-from symtop.report.sentences import few, joined
+from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 
 ROUNDED = 1e-12  # an error below it is not compared between horizons
@@ -134,7 +134,9 @@ def table(data: xr.Dataset) -> Table:
             pairs = [one for listed in compared.values() for one in listed]
             kinds = Counter(_kind(one) for one in pairs)
             ends = [
-                few([name for name, listed in compared.items() if listed and all(one.share == end for one in listed)])
+                abridged(
+                    [name for name, listed in compared.items() if listed and all(one.share == end for one in listed)]
+                )
                 for end in (1.0, 0.0)
             ]
             if pairs:

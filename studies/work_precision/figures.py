@@ -78,11 +78,11 @@ def _parts(data: xr.Dataset) -> Picture:
         "parts",
         figure,
         f"How the parts of the axis error on {scene['scene'].values} grow from {first} to {last} nutation periods at "
-        "equal step or tolerance. Shape is the distance from the true path. The lags are how far the run is behind or "
-        "ahead of the truth in its nutation and in its precession. Large marks are medians over the settings that were "
-        f"run at both and whose error is above {energy.ROUNDED:g} at the first; thin marks are each of them. A shape "
-        "error that stays the same is a path that is kept, whatever the phase on it. The table of the growth has the "
-        "medians.",
+        "equal step or tolerance, a line a row, method[chart]. Shape is the distance from the true path. The lags are "
+        "how far the run is behind or ahead of the truth in its nutation and in its precession. Large marks are "
+        f"medians over the settings that were run at both and whose error is above {energy.ROUNDED:g} at the first; "
+        "thin marks are each of them. A shape error that stays the same is a path that is kept, whatever the phase on "
+        "it. The table of the growth has the medians.",
         "Dot plot of the growth of shape error, nutation lag and precession lag, a row a method.",
     )
 

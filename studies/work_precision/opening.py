@@ -7,7 +7,7 @@ import xarray as xr
 
 from symtop.measure import ranking
 from symtop.measure.errors import QUANTITIES
-from symtop.report.sentences import few
+from symtop.report.sentences import abridged
 from symtop.runner.study import Chart, Opening, Series, Table
 
 from . import energy
@@ -42,7 +42,7 @@ def opening(data: xr.Dataset) -> Opening:
             rows.append(row)
     if ahead:
         (first, times), *others = ahead.most_common()
-        listed = f", and {few([f'{name} in {count}' for name, count in others])}" if others else ""
+        listed = f", and {abridged([f'{name} in {count}' for name, count in others])}" if others else ""
         sentences.append(
             f"For the direction of the axis, begin with {first}. It is the first choice in {times} of the {len(rows)} "
             f"lines of the table{listed}. The first choice meets the error on the most scenes and takes, of the rows "

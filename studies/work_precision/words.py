@@ -9,7 +9,7 @@ import xarray as xr
 from symtop.measure import ranking
 from symtop.measure.work import CAPPED, TARGETS, TOO_WIDE
 from symtop.methods.registry import split_name
-from symtop.report.sentences import few, joined
+from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 
 from . import against_taylor, closed_form, energy, growth, trust, worth
@@ -61,7 +61,7 @@ def lead(won: ranking.Win) -> str:
     """The fastest row at a target, its time, and the rows that are level with it or else its lead."""
     parts = [won.best.integrator, seconds(won.best.cost)]
     if won.level:
-        parts.append(f"tied with {few(won.level, LEVEL)}")
+        parts.append(f"tied with {abridged(won.level, LEVEL)}")
     elif won.behind:
         parts.append(f"{won.ratio:.1f} times faster than {won.behind.integrator}")
     return ", ".join(parts)
@@ -124,7 +124,7 @@ def fastest(data: xr.Dataset, wins: Sequence[ranking.Win]) -> str:
     if not wins:
         return "No compiled row meets any of the errors."
     (first, most), *others = Counter(won.best.integrator for won in wins).most_common()
-    rest = f", followed by {few([f'{name} in {times}' for name, times in others], LEVEL)}" if others else ""
+    rest = f", followed by {abridged([f'{name} in {times}' for name, times in others], LEVEL)}" if others else ""
     return (
         f"{first} is the fastest row in {most} of the {len(wins)} combinations of scene, run length and error that a "
         f"compiled row meets{rest}. In {sum(not won.level for won in wins)} the lead is larger than the noise."
@@ -154,8 +154,8 @@ def plain_python(data: xr.Dataset) -> str:
     rows = of_implementation(data, "python")
     methods = list(dict.fromkeys(split_name(row)[0] for row in rows))
     return (
-        f"Only compiled rows are ranked. The {len(rows)} rows in plain Python, of {few(methods)}, are ranked among "
-        "themselves in a table of their own; compare them with the others by force evaluations."
+        f"Only compiled rows are ranked. The {len(rows)} rows in plain Python, of {abridged(methods)}, are ranked "
+        "among themselves in a table of their own; compare them with the others by force evaluations."
         if rows
         else ""
     )

@@ -10,6 +10,6 @@ def joined(words: Sequence[str]) -> str:
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + f" and {words[-1]}" if words else "none"
 
 
-def few(names: Sequence[str], most: int = FEW) -> str:
+def abridged(names: Sequence[str], most: int = FEW) -> str:
     """The first names of a list, and how many more there are."""
     return joined(names) if len(names) <= most else f"{', '.join(names[:most])} and {len(names) - most} more"

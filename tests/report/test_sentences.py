@@ -2,7 +2,7 @@
 
 import pytest
 
-from symtop.report.sentences import few, joined
+from symtop.report.sentences import abridged, joined
 
 
 @pytest.mark.parametrize(
@@ -13,6 +13,6 @@ def test_a_list_is_joined_as_one_says_it(words, said):
 
 
 def test_a_long_list_is_cut_off_and_counted():
-    assert few(list("abcd")) == "a, b, c and d"
-    assert few(list("abcdef")) == "a, b, c, d and 2 more"
-    assert few(list("abc"), 2) == "a, b and 1 more"
+    assert abridged(list("abcd")) == "a, b, c and d"
+    assert abridged(list("abcdef")) == "a, b, c, d and 2 more"
+    assert abridged(list("abc"), 2) == "a, b and 1 more"
