@@ -11,6 +11,7 @@ from symtop.judging.ledger import CLAIMS, Finding, spoken
 from symtop.methods.registry import FAMILIES, integrators
 from symtop.report import style
 from symtop.report.figures import name_ends
+from symtop.report.sentences import joined
 from symtop.runner.study import Picture
 
 from .tables import defects, findings
@@ -146,11 +147,10 @@ def _bracket(data: xr.Dataset) -> Picture:
     name_ends(axis, ends)
     caption = (
         f"How far one step is from preserving the Poisson bracket, which a symplectic step does, on {SCENE} in the "
-        "chart where it is farthest, against the width of the central differences that measure it. For a symplectic "
-        "step the defect is an error of the differencing and falls with the square of the width: "
-        f"{', '.join(falling) or 'none'}. For the others it is real and levels off: {', '.join(level) or 'none'}. "
-        "Gauss methods are symplectic for canonical equations; in the variables (e, L) those of the top are "
-        "Lie-Poisson, with a bracket that depends on the state, and no Gauss method preserves it."
+        "chart where it is farthest, against the width of the central differences that measure it. A defect that falls "
+        f"with the square of the width is an error of the differencing: {joined(falling)}. One that levels off is "
+        f"real: {joined(level)}. Gauss methods are symplectic for canonical equations. In the variables (e, L) those "
+        "of the top are Lie-Poisson, with a bracket that depends on the state, and no Gauss method preserves it."
     )
     alt = (
         "Log-log plot of the defect against the differencing width: lines of slope two for symplectic methods, level "

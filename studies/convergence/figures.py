@@ -1,6 +1,5 @@
 """Figures of the study: the five named methods together, what every order costs, error against tolerance."""
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ from symtop.report.figures import SMALLEST, error_band
 from symtop.report.style import FIRM, LEAST_TEXT, few_ticks, headline, legend_below, line, look, number, panels
 from symtop.runner.study import Picture
 
+from .named import TARGET, least_work, named_rows
 from .tables import (
     HISTORY_STEPS,
     LARGE,
@@ -23,14 +23,11 @@ from .tables import (
     declared_order,
     efficiencies,
     evaluations_a_nutation,
-    fits,
     merged,
     stepping,
     tolerance_fits,
 )
-from .words import spans
 
-TARGET = 1e-6  # rad, the axis error at which costs are compared
 HORIZON = "over 8 nutations (spheroid: to t = 8)"
 EQUAL = {
     "color": "#9EC9E8",
@@ -60,11 +57,8 @@ def _line(axis: Any, name: str, label: str, x: Any, y: Any) -> None:
 
 def _named(data: xr.Dataset) -> Picture:
     """Four panels on one scene: error against the step, against the tolerance, against work; energy over time."""
-    named = [name for name in map(str, data["integrator"].values) if split_name(name)[0] in NAMED]
-    names = [name for name in named if name.replace("[attitude]", "[axis]") not in named or "[attitude]" not in name]
-    part = data.sel(integrator=names).isel(scene=0)
+    part, labels = named_rows(data)
     scene = str(part["scene"].values)
-    labels = merged(data.sel(integrator=names), MAIN)
     figure, axes = panels(2, 2, height=2.3)
     steps, tolerances, work, energy = axes.flat
     floor = 0.0
@@ -89,7 +83,7 @@ def _named(data: xr.Dataset) -> Picture:
     energy.set(xscale="log", yscale="log", xlabel="nutations", ylabel="relative change\nof the energy")
     energy.set_title(f"energy (fixed steps: {HISTORY_STEPS:g} a nutation)")
     few_ticks(*axes.flat)
-    paid_least = least_work(part, scene, labels)
+    paid_least = least_work(part, labels)
     if len(paid_least) > 1:
         (best, least), (worst, most) = paid_least[0], paid_least[-1]
         headline(
@@ -98,15 +92,14 @@ def _named(data: xr.Dataset) -> Picture:
             f"{scene}, {worst} {number(most)}",
         )
     legend_below(figure, [work, tolerances])
-    listed = ", ".join(f"{name} {value:.3g}" for name, value in paid_least)
     tolerance = sorted({f"{value:.1e}" for value in np.ravel(part.get("history_tolerance", np.nan)) if value > 0.0})
     caption = (
         f"The five methods that everybody knows on {scene}, chart in the name, to t = {float(part['horizon'].max()):g}."
-        " Largest axis error at every step, at every tolerance, and both against force evaluations per nutation, on "
-        "one axis of work: a line of slope -2 costs ten times the work for a hundredth of the error; a Taylor step of "
-        "order n counts n evaluations. Last: the largest change of the energy, relative to E0 - min V, in each window "
-        f"of time, at {HISTORY_STEPS:g} steps a nutation (adaptive: tolerance {' or '.join(tolerance)}). For an error "
-        f"below {TARGET:g} the cheapest run of each takes: {listed}. Grey band: below the error bound of the reference."
+        " Largest axis error at every step, at every tolerance, and both against force evaluations per nutation: a "
+        "line of slope -2 costs ten times the work for a hundredth of the error. Last: the largest change of the "
+        f"energy, relative to E0 - min V, in each window of time, at {HISTORY_STEPS:g} steps a nutation (adaptive: "
+        f"tolerance {' or '.join(tolerance)}). The table of the cheapest runs says what an error below {TARGET:g} "
+        "takes. Grey band: below the error bound of the reference."
     )
     alt = "Four log-log plots of the five named methods: error against step, tolerance and work, energy over time."
     return Picture("named-methods", figure, caption, alt, lead="Five well-known methods")
@@ -129,17 +122,6 @@ def _history(axis: Any, name: str, label: str, cell: xr.Dataset) -> None:
         axis.plot(
             x, np.where(np.greater(y, SMALLEST), y, np.nan), **line(name), label=label
         )  # no change at all has no place
-
-
-def least_work(part: xr.Dataset, scene: str, labels: Mapping[str, str]) -> list[tuple[str, float]]:
-    """What each row pays for an error below `TARGET`: force evaluations per nutation, the least first."""
-    paid = {}
-    for name in labels:
-        cell = part.sel(integrator=name)
-        work = evaluations_a_nutation(cell, scene)[cell[MAIN].values <= TARGET]
-        if work.size:
-            paid[name] = float(np.min(work))
-    return sorted(paid.items(), key=lambda one: one[1])
 
 
 def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Picture:
@@ -200,12 +182,11 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
         f"best of order {declared_order(low)}, {times} times as many",
     )
     caption = (
-        "Efficiency constants: force evaluations per nutation that the law error = C h^p of each row, method[chart], "
-        f"foretells for an axis error of {TARGET:g} rad {HORIZON}; p is the declared order, C the median of error / "
-        f"h^p over the steps of the fit. Bar: from the least to the largest of the scenes {', '.join(scenes)}; marker: "
-        f"their median, open if {TARGET:g} rad lies outside the errors that were fitted on most of them, so that it is "
-        "extrapolated. Charts of a method with the same errors share a line. Rows without an order to be trusted are "
-        f"in the table only. {spans(fits(data, MAIN))}"
+        "Force evaluations per nutation that each row, method[chart], needs for an axis error of "
+        f"{TARGET:g} rad {HORIZON}, by its law error = C h^p. p is the declared order, and C the median of error / h^p "
+        f"over the steps of the fit. Bar: from the least to the largest of the scenes {', '.join(scenes)}. Marker: "
+        f"their median, open if {TARGET:g} rad lies outside the errors that were fitted on most of them. Charts of a "
+        "method with the same errors share a line. Rows without an order to be trusted are in the table only."
     )
     alt = "Dot plot of the work for one accuracy, a line a row, grouped by order."
     return Picture("constants", figure, caption, alt)
@@ -285,15 +266,11 @@ def _by_tolerance(data: xr.Dataset) -> Picture:
         f"Runs on {scenes}, one at each tolerance.\nNot counted: errors above {LARGE:g} rad, and those near the "
         "reference's error bound, which are rounding."
     )
-    slopes = {name: [fit.slope for pair, fit in tolerance_fits(data).items()
-                     if pair[1] == name and np.isfinite(fit.slope)] for name in merged(data, MAIN)}  # fmt: skip
-    listed = ", ".join(f"{name} {min(values):.2f} to {max(values):.2f}" for name, values in slopes.items() if values)
     caption = (
-        f"Largest axis error {HORIZON} of the adaptive methods, method[chart], over the tolerance that was asked "
-        "for; relative and absolute tolerance of the Runge-Kutta methods are equal. A dot is a run, a mark the median "
-        "of its method; right of the wide line a run loses more than it was asked for. Left out are errors that do "
-        f"not follow the tolerance: above {LARGE:g} rad, and near the error bound of the reference, where they are "
-        f"rounding. Exponents x of error ~ tolerance^x: {listed}."
+        f"Largest axis error {HORIZON} of the adaptive methods over the tolerance that was asked for; relative and "
+        "absolute tolerance of the Runge-Kutta methods are equal. A dot is a run, a mark the median of its row, "
+        "method[chart]. Right of the wide line a run loses more than it was asked for. Left out are errors that do not "
+        f"follow the tolerance: above {LARGE:g} rad, and near the error bound of the reference, where rounding rules."
     )
     if met:
         caption += f" The largest ratio is on {one.worst_on}."

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.ticker import LogLocator, NullLocator
 
 from symtop.report import style
+from symtop.report.sentences import joined
 from symtop.runner.study import Picture
 
 from . import words
@@ -82,14 +83,11 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
     return Picture(
         "waterfall",
         figure,
-        f"Where the factor comes from. {words.product(*shown[0])} Each bar changes what its label names and holds the "
-        "other three factors and the accuracy, by the coarsest step or tolerance found; the ratios multiply to the "
-        "total. Language: SciPy's loop with its right-hand side in Python, then compiled, then the whole loop. "
-        "Hatched bars are slower. Public "
-        f"calls return {SAMPLES} samples, a kernel two. Above, every change but the last is timed through simulate: "
-        "what it adds to a run hides the method. Below, all are timed with the kernel: the ratios differ, the product "
-        "does not. "
-        f" Noise (median over least sample) is at most {noise:.0%}.",
+        f"{words.product(*shown[0])} Each bar changes what its label names and holds the rest, at the coarsest step or "
+        "tolerance found. Language: SciPy's loop with its right-hand side in Python, then compiled, then the whole "
+        "loop. Hatched bars are slower. Above, every change but the last is timed through simulate, whose "
+        f"{SAMPLES} samples hide the method; below with the kernel. The product is the same. Noise (median over least "
+        f"sample): at most {noise:.0%}.",
         "Horizontal bars on a logarithmic axis of time, each beginning where the one above ends.",
         lead="Where the speed comes from",
     )
@@ -126,16 +124,14 @@ def draw_charts(data: xr.Dataset) -> Picture:
     axes[0, 0].plot([], [], color="#444444", lw=0.9, label="as long as on the axis alone")
     style.legend_below(figure, axes)
     style.headline(figure, words.charts_message(data))
-    sentences = " ".join(words.family_sentences(data))
-    scenes = words.joined([str(name) for name in data["scene"].values])
+    scenes = joined([str(name) for name in data["scene"].values])
     return Picture(
         "charts",
         figure,
-        "Time of a run in Euler angles, and with the whole attitude, over that of the same method on the axis alone "
-        f"(the axis e and the angular momentum L): a dot a pair, on {scenes}, each horizon and target. Every run has "
-        "the coarsest step or tolerance found that meets the target; bare compiled kernels. A pair is missing if one "
-        f"of its runs needs more than the study's budget. {sentences} The tables have every time and its force "
-        "evaluations.",
+        "Time of a run in Euler angles, and with the whole attitude, over that of the same method on the axis alone: "
+        f"a dot a pair, on {scenes}, for each run length and error. All runs "
+        "are bare compiled kernels at the coarsest step or tolerance found that meets the error. Missing pairs "
+        f"need more than the study's budget. {words.families_sentence(data)}",
         "Two dot plots of ratios of time, a row a method: splitting methods above all others, a line at ratio one.",
     )
 

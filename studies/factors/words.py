@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from symtop.measure.timing import NOISY
+from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 
 from .cells import COMPILED, FAMILIES, KERNEL, SAMPLES, SCIPY_PYTHON, SCIPYS, SIMULATE, SOLVE_IVP
@@ -28,17 +30,20 @@ from .tables import (
 
 HOW_TO_READ = (
     "Four factors make the time of a run: the method, the chart that its equations are written in, the language that "
-    "executes them and the call around them. Every row has its own step or tolerance, the coarsest found that meets "
-    "the stated error of the axis, so that times compare at equal accuracy. A factor's effect is the ratio of two "
-    "measured times that differ in this factor alone. The waterfall changes one factor after the other; the table "
-    "below it has the same factor's effect in every other surrounding, because factors do not simply multiply: a "
-    "smaller chart helps a compiled loop more than a Python one. A kernel is the bare solver with two samples; "
-    f"simulate and solve_ivp are what a user calls, with {SAMPLES} samples. SciPy's loop is Python, whatever the "
-    "language of its right-hand side. The closed form does not take part."
+    "executes them and the call around them. A row is a method in one chart. Every row has its own step or tolerance, "
+    "the coarsest found that meets the stated error of the axis, so that times compare at equal accuracy. A factor's "
+    "effect is the ratio of two measured times that differ in this factor alone. The waterfall changes one factor "
+    "after the other. A table has the same factor's effect in every other surrounding, because factors do not simply "
+    "multiply: a smaller chart helps a compiled loop more than a Python one. A kernel is the bare solver with two "
+    f"samples; simulate and solve_ivp are what a user calls, with {SAMPLES} samples. SciPy's loop is Python, whatever "
+    "the language of its right-hand side. The closed form does not take part."
 )
 
 WATERFALL = ["scene", "nutations", "axis error", "changed", "run", "call", "time", "ratio", "product so far", "noise"]
 EFFECTS = ["factor", "from", "to", "pairs", "times faster, median", "least", "most"]
+SCIPY = ["scene", "nutations", "axis error", "SciPy", "solve_ivp", "simulate", "times", "SciPy", "its kernel",
+         "own kernel", "times"]  # fmt: skip
+CHARTS_BESIDE = ("attitude", "angles")
 CHARTS_SHOWN = ("angles", "axis", "attitude")
 CHARTS = ["scene", "nutations", "axis error", "method", "angles", "axis", "attitude", "angles/axis", "attitude/axis"]
 FACTORIAL = [
@@ -63,11 +68,6 @@ def times_faster(value: float) -> str:
     return f"{value:,.0f}" if value >= 99.5 else f"{value:.3g}"
 
 
-def joined(words: Sequence[str]) -> str:
-    """A list as a sentence has it."""
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + f" and {words[-1]}" if words else "none"
-
-
 def waterfalls(data: xr.Dataset, *, call_first: bool = False) -> list[tuple[str, float, float, list[Bar]]]:
     """Scene, nutations, target and bars of every goal that has a waterfall."""
     every = [
@@ -87,38 +87,73 @@ def all_changes(data: xr.Dataset) -> list[Change]:
 
 
 def product(scene: str, nutations: float, target: float, bars: Sequence[Bar]) -> str:
-    """A waterfall as a sentence."""
+    """Where a waterfall begins and ends."""
     first, last = bars[0].time, bars[-1].time
-    steps = joined([f"{bar.change} {times_faster(bar.ratio)}" for bar in bars[1:]])
     return (
-        f"On {scene}, {nutations:g} nutations, axis error {target:.0e}: {first.name} called through {first.call} takes "
-        f"{duration(first.seconds)}, the kernel of {last.name} {duration(last.seconds)}, "
-        f"{times_faster(first.seconds / last.seconds)} times less. Times faster, one factor after the other: {steps}."
+        f"The kernel of {last.name} takes {duration(last.seconds)} where {first.name} called through {first.call} "
+        f"takes {duration(first.seconds)}, {times_faster(first.seconds / last.seconds)} times less: on {scene}, "
+        f"{nutations:g} nutations, axis error {target:.0e}."
     )
 
 
-def public_and_inner(scene: str, nutations: float, target: float, rows: Sequence[Timed]) -> str:
+def largest_step(bars: Sequence[Bar]) -> str:
+    """The largest step of a waterfall."""
+    largest = max(bars[1:], key=lambda bar: bar.ratio)
+    return (
+        f"The largest step on the way is the {largest.factor}, {largest.change}, with {times_faster(largest.ratio)} "
+        "times."
+    )
+
+
+class Against(NamedTuple):
+    """One of SciPy's methods in its fastest chart beside the fastest compiled row, as a user calls them and inside."""
+
+    public: Timed
+    ours: Timed
+    inner: Timed
+    ours_inner: Timed
+
+    @property
+    def user(self) -> float:
+        """How many times less the own row takes where a user measures."""
+        return self.public.seconds / self.ours.seconds
+
+    @property
+    def author(self) -> float:
+        """How many times less it takes in the inner loop."""
+        return self.inner.seconds / self.ours_inner.seconds
+
+
+def against_scipy(rows: Sequence[Timed]) -> list[Against]:
     """The comparison that a user makes beside the one that an author makes, against each of SciPy's methods."""
-    parts: list[str] = []
+    pairs: list[Against] = []
     if not any(one.call == SIMULATE for one in rows):
-        return ""
+        return pairs
+    ours = {call: fastest(rows, call, COMPILED) for call in (SIMULATE, KERNEL)}
     for scheme in SCIPYS:
         theirs = {
             call: min((one for one in rows if (one.method, one.language, one.call) == (scheme, SCIPY_PYTHON, call)),
                       key=lambda one: one.seconds, default=None)
             for call in (SOLVE_IVP, KERNEL)
         }  # fmt: skip
-        ours = {call: fastest(rows, call, COMPILED) for call in (SIMULATE, KERNEL)}
         public, inner = theirs[SOLVE_IVP], theirs[KERNEL]
-        if public is None or inner is None:
-            continue
-        parts.append(
-            f"against {inner.name}, its fastest chart, {times_faster(public.seconds / ours[SIMULATE].seconds)} times "
-            f"where a user measures (solve_ivp {duration(public.seconds)}, simulate with {ours[SIMULATE].name} "
-            f"{duration(ours[SIMULATE].seconds)}) and {times_faster(inner.seconds / ours[KERNEL].seconds)} times in "
-            f"the inner loop (kernel {duration(inner.seconds)}, {ours[KERNEL].name} {duration(ours[KERNEL].seconds)})"
-        )
-    return f"SciPy on {scene}, {nutations:g} nutations, {target:.0e}: {'; '.join(parts)}." if parts else ""
+        if public is not None and inner is not None:
+            pairs.append(Against(public, ours[SIMULATE], inner, ours[KERNEL]))
+    return pairs
+
+
+def scipy_sentence(data: xr.Dataset) -> str:
+    """From how many to how many times SciPy's methods take longer; empty if they were not timed."""
+    pairs = [pair for *_, part in goals_of(data) for pair in against_scipy(times(part))]
+    if not pairs:
+        return ""
+    user, author = (sorted(values) for values in zip(*((pair.user, pair.author) for pair in pairs), strict=True))
+    return (
+        f"SciPy's {abridged(list(dict.fromkeys(pair.public.method for pair in pairs)))} take {times_faster(user[0])} "
+        f"to {times_faster(user[-1])} times as long as the fastest compiled row where a user measures, solve_ivp "
+        f"against simulate. They take {times_faster(author[0])} to {times_faster(author[-1])} times as long in the "
+        "inner loop, kernel against kernel."
+    )
 
 
 def family_ratios(data: xr.Dataset, family: str, chart: str) -> list[float]:
@@ -128,18 +163,25 @@ def family_ratios(data: xr.Dataset, family: str, chart: str) -> list[float]:
     return [ratio for ratio in ratios if math.isfinite(ratio)]
 
 
-def family_sentences(data: xr.Dataset) -> list[str]:
-    """What a larger chart costs each family of methods, and what the angles cost it, at equal error of the axis."""
-    sentences = []
-    for family in FAMILIES:
-        parts = []
-        for chart in ("attitude", "angles"):
-            if ratios := family_ratios(data, family, chart):
-                several = f" ({min(ratios):.2f} to {max(ratios):.2f}, {len(ratios)} pairs)" if len(ratios) > 1 else ""
-                parts.append(f"{np.median(ratios):.2f} times as long in {chart}{several}")
-        if parts:
-            sentences.append(f"{family}: a compiled run takes {joined(parts)} as on the axis.")
-    return sentences
+def chart_costs(data: xr.Dataset) -> dict[tuple[str, str], list[float]]:
+    """The ratios of every family and every chart beside the axis where both were timed."""
+    every = {(family, chart): family_ratios(data, family, chart) for family in FAMILIES for chart in CHARTS_BESIDE}
+    return {key: ratios for key, ratios in every.items() if ratios}
+
+
+def families_sentence(data: xr.Dataset) -> str:
+    """What a larger chart costs the families of methods, and what the angles cost them, at equal error of the axis."""
+    costs, parts = chart_costs(data), []
+    for chart in CHARTS_BESIDE:
+        middles = {family: float(np.median(ratios)) for (family, one), ratios in costs.items() if one == chart}
+        if middles:
+            ends = dict.fromkeys(pick(middles, key=lambda name: middles[name]) for pick in (min, max))
+            said = " to ".join(f"{middles[name]:.2f} ({name})" for name in ends)
+            who = "it takes" if parts else "a compiled run takes"
+            parts.append(f"In {chart} {who} {said} times as long{'' if parts else ' as on the axis alone'}.")
+    if not parts:
+        return ""
+    return f"{' '.join(parts)} These are medians of families of methods, at equal error of the axis."
 
 
 def charts_message(data: xr.Dataset) -> str:
@@ -172,15 +214,21 @@ def waterfall_message(shown: Sequence[tuple[str, float, float, list[Bar]]]) -> s
 
 
 def factors_sentence(data: xr.Dataset) -> str:
-    """The effect of each factor over the whole factorial."""
+    """The largest effect of each factor but the method over the whole factorial."""
+    largest: dict[str, Change] = {}
+    for change in all_changes(data):
+        known = largest.get(change.factor)
+        if change.factor != "method" and (known is None or np.median(change.ratios) > np.median(known.ratios)):
+            largest[change.factor] = change
     parts = [
-        f"{change.before} to {change.after} {times_faster(float(np.median(change.ratios)))} "
-        f"({times_faster(min(change.ratios))} to {times_faster(max(change.ratios))}, {len(change.ratios)} pairs)"
-        for change in all_changes(data)
-        if change.factor != "method"
+        f"the {factor} ({one.before} to {one.after}) {times_faster(float(np.median(one.ratios)))} times"
+        for factor, one in largest.items()
     ]
+    if not parts:
+        return ""
     return (
-        f"Times faster by one factor alone, median and range over every pair that holds the others: {'; '.join(parts)}."
+        f"Changed alone, these factors make a run faster: {joined(parts)}. Each is the largest effect of its factor, "
+        "the median over all pairs of times that differ in nothing else."
     )
 
 
@@ -204,20 +252,16 @@ def noise_sentence(data: xr.Dataset) -> str:
 
 
 def verdict(data: xr.Dataset) -> list[str]:
-    """The waterfalls, the factors, the public call, and a sentence a family."""
-    falls = [product(*one) for one in waterfalls(data)[:2]]
-    first = str(data["scene"].values[0])  # the tables have the others
-    every = [(scene, span, target, times(part)) for scene, span, target, part in goals_of(data)]
-    calls = [public_and_inner(*one) for one in every if one[0] == first]
-    families = " ".join(family_sentences(data))
-    return [
-        *falls,
+    """The waterfalls, the factors, SciPy, the charts, and what the numbers are worth."""
+    said = [
+        *(f"{product(*one)} {largest_step(one[-1])}" for one in waterfalls(data)[:2]),  # the tables have the others
         factors_sentence(data),
-        *[call for call in calls if call],
-        f"Model no more than a scene needs, at equal error of the axis. {families}",
+        scipy_sentence(data),
+        families_sentence(data),
         accuracy_sentence(data),
         noise_sentence(data),
     ]
+    return [sentence for sentence in said if sentence]
 
 
 def tables(data: xr.Dataset) -> list[Table]:
@@ -252,11 +296,33 @@ def tables(data: xr.Dataset) -> list[Table]:
                 charts.append([*goal, scheme, *shown, *(f"{r:.2f}" if math.isfinite(r) else "" for r in ratios)])
         rows += [[*goal, *row] for row in _factorial(part, taken)]
     return [
+        *(table for table in (_scipy(data), _families(data)) if table.rows),
         Table("The waterfall: one factor at a time, the call last and the call first", WATERFALL, falls),
         Table("What one factor does, everything else held", EFFECTS, effects),
         Table("Compiled kernels by chart, at equal error of the axis", CHARTS, charts),
         Table("The factorial", FACTORIAL, rows),
     ]
+
+
+def _scipy(data: xr.Dataset) -> Table:
+    lines = [
+        [scene, f"{span:g}", f"{target:.0e}", pair.public.name, duration(pair.public.seconds),
+         f"{duration(pair.ours.seconds)} ({pair.ours.name})", times_faster(pair.user), pair.inner.name,
+         duration(pair.inner.seconds), f"{duration(pair.ours_inner.seconds)} ({pair.ours_inner.name})",
+         times_faster(pair.author)]
+        for scene, span, target, part in goals_of(data)
+        for pair in against_scipy(times(part))
+    ]  # fmt: skip
+    return Table("SciPy's methods, each in its fastest chart, beside the fastest compiled row", SCIPY, lines)
+
+
+def _families(data: xr.Dataset) -> Table:
+    lines = [
+        [family, chart, str(len(ratios)), *(f"{value:.2f}" for value in (np.median(ratios), min(ratios), max(ratios)))]
+        for (family, chart), ratios in chart_costs(data).items()
+    ]
+    title = "Time of a compiled run in a larger chart over that on the axis alone, at equal error of the axis"
+    return Table(title, ["methods", "chart", "pairs", "times as long, median", "least", "most"], lines)
 
 
 def _factorial(part: xr.Dataset, taken: Sequence[Timed]) -> list[list[str]]:

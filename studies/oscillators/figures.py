@@ -83,13 +83,11 @@ def draw_orders(data: xr.Dataset) -> Picture:
         "orders",
         figure,
         f"The oscillator released from rest, T = {HORIZON:g}, steps from {least:.0e} to {most:.2g}; one coordinate x, "
-        "no "
-        "chart. Left: the position at critical damping has order 2 with both rules, as in every regime (table); the "
-        "whole force at one end of the step costs an order. Middle and right: lambda of exp(lambda t), the rate at "
-        "which the slower of the two parts of the motion decays, relative to the exact one. At "
-        "critical damping (b = 2) it is the square root of a perturbation of the discriminant, so that the errors "
-        f"there have half the usual order ({', '.join(halved)}). The midpoint rule leaves critical damping "
-        "in place and keeps its order.",
+        "no chart. Left: at critical damping (b = 2) the position has order 2 with both rules, as in every regime; the "
+        "whole force at one end of the step costs an order. Middle and right: error of lambda of exp(lambda t), the "
+        "rate at which the slower part of the motion decays. At critical damping it is the square root of a perturbed "
+        f"discriminant, so that errors have half the usual order ({', '.join(halved)}). The midpoint rule leaves "
+        "critical damping in place and keeps its order.",
         "Log-log plots of errors against step: at critical damping the rate of decay has slopes 2, 1 and 1/2, in the "
         "other panels 2, 2 and 1.",
     )
@@ -110,7 +108,7 @@ def draw_decay(data: xr.Dataset) -> Picture:
         "decay",
         figure,
         f"Energy of the oscillator (one coordinate x, no chart) against its exact decay over T = {LONG:g}, at equal "
-        f"cost: {words.cost(data)}. {words.energy(data)}",
+        f"cost: {words.cost(data)}. {words.energy(data)} {words.FRICTION_BREAKS}",
         "Log-log plots of the relative energy error over time for two rules and RK45.",
     )
 

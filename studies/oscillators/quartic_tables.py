@@ -1,4 +1,4 @@
-"""What is computed and stored of the planar quartic oscillator (`quartic`), and what is said of it.
+"""What is computed and stored of the planar quartic oscillator (`quartic`).
 
 Scenes are oscillators: a plain harmonic one, two that are no top, and the two of spheroid. Times are in periods T.
 """
@@ -11,7 +11,6 @@ import xarray as xr
 from symtop.measure.order import Fit, power_law
 from symtop.model.charts import Array
 from symtop.model.scenes import scene
-from symtop.runner.study import Table
 
 from .quartic import Quartic, discrete_path, exact, mcmillan, of_top, true_path
 
@@ -112,37 +111,3 @@ def distances(data: xr.Dataset, name: str, method: str) -> Array:
 def off_curve(data: xr.Dataset, name: str, method: str) -> float:
     """The largest of the distances, NaN if a point is lost."""
     return float(np.max(distances(data, name, method)))
-
-
-def sentences(data: xr.Dataset) -> list[str]:
-    """What the four maps do, and what becomes of the exact one for small steps."""
-    worst = float(data[ERROR].sel(scene=list(QUARTICS), integrator="exact-discrete").max())
-    slopes = [quartic_order(data, name, method).slope for name in QUARTICS for method in MAPS[1:]]
-    limits = [quartic_order(data, name, MAPS[0], gap).slope for name in QUARTICS[1:] for gap in GAPS]
-    line = (
-        "From the seed to the top in one line: with sigma = 0 the map Z+ + Z- = 2 A Z/(1 + B |Z|^2) is the harmonic "
-        "oscillator with its known exact discrete Lagrangian (B = 0, A = cos w h); with sigma it is the planar quartic "
-        f"oscillator; two of these, with sigma = kappa and -kappa, are the top. Over {PERIODS:g} periods and steps of "
-        f"T/{max(STEPS):g} to T/{min(STEPS):g} its largest relative error on these oscillators is {worst:.0e}, which "
-        "is rounding."
-    )
-    limit = (
-        "stormer-verlet, the midpoint rule and McMillan's map with constants to order h^2 are its neighbours, with "
-        f"orders {min(slopes):.2f} to {max(slopes):.2f}. For small steps A and B differ from theirs by h^4 and delta "
-        f"vanishes as h^3 (slopes {min(limits):.2f} to {max(limits):.2f})."
-    )
-    return [line, limit]
-
-
-def tables(data: xr.Dataset) -> list[Table]:
-    """Orders and the largest errors of every map."""
-    rows = []
-    for name in QUARTICS:
-        oscillator = oscillator_of(name)
-        for method in MAPS:
-            errors = data[ERROR].sel(scene=name, integrator=method).values
-            order = "exact" if method == MAPS[0] else f"{quartic_order(data, name, method).slope:.2f}"
-            sizes = [f"{errors[STEPS.index(steps)]:.0e}" for steps in (160.3, 20.3, 4.37, 2.1)]
-            rows.append([name, f"{oscillator.sigma:.3g}", f"{oscillator.b:.3g}", method, order, *sizes])
-    header = ["oscillator", "sigma", "b", "map", "order", "error at T/160", "T/20", "T/4.4", "T/2.1"]
-    return [Table(f"Planar quartic oscillators: largest relative error over {PERIODS:g} periods", header, rows)]

@@ -116,13 +116,12 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
     return Picture(
         f"run-lengths-{unit}",
         figure,
-        f"Share of random tops on which a row, method[chart], has met the axis error within a cost: a line further to "
-        f"the left is faster, one that ends higher solves more tops within {words.budget(data, horizon)} force "
-        f"evaluations a nutation. {words.span(data, horizon)} ({asked:,} of them have a nutation wider than the "
-        "coarsest error), no named scene. At each cost every row has the step or tolerance that suits the top. "
-        f"Cost in {UNITS[unit]}. Thick: rows that win on the most tops; thin: familiar ones; grey: all others. Ring: "
-        "where the first row has solved half of the tops. "
-        f"{words.winner_sentence(data, Cell(horizon, 'axis', targets[0]), unit)}.",
+        "Share of random tops, no named scene, on which a row, method[chart], has met the axis error within a cost. "
+        f"Further left is faster; a line that ends higher solves more tops within {words.budget(data, horizon)} force "
+        f"evaluations a nutation. {words.span(data, horizon)}, {asked:,} with a nutation wider than the largest error. "
+        f"Cost in {UNITS[unit]}, with the step or tolerance that suits the top. Thick: rows that win on the most tops; "
+        "thin: familiar ones; grey: all others. Ring: first to half of the tops. To "
+        f"{targets[0]:.0e}: {words.winner_words(data, Cell(horizon, 'axis', targets[0]), unit)}.",
         f"Empirical distribution functions of the cost, one panel for each axis error, {len(rows)} lines with a name.",
     )
 
@@ -175,13 +174,11 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
     return Picture(
         f"slowdowns-{horizon}",
         figure,
-        f"The {len(names)} rows, method[chart], with the most wins at all accuracies together, in the same order in "
-        "each panel: marker, median of the slowdown against the cheapest row on the same top; bar, from the 10 % to "
-        "the 90 % quantile (arrow: not reached within the budget; no marker: not on half of the tops). Beside it the "
-        f"share of tops on which the row is the cheapest beyond ties; the last line has the tops on which nobody is. "
-        f"{messages.asked_sentence(data, horizon)} A bar that stays near 1 is a safe choice. "
-        f"{words.span(data, horizon)}, no named scene; cost in {UNITS[words.UNIT]}, each at its own step or tolerance. "
-        f"{words.verdict_of(data, horizon, 'axis')}",
+        f"The {len(names)} rows, method[chart], with the most wins, each at its own step or tolerance. Marker: median "
+        "of the slowdown against the cheapest row on the same top. Bar: from the 10 % to the 90 % quantile; arrow: not "
+        "reached within the budget. Beside it the share of tops on which the row is the cheapest; last, the tops on "
+        f"which two are closer. {messages.asked_sentence(data, horizon)} {words.span(data, horizon)}, no named scene; "
+        f"cost in {UNITS[words.UNIT]}. A bar that stays near 1 is a safe choice.",
         "Dot plots of slowdown with bars from the 10 to the 90 % quantile, one panel for each axis error.",
     )
 
@@ -245,11 +242,9 @@ def draw_strata(data: xr.DataTree) -> Picture:
     return Picture(
         "strata",
         figure,
-        "Which tops want which row: the method[chart] that wins on the most tops of each stratum, and its share of "
-        f"wins beyond ties, for each axis error. Pale and with a tilde: its lead may be chance or noise of the "
-        "times; level: no row wins beyond ties. Cost in "
-        f"{UNITS[words.UNIT]}, each row at its own step or tolerance on each top; random tops, no named scene. "
-        f"{words.strata_sentence(data)}",
+        "The row that wins on the most tops of each kind, and its share of wins, for each axis error. Pale and with a "
+        "tilde: its lead may be chance or noise of the times; level: two rows are closer than a win. Cost in "
+        f"{UNITS[words.UNIT]}, each row at its own step or tolerance on each top. {words.strata_sentence(data)}",
         "Coloured cells naming the winning row, a line a stratum, a column an accuracy, a panel a horizon.",
     )
 
@@ -288,11 +283,9 @@ def draw_silent(data: xr.DataTree) -> Picture:
     return Picture(
         "silent",
         figure,
-        f"Wrong runs, whose axis is off by more than {WRONG:g} rad, and the share of them that nothing warns of: they "
-        f"end without an error and keep the energy of the nutation and both momenta to {KEPT:.0%}. Of all rows, "
-        f"method[chart]; of the rows with a fixed step, below {words.FINE:g} steps a nutation and above, and at each "
-        f"number of them, over the rows that were run there. {words.span(data, 'short')}, no named scene. "
-        f"{words.silent_sentence(data)} A conserved energy is no sign of a right answer.",
+        "Wrong runs, and the share of them that look healthy: of all rows, method[chart]; of the rows with a fixed "
+        f"step, with at least {words.FINE:g} steps a nutation and at each number of them. {words.span(data, 'short')}, "
+        f"no named scene. {words.silent_sentence(data)} A conserved energy is no sign of a right answer.",
         "Bars of the share of wrong runs that look healthy: of all, of those with small steps, by steps a nutation.",
         lead="How often a run is wrong without a sign",
     )
@@ -334,12 +327,10 @@ def draw_guard(data: xr.DataTree) -> Picture:
     return Picture(
         "guard",
         figure,
-        "Wrong runs that are noticed against right ones that are suspected, as the threshold varies. Black: by the "
-        f"guard's forecast, made before the run (dot: {EXPECTED:g} rad, where it warns). Orange: by the larger error "
-        f"of energy and momenta, seen after the run (dot: {KEPT:.0%}). All rows, method[chart], at every "
-        f"step and tolerance of the ladder, on {' and on '.join(messages.guarded(data, one) for one in spans)}; no "
-        f"named scene. {words.guard_sentence(data)} The figure of silent failures counts all tops, at the settings "
-        "that were run on every one, and therefore another share of wrong runs that keep energy and momenta: "
-        f"{words.hidden(data).everywhere:.1%}.",
+        "Wrong runs that are noticed against right ones that are suspected. Black: by the guard's "
+        f"forecast before the run (dot: it warns at {EXPECTED:g} rad). Orange: by the larger error of energy and "
+        f"momenta after the run (dot: {KEPT:.0%}). All rows, method[chart], at every step and tolerance, on "
+        f"{' and on '.join(messages.guarded(data, one) for one in spans)}; no named scene. The higher a line, the more "
+        "wrong runs are found at equal false alarms. Silent failures are counted on all tops instead.",
         "Receiver operating characteristics of the guard and of the conserved quantities, with their thresholds.",
     )

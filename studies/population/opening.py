@@ -55,10 +55,15 @@ def opening(data: xr.DataTree) -> Opening:
     closest = f"No row is the cheapest on every top. The closest contest is at {min(won_by)[1]}." if won_by else ""
     measured = (
         f"Measured on {drawn}, drawn at random. A row is a method in one chart, at the coarsest step or tolerance that "
-        "meets the error; times are those of the bare compiled loop. A row meets the error on a share of all tops "
-        "whose nutation is wider than it; it is the cheapest on a share of those that some row solves. For your own "
-        "scene and accuracy: symtop recommend SCENE --accuracy 1e-6."
+        "meets the error; times are those of the bare compiled loop."
     )
-    said = [first_choice, closest, words.silent_sentence(data), words.warning_sentence(data), measured]
+    shares = (
+        "A row meets the error on a share of all tops whose nutation is wider than it. It is the cheapest on a share "
+        "of those that some row solves."
+    )
+    yours = "For your own scene and accuracy: symtop recommend SCENE --accuracy 1e-6."
+    said = [
+        first_choice, closest, words.silent_sentence(data), words.guard_sentence(data), measured, shares, yours,
+    ]  # fmt: skip
     table = Table("Wins on random tops", HEADER, rows)
     return Opening("Which integrator should I use, whatever my top?", list(filter(None, said)), table, EXPLAINED)

@@ -11,7 +11,7 @@ from symtop.methods.registry import Integrator, integrator, rows
 from symtop.run.population import STRATA
 from symtop.runner.study import Case, Study
 
-from . import figures, words
+from . import figures, listed, words
 from .ladder import table
 from .opening import opening
 from .prices import prices
@@ -93,7 +93,7 @@ STUDY = Study(
     cases=lambda quick: grid(quick=quick),
     measure=measure,
     pictures=figures.pictures,
-    tables=words.tables,
+    tables=listed.tables,
     verdict=words.sentences,
     opening=opening,
     full=lambda: grid(full=True),

@@ -15,13 +15,13 @@ import xarray as xr
 
 from symtop.measure import ranking
 from symtop.methods.registry import split_name
+from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 
 ROUNDED = 1e-12  # an error below it is not compared between horizons
 CHARTS = {"axis": "the axis and the angular momentum (e, L)", "angles": "Euler angles"}
 CLASSIC = ("rk4", "rk45-compiled", "taylor")  # compared in each chart that they have
 KINDS = ("at every run time", "at short run times only", "at long run times only", "in turns", "at none")
-MOST_NAMES = 4  # of a list of rows in a sentence; the others are counted
 STEPS = 118.0  # a nutation, of the comparison at equal steps
 
 
@@ -85,7 +85,7 @@ def crossing(cell: xr.Dataset, first: str, second: str) -> Crossing | None:
 
 def crossings(data: xr.Dataset, chart: str) -> dict[str, dict[str, list[Crossing]]]:
     """All comparisons of a chart over the long horizon, by the classical row and by the other one."""
-    last = data.isel(horizon=-1)
+    last = data[["seconds", "energy", "outcome"]].isel(horizon=-1)  # of these alone: a dataset has dozens
     cells = [last.sel(scene=name) for name in last["scene"].values]
     classic, structured = in_chart(data, chart)
     return {
@@ -134,7 +134,7 @@ def table(data: xr.Dataset) -> Table:
             pairs = [one for listed in compared.values() for one in listed]
             kinds = Counter(_kind(one) for one in pairs)
             ends = [
-                _listed(
+                abridged(
                     [name for name, listed in compared.items() if listed and all(one.share == end for one in listed)]
                 )
                 for end in (1.0, 0.0)
@@ -142,9 +142,9 @@ def table(data: xr.Dataset) -> Table:
             if pairs:
                 rows.append([classic, str(len(pairs)), *(str(kinds[kind]) for kind in KINDS), *ends])
     return Table(
-        f"Energy over {float(data['horizon'].values[-1]):g} nutation periods at equal run times that both rows have: "
-        "pairs of a scene and a structure-preserving row of the same chart, by the times at which this has less error",
-        ["against", "pairs", *KINDS, "always less", "never less"],
+        f"Energy errors over {float(data['horizon'].values[-1]):g} nutation periods at equal run times: comparisons of "
+        "a classical row with a structure-preserving one on a scene, by the run times at which the latter has less",
+        ["against", "comparisons", *KINDS, "always less", "never less"],
         rows,
     )
 
@@ -161,18 +161,15 @@ def sentence(data: xr.Dataset, chart: str) -> str:
     counted = tallies(data, chart)
     if not counted:
         return ""
-    said = [f"{classic} {tally.share:.0%} of {tally.compared}" for classic, tally in counted.items()]
+    said = [
+        f"{tally.share:.0%} of {tally.compared}{' comparisons' * (not k)} with {classic}"
+        for k, (classic, tally) in enumerate(counted.items())
+    ]
     return (
-        f"Energy over {float(data['horizon'].values[-1]):g} nutation periods in {CHARTS[chart]}: structure-preserving "
-        "rows have less error than a classical row, at every run time that both have, in these shares of the pairs of "
-        f"a row and a scene: against {', '.join(said)}."
+        f"Structure-preserving rows in {CHARTS[chart]} have less energy error at every common run time in "
+        f"{joined(said)}. A comparison is two rows on one scene over "
+        f"{float(data['horizon'].values[-1]):g} nutation periods."
     )
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Names in a cell; of a long list the first, and how many more there are."""
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more or "none"
 
 
 class Tally(NamedTuple):
@@ -226,14 +223,10 @@ def at_equal_steps(data: xr.Dataset, names: Sequence[str], scene: str) -> str:
     periods = float(data["horizon"].values[-1])
     known = [name for name in names if name in last["integrator"].values]
     ends = {name: at_steps(last.sel(integrator=name), STEPS * periods) for name in known}
-    listed = [
-        f"{name} (force evaluations a step: {work:.2g}) {error:.1e}"
-        for name, (error, work) in ends.items()
-        if np.isfinite(error)
-    ]
+    listed = [f"{error:.1e} with {name} ({work:.2g})" for name, (error, work) in ends.items() if np.isfinite(error)]
     if len(listed) < 2:
         return ""
     return (
-        f"At equal steps, {STEPS:g} a nutation, the largest energy errors on {scene} over {periods:g} nutation periods "
-        f"are: {', '.join(listed)}."
+        f"At {STEPS:g} steps a nutation, the largest energy error on {scene} over {periods:g} nutation periods is "
+        f"{joined(listed)}; in brackets, force evaluations a step."
     )

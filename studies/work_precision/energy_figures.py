@@ -47,11 +47,9 @@ def draw(data: xr.Dataset, chart: str) -> Picture:
     return Picture(
         f"energy-{chart}",
         figure,
-        f"Above, largest energy error {words.spans(data)[-1]} of {scene} against the time of a run, step or tolerance "
-        f"varying along each line. Every row works in the chart of {energy.CHARTS[chart]}, so that lines differ by the "
-        "method alone; grey: structure-preserving rows, which claim to be symplectic or symmetric. Below, every "
-        f"comparison of such a row with a classical one on a scene, if there is a run time that both have. {lost}"
-        f"{energy.sentence(data, chart)}",
+        f"Above, largest energy error {words.spans(data)[-1]} of {scene} against the time of a run, with finer steps "
+        "along a line. Grey: rows that preserve structure, being symplectic or symmetric. Below, all "
+        f"comparisons, within one chart. {lost}{energy.sentence(data, chart)}",
         f"Energy error against time for rows of the chart {chart}, and bars that count who has less error.",
     )
 

@@ -9,11 +9,9 @@ from symtop.measure.phase import PARTS
 from symtop.report.style import BLUE, GREY, LEAST_TEXT, VERMILLION, headline, legend_below, number, panels
 from symtop.runner.study import Picture
 
-from . import energy, energy_figures, fronts, words
+from . import energy, energy_figures, fronts, growth
 from .rankings import slowdown, winners
 
-PARTS_OF = ("midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]", "rk4[axis]",
-            "rk45-compiled[angles]", "gauss-8[axis]")  # fmt: skip
 SAME = 1.5  # an error that grows less stays the same
 MARKS = {"shape": ("o", "black", "black"), "nutation_lag": ("s", "white", VERMILLION),
          "precession_lag": ("^", "white", BLUE)}  # fmt: skip
@@ -35,7 +33,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 def _parts(data: xr.Dataset) -> Picture:
     """How the parts of the error grow from one horizon to the other at equal steps, a row a method."""
     scene = data.isel(scene=0)
-    rows = [row for row in PARTS_OF if row in data["integrator"].values]
+    rows = growth.rows_of(data)
     first, last = (f"{data['horizon'].values[far]:g}" for far in (0, -1))
     length = float(data["horizon"][-1] / data["horizon"][0])
     figure, axes = panels(1, 1, height=0.36 * len(rows) + 0.9)
@@ -80,11 +78,11 @@ def _parts(data: xr.Dataset) -> Picture:
         "parts",
         figure,
         f"How the parts of the axis error on {scene['scene'].values} grow from {first} to {last} nutation periods at "
-        "equal step or tolerance: distance from the true path (shape), and how far the run is behind or ahead of the "
-        "truth in its nutation and in its precession (lags). Large marks: medians over the settings that were run at "
-        f"both and whose error is above {energy.ROUNDED:g} at the first; thin ones: each of them. The shape error "
-        f"grows by a factor of {words.growth(scene, rows, 'shape')}; the nutation lag by a factor of "
-        f"{words.growth(scene, rows, 'nutation_lag')}.",
+        "equal step or tolerance, a line a row, method[chart]. Shape is the distance from the true path. The lags are "
+        "how far the run is behind or ahead of the truth in its nutation and in its precession. Large marks are "
+        f"medians over the settings that were run at both and whose error is above {energy.ROUNDED:g} at the first; "
+        "thin marks are each of them. A shape error that stays the same is a path that is kept, whatever the phase on "
+        "it. The table of the growth has the medians.",
         "Dot plot of the growth of shape error, nutation lag and precession lag, a row a method.",
     )
 

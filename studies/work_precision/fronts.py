@@ -11,6 +11,7 @@ import xarray as xr
 from symtop.measure import ranking
 from symtop.measure.work import TARGETS
 from symtop.report.figures import bound_of, error_band, pareto
+from symtop.report.sentences import joined
 from symtop.report.style import GREY, RAISED, few_ticks, grid, headline, legend_below, line, look
 from symtop.runner.study import Picture
 
@@ -74,21 +75,19 @@ def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     whole = sum(owners.values())
     headline(figure, message(most, sum(owners[row] for row in most), whole, BEATEN[cost], words.spans(data)[far]))
     timed = (
-        " A run is shown if it was timed, as its row's cheapest for some target or for the comparison of energies; all "
-        "times are measured, of the bare compiled loop. Dotted: the closed form, `exact`, which is not ranked. A call "
-        "takes some ten microseconds by itself, where curves bend."
+        " Only timed runs are shown: a row's cheapest for some error, and those of the comparison of energies. Dotted: "
+        "the closed form, which is not ranked. Lines bend near ten microseconds, which a call takes by itself."
         if cost == "seconds"
-        else " A high derivative, a kick and a stage take different times."
+        else " A high derivative, a kick and a stage count alike and take different times."
     )
+    owned = joined([f"{row} ({owners[row]})" for row in most])
     return Picture(
         name,
         figure,
-        f"Largest axis error {words.spans(data)[far]} against {COSTS[cost]}, one panel a scene; each grey line is a "
-        "compiled row, a method in one chart, whose step or tolerance varies along it. Marks joined by steps are the "
-        "front: no run of a compiled row is below or left of it. Above each panel, how many of its runs belong to "
-        f"{' and '.join(most) or 'a method'}; the most belong to "
-        f"{', '.join(f'{row} ({count})' for row, count in owners.most_common(4)) or 'none'}, of {whole}. "
-        f"Grey band: below the error bound of the reference.{timed}",
+        f"Largest axis error {words.spans(data)[far]} against {COSTS[cost]}, one panel a scene. A grey line is a "
+        "compiled row whose step or tolerance varies along it. Marks joined by steps are the front: runs that no "
+        f"compiled row beats in both. Of its {whole} runs the most belong to {owned}. Grey band: below the error bound "
+        f"of the reference.{timed}",
         f"Log-log work-precision plots of the axis error against {COSTS[cost]}, one panel a scene.",
     )
 

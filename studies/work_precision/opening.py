@@ -7,11 +7,14 @@ import xarray as xr
 
 from symtop.measure import ranking
 from symtop.measure.errors import QUANTITIES
+from symtop.report.sentences import abridged
 from symtop.runner.study import Chart, Opening, Series, Table
 
 from . import energy
 from .fronts import COSTS
 from .words import COMPARED, not_asked, of_implementation, seconds, spans
+
+USED = (*ranking.NEEDS, "axis", "chart", "structured", "energy", "steps", "force_evaluations")  # of dozens of variables
 
 
 def opening(data: xr.Dataset) -> Opening:
@@ -20,6 +23,7 @@ def opening(data: xr.Dataset) -> Opening:
     It is, of the compiled rows that meet the target on the most scenes, the one that is closest to the fastest.
     """
     rows, sentences = [], []
+    data = data[[name for name in USED if name in data]]
     compiled = of_implementation(data, "compiled")
     names = [name for name in ranking.ranked(data) if name in compiled]
     ahead: Counter[str] = Counter()
@@ -38,12 +42,15 @@ def opening(data: xr.Dataset) -> Opening:
             rows.append(row)
     if ahead:
         (first, times), *others = ahead.most_common()
-        listed = "; " + ", ".join(f"{name} is in {count}" for name, count in others) if others else ""
+        listed = f", and {abridged([f'{name} in {count}' for name, count in others])}" if others else ""
         sentences.append(
             f"For the direction of the axis, begin with {first}. It is the first choice in {times} of the {len(rows)} "
             f"lines of the table{listed}. The first choice meets the error on the most scenes and takes, of the rows "
-            "that do, the least time over the fastest. A row is a method in one chart, timed as the bare compiled "
-            f"loop, at the coarsest step or tolerance that meets the error.{not_asked(data)}"
+            "that do, the least time over the fastest."
+        )
+        sentences.append(
+            "A row is a method in one chart, timed as the bare compiled loop, at the coarsest step or tolerance that "
+            f"meets the error.{not_asked(data)}"
         )
     steps = energy.at_equal_steps(data, COMPARED[:2], str(data["scene"].values[0]))
     sentences += [

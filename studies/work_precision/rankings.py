@@ -11,6 +11,7 @@ import xarray as xr
 from symtop.measure import ranking
 from symtop.measure.work import TARGETS
 from symtop.methods.registry import split_name
+from symtop.report.sentences import joined
 from symtop.report.style import GREY, LEAST_TEXT, headline, look, number, panels
 from symtop.runner.study import Picture
 
@@ -61,7 +62,7 @@ def winners(data: xr.Dataset) -> Picture:
     )  # fmt: skip
     met = [won for won in wins.values() if won]
     ranks = Counter(won.best.integrator for won in met).most_common(4)
-    most = ", ".join(f"{name} ({times})" for name, times in ranks)
+    most = joined([f"{name} ({times})" for name, times in ranks])
     if ranks:
         first, times = ranks[0]
         others = len({won.best.integrator for won in met}) - 1
@@ -72,11 +73,10 @@ def winners(data: xr.Dataset) -> Picture:
     return Picture(
         "winners",
         figure,
-        f"The fastest compiled row, method[chart], on each scene, for each axis error that steps and tolerances were "
-        "searched for. "
-        f"Most often: {most}, of {len(met)} cells.{words.not_asked(data)} Pale and with a tilde: its lead over at "
-        "least one other row is within the noise. All times are measured; the closed form is not ranked. "
-        f"{_taking_part(data)}",
+        "The fastest compiled row on each scene for each axis error, each row at the coarsest step or tolerance found "
+        f"that meets the error. Most of the {len(met)} cells belong to {most}.{words.not_asked(data)} Pale and with a "
+        "tilde: its lead over at least one other row is within the noise. All times are measured; the closed form is "
+        f"not ranked. {_taking_part(data)}",
         "Coloured cells naming the fastest row, a line a scene, a column an accuracy.",
     )
 
@@ -153,11 +153,10 @@ def slowdown(data: xr.Dataset) -> Picture:
         "slowdown",
         figure,
         f"Of {asked} targets, each an axis error on a scene over a horizon, how many every compiled row, "
-        "method[chart], meets with some step or tolerance within a million force evaluations; and its time over that "
-        "of the fastest row, the median over all targets. Rows that meet most come first, and those that meet as many "
-        "by how close they come to the fastest. A row that misses half of the targets or more has no median and is "
-        f"left out: {', '.join(row.name for row in rows if row not in shown) or 'none'}. All times are measured; the "
-        "tables have every one of them.",
+        "method[chart], meets with some step or tolerance within a million force evaluations. Beside it, its time "
+        "over that of the fastest row, the median over all targets. Rows that meet most come first, and of these "
+        f"those that are closest to the fastest. The {slow} rows that miss half of the targets or more have no median "
+        "and are left out; the table on when to choose each row has them.",
         "Bars of targets met and dots of the median slowdown, a line a row, the fastest and the surest in bold.",
     )
 

@@ -17,7 +17,7 @@ from symtop.runner.study import Table
 
 from .timing_rounds import WITHIN
 
-HEADER = ["integrator", "fastest in", "level with the fastest in", "met", "at its best", "median", "when to choose it"]
+HEADER = ["integrator", "fastest in", "tied with the fastest in", "met", "at its best", "median", "when to choose it"]
 NEVER, NO_TARGET = "never", "never: it meets no target within its budget"
 
 

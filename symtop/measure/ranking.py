@@ -58,9 +58,13 @@ class Win(NamedTuple):
 
 def ranked(data: xr.Dataset) -> list[str]:
     """The rows that take steps."""
-    steps = (data["control"] != "") & data["control"].notnull()
-    apart = [dim for dim in steps.dims if dim != "integrator"]
-    return [str(name) for name in data["integrator"].values[steps.any(apart).values]]
+    names = data["integrator"].values
+    control = data["control"].transpose("integrator", ...).values.reshape(len(names), -1)
+    return [
+        str(name)
+        for name, known in zip(names, control, strict=True)
+        if any(isinstance(one, str) and one for one in known)
+    ]
 
 
 def targets(cell: xr.Dataset) -> list[float]:
@@ -74,7 +78,8 @@ def cheapest(cell: xr.Dataset, target: float, quantity: str = "axis", implementa
 
     `cell` is one scene and one horizon of the study's dataset.
     """
-    cell = cell.sel(integrator=ranked(cell))
+    few = cell[[quantity, "seconds", "seconds_forecast", "outcome", "seconds_samples", "implementation"]]
+    cell = few.sel(integrator=ranked(cell))  # of these alone: a dataset has dozens
     table = cell[[quantity, "seconds", "seconds_forecast", "outcome"]].transpose("integrator", "setting")
     seconds, forecast = table["seconds"].values, table["seconds_forecast"].values
     good = (table[quantity].values <= target) & (table["outcome"].values == "ok")
@@ -136,6 +141,7 @@ def win(cell: xr.Dataset, target: float, implementation: str = "compiled") -> Wi
 
 def winners(data: xr.Dataset) -> dict[tuple[str, int, float], Win | None]:
     """The compiled winners in axis error of every scene, horizon (by index) and target that is asked there."""
+    data = data[["axis", *NEEDS]]
     return {
         (str(scene), far, target): win(data.sel(scene=scene).isel(horizon=far), target)
         for scene in data["scene"].values
@@ -150,7 +156,7 @@ def relative_costs(data: xr.Dataset, among: list[str]) -> xr.DataArray:
     Dimensions target, integrator, problem; a problem is a scene with a horizon. Infinite where a row does not meet the
     target, or none of `among` does; NaN where the target is not asked.
     """
-    names = ranked(data)
+    names, data = ranked(data), data[["axis", *NEEDS]]
     problems = [data.sel(scene=scene).isel(horizon=far)
                 for scene in data["scene"].values for far in range(data.sizes["horizon"])]  # fmt: skip
     table = np.full((len(TARGETS), len(names), len(problems)), np.inf)

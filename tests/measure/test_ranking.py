@@ -62,7 +62,7 @@ def test_a_lead_is_sure_only_if_every_round_agrees_and_it_is_more_than_a_hair():
     assert clear.best.integrator == "a"
     assert clear.level == ()
     assert (clear.behind.integrator, clear.ratio) == ("b", pytest.approx(1.3, rel=0.03))
-    assert "1.3 times faster than b)" in work_words.lead(1e-6, cell([[1.0, 1.1, 1.0], [1.3, 1.4, 1.35]]))
+    assert work_words.lead(clear) == "a, 1 s, 1.3 times faster than b"
     mixed = ranking.win(cell([[1.0, 1.6, 1.0], [1.3, 1.4, 1.35]]), 1e-6)
     assert mixed.level == ("b",)
     hair = ranking.win(cell([[1.0, 1.0, 1.0], [1.05, 1.05, 1.05]]), 1e-6)
@@ -106,8 +106,8 @@ def test_the_closed_form_is_compared_with_the_fastest_row():
     pairs = work_closed_form.compared(data)
     assert [(pair.row, pair.target, pair.ratio) for pair in pairs] == [("b", 1e-3, 10.0), ("b", 1e-6, 10.0)]
     said = work_closed_form.headline(data)
-    assert said.startswith("For a free symmetric top under gravity the fastest method is no integrator. In 2 of 2")
-    assert "10 to 10 times less (median 10)" in said
+    assert said.startswith("The closed form takes less time than the fastest compiled row in 2 of 2 combinations")
+    assert "10 to 10 times less, with a median of 10." in said
     (row,) = work_closed_form.table(data, ["ten"]).rows
     assert row == ["x", "ten", "10 (1e+05 us; b)", "10 (1e+05 us; b)", "", ""]
     slow = data.assign(seconds=data["seconds"].where(data["control"] != "", 5.0))
@@ -124,11 +124,28 @@ def test_own_rows_are_compared_with_taylor():
     assert row == ["x", "over ten", "0.50 (series[axis])", "2.00 (rk4[axis])", "rk4[axis] alone", "neither"]
     said = against_taylor.headline(data, ["over ten"])
     assert said == (
-        "Own rows take at most taylor's time in 1 of 2 combinations, all but x over ten at 1e-06 (2.00), and 1 more "
-        "that it does not meet."
+        "The fastest of symtop's own rows takes no more time than heyoka's taylor in 1 of 2 combinations of scene, run "
+        "length and error that both meet, and meets 1 more."
     )
     only = data.sel(integrator=["series[axis]", "rk4[axis]"])
     assert (against_taylor.compared(only), against_taylor.headline(only, ["over ten"])) == ({}, "")
+
+
+def test_the_fastest_row_its_times_and_its_leads_are_told_where_there_are_any():
+    clear = cell([[1.0, 1.0, 1.0], [1.3, 1.3, 1.3]]).expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
+    assert work_words.fastest(clear, [won for won in ranking.winners(clear).values() if won]) == (
+        "a is the fastest row in 2 of the 2 combinations of scene, run length and error that a compiled row meets. In "
+        "2 the lead is larger than the noise."
+    )
+    assert work_words.least_times(clear) == (
+        "The fastest row takes 1 s to 1 s over 10 nutation periods, by scene and error. Where its lead is sure, the "
+        "next row takes 1.3 to 1.3 times as long."
+    )
+    tied = clear.assign({name: xr.ones_like(clear[name]) for name in ("seconds", "seconds_samples")})
+    assert work_words.least_times(tied).endswith("by scene and error.")
+    missed = clear.assign(axis=clear["axis"] * 1e6)
+    assert work_words.fastest(missed, []) == "No compiled row meets any of the errors."
+    assert work_words.least_times(missed) == ""
 
 
 def test_a_target_wider_than_the_nutation_has_no_winner_and_does_not_count():

@@ -270,13 +270,13 @@ def test_figures_tables_and_sentences_come_from_the_dataset(measured):
     assert sorted(dots) == sorted(one for family in FAMILIES for chart in BESIDE
                                   for one in words.family_ratios(measured, family, chart))  # fmt: skip
     text = " ".join(words.verdict(measured))
-    for phrase in ("rk45[angles] called through solve_ivp", "in the inner loop", "Dormand-Prince: a compiled run"):
+    for phrase in ("rk45[angles] called through solve_ivp", "in the inner loop", "(Dormand-Prince) times as long"):
         assert phrase in text
-    falls, effects, charts, everything = words.tables(measured)
+    scipy, families, falls, effects, charts, everything = words.tables(measured)
     taken = times(next(goals_of(measured))[3])
     assert len(falls.rows) == len(waterfall(taken)) + len(waterfall(taken, call_first=True))
     assert {row[0] for row in effects.rows} == {"chart", "language", "call", "method"}
     assert len(charts.rows) == 2
     assert len(everything.rows) == measured.sizes["integrator"]
-    for table in (falls, effects, charts, everything):
+    for table in (scipy, families, falls, effects, charts, everything):
         assert all(len(row) == len(table.header) for row in table.rows)

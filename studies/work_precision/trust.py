@@ -1,0 +1,80 @@
+"""How far the times of the work-precision study can be trusted."""
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure import ranking
+from symtop.measure.timing import AGAIN, MISSED
+from symtop.runner.study import Table
+
+
+class Trust(NamedTuple):
+    """What is known of the times."""
+
+    timed: int
+    rounds: int  # the least of a time
+    measured: float  # the share of the times that are the smallest sample of that very run
+    miss: float  # median difference from the time that the row's other times predict
+    differing: int  # times that differ by more than `MISSED`, though they were taken again
+    noisy: int  # times without a second sample within `AGAIN` of the smallest
+    margins: tuple[float, float]  # the least ratio that counts as a lead: the range over scenes and horizons
+
+
+def measured(data: xr.Dataset) -> float:
+    """The share of the times that are the smallest of the samples that were taken of that very run."""
+    taken = data["seconds"].values
+    shown = np.isfinite(taken)
+    least = data["seconds_samples"].min("batch").transpose(*data["seconds"].dims).values
+    return float((taken[shown] == least[shown]).mean()) if shown.any() else 1.0
+
+
+def trust(data: xr.Dataset) -> Trust:
+    """What is known of the times of a dataset."""
+    times = data[["seconds", "seconds_forecast", "seconds_samples"]]
+    taken = times["seconds"]
+    rounds = times["seconds_samples"].notnull().sum("batch").where(taken.notnull())
+    miss = abs(taken / times["seconds_forecast"] - 1.0)
+    samples = np.sort(times["seconds_samples"].transpose(..., "batch").values, axis=-1)
+    margins = [
+        ranking.margin(times.sel(scene=name).isel(horizon=far))
+        for name in data["scene"].values
+        for far in range(data.sizes["horizon"])
+    ]
+    return Trust(
+        int(taken.notnull().sum()), int(rounds.min()), measured(data), float(miss.median()), int((miss > MISSED).sum()),
+        int((samples[..., 1] > (1.0 + AGAIN) * samples[..., 0]).sum()), (min(margins), max(margins)),
+    )  # fmt: skip
+
+
+def sentence(data: xr.Dataset) -> str:
+    """How far a time can be trusted, and from which ratio on a lead counts."""
+    known = trust(data)
+    least, most = known.margins
+    return (
+        f"Each of the {known.timed} times was compared with the one that the row's other times predict: the median "
+        f"difference is {known.miss:.1%}. A lead counts as larger than the noise from a ratio of {least:.2f} to "
+        f"{most:.2f} on, by scene and run length."
+    )
+
+
+def table(data: xr.Dataset) -> Table:
+    """The numbers behind it, with the rules for the times that are in doubt."""
+    known = trust(data)
+    least, most = known.margins
+    rule = "by scene and horizon: 1 plus twice the difference that nine of ten times stay within, and at least"
+    rows = [
+        ["runs that ended well", str(int((data["outcome"] == "ok").sum())), ""],
+        ["runs of these that were timed", str(known.timed), "only these are shown against seconds"],
+        ["rounds of a time, at least", str(known.rounds), "each is with the other rows of its scene"],
+        ["share of the times that are measured", f"{known.measured:.0%}", "none is computed from others"],
+        ["median difference from the predicted time", f"{known.miss:.1%}", "predicted from the row's other times"],
+        [f"times that differ from it by more than {MISSED:.0%}", str(known.differing),
+         "they were taken again, and lead only if the predicted time leads, too"],
+        [f"times without a second sample within {AGAIN:.0%} of the smallest", str(known.noisy),
+         "no lead of theirs, or over them, counts"],
+        ["least ratio of two times that counts as a lead", f"{least:.2f} to {most:.2f}",
+         f"{rule} {ranking.MARGIN:g}"],
+    ]  # fmt: skip
+    return Table("How far the times can be trusted", ["what", "value", "rule"], rows)
