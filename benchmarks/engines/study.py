@@ -6,7 +6,7 @@ from typing import Any
 from benchmarks.engines.measure import COMPARED, COUNT, LEVEL, STEPS, agrees
 from symtop.base import datasets
 from symtop.methods.engines import SINGLE
-from symtop.report.phrases import counted, few
+from symtop.report.sentences import counted, few
 
 NAME = "live-engines"  # of the findings; `engines` is the study of the maps
 UNRUN = "YADE is not run: its map is held by its formula and a reference value alone."

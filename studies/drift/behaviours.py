@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS
-from symtop.report.phrases import counted, few
+from symtop.report.sentences import counted, few
 from symtop.runner.study import Table
 
 from .tables import FAILED, worst_behaviour

@@ -11,7 +11,7 @@ import xarray as xr
 from symtop.measure.conservation import CONSTANTS
 from symtop.methods.registry import split_name
 from symtop.model.charts import CHARTS
-from symtop.report.phrases import counted, few
+from symtop.report.sentences import counted, few
 from symtop.runner.study import Table
 
 from .tables import rounding

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS
-from symtop.report.phrases import counted, few
+from symtop.report.sentences import counted, few
 from symtop.run.long_run import PER_NUTATION, SAMPLES
 from symtop.runner.study import Table
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 from symtop.methods.engines import SINGLE
 from symtop.methods.registry import integrator, split_name
-from symtop.report.phrases import counted, few
+from symtop.report.sentences import counted, few
 
 from .tables import FREQUENCIES, HORIZON, SCENES
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import xarray as xr
 
-from symtop.report.phrases import few
+from symtop.report.sentences import few
 from symtop.runner.study import Table
 
 from .long_energy import better_from, energy_until, notebook_end

@@ -9,7 +9,7 @@ import xarray as xr
 from symtop.measure.conservation import CONSTANTS
 from symtop.measure.order import power_law
 from symtop.model.charts import Array, axis_from_angles
-from symtop.report.phrases import few
+from symtop.report.sentences import few
 from symtop.report.style import number
 from symtop.runner.study import Table
 

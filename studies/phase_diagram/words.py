@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.report.phrases import counted
+from symtop.report.sentences import counted
 from symtop.runner.study import Table
 
 from . import tables as diagrams

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.methods.registry import integrator
-from symtop.report.phrases import few
+from symtop.report.sentences import few
 from symtop.report.style import number
 from symtop.runner.study import Table
 

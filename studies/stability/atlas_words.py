@@ -9,7 +9,7 @@ import xarray as xr
 
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT
 from symtop.methods.registry import split_name
-from symtop.report.phrases import counted, few
+from symtop.report.sentences import counted, few
 from symtop.runner.study import Table
 
 from .atlas import COMMON, NOTABLE, OutcomeMap, accurate_everywhere, closed_forms, common, maps, pole_effect

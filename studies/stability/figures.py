@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import xarray as xr
 
-from symtop.report.phrases import counted
+from symtop.report.sentences import counted
 from symtop.report.style import headline
 from symtop.runner.study import Picture
 

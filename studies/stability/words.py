@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.report.phrases import counted, few
+from symtop.report.sentences import counted, few
 from symtop.runner.study import Table
 
 from .atlas import NEAR, families, map_of, methods_of, pole_effect

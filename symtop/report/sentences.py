@@ -1,4 +1,4 @@
-"""Lists in a sentence: joined as one says them, and cut off where nobody reads on."""
+"""Lists in a sentence: a few names are joined as one says them, many are counted, since a long list is a table's."""
 
 from collections.abc import Sequence
 
@@ -13,3 +13,13 @@ def joined(words: Sequence[str]) -> str:
 def abridged(names: Sequence[str], most: int = FEW) -> str:
     """The first names of a list, and how many more there are."""
     return joined(names) if len(names) <= most else f"{', '.join(names[:most])} and {len(names) - most} more"
+
+
+def counted(count: int, noun: str = "row") -> str:
+    """So many things: ``1 row``, ``12 rows``."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def few(names: Sequence[str], noun: str = "row", most: int = FEW) -> str:
+    """The names, if they are at most so many; otherwise how many there are."""
+    return ", ".join(names) if len(names) <= most else counted(len(names), noun)
