@@ -201,10 +201,14 @@ def compact(path: str | Path) -> None:
     palette = Image.new("P", (1, 1))
     palette.putpalette((fixed + free)[:768])
     drawn = picture.quantize(palette=palette, dither=Image.Dither.NONE)
-    pixels, places = np.asarray(picture), np.array(drawn)
-    for k, color in enumerate(ours):  # the library's search for the nearest colour is a little coarse
-        places[(pixels == getrgb(color)).all(axis=-1)] = k
-    drawn.putdata(places.ravel())
+    seen = np.asarray(picture) @ np.array([1, 256, 65536])  # a colour as one number
+    known = np.reshape(fixed, (-1, 3)) @ np.array([1, 256, 65536])
+    order = np.argsort(known)
+    nearest = order[np.minimum(np.searchsorted(known, seen, sorter=order), len(known) - 1)]
+    places = np.where(
+        known[nearest] == seen, nearest, np.asarray(drawn)
+    )  # the library's search for the nearest is a little coarse
+    drawn.frombytes(places.astype(np.uint8).tobytes())
     drawn.save(path, optimize=True)
 
 
@@ -278,44 +282,6 @@ def grid(count: int, columns: int, labels: tuple[str, str] = ("", ""), **options
     for axis in used[::columns]:
         axis.set_ylabel(labels[1])
     return figure, used
-
-
-def lead(count: int, labels: tuple[str, str], height: float = 2.9, small: float = 1.3, columns: int = 4) -> Any:
-    """A figure of one wide panel and, below it, `count` - 1 small ones, all logarithmic.
-
-    Returns the figure and its panels (one-dimensional). `same_limits` gives them the same limits once all is drawn:
-    axes that are shared between parts of a figure would draw it anew at every change.
-    """
-    use()
-    rows = -(-(count - 1) // columns)
-    figure = plt.figure(figsize=(WIDTH, height + small * rows + 0.5))
-    ratios = [height, small * rows + 0.2][: 1 + bool(rows)]
-    parts: Any = figure.subfigures(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
-    first = parts[0].subplots()
-    others: list[Any] = []
-    if rows:
-        below = parts[1].subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-        others = list(below.flat[: count - 1])
-        for axis in below.flat[count - 1 :]:
-            axis.set_visible(False)
-        for axis in others[-columns:]:
-            axis.tick_params(which="both", labelbottom=True)
-    for axis in (first, *others):
-        axis.set(xscale="log", yscale="log")
-        axis.tick_params(which="minor", length=0)
-    first.set(xlabel=labels[0], ylabel=labels[1])
-    return figure, np.array([first, *others])
-
-
-def same_limits(axes: Any) -> None:
-    """Give all panels the limits that hold everything; those in y of the first, if it does not scale itself."""
-    for name in "xy":
-        limits = [getattr(axis, f"get_{name}lim")() for axis in axes]
-        if not getattr(axes[0], f"get_autoscale{name}_on")():
-            limits = limits[:1]
-        ends = min(low for low, _ in limits), max(high for _, high in limits)
-        for axis in axes:
-            getattr(axis, f"set_{name}lim")(ends)
 
 
 def few_ticks(*axes: Any, most: int = 6) -> None:

@@ -32,11 +32,8 @@ print(len(used), sum(sum(one.stats.cache_misses.values()) for one in used),
 """
 
 
-@pytest.mark.parametrize(
-    ("names", "lanes"),
-    [("strang", []), pytest.param(EVERY, ["strang[axis]", "srkn-14-6[attitude]"], marks=pytest.mark.slow)],
-    ids=["one", "every"],
-)
+@pytest.mark.slow  # tests/base/test_cold.py has a short run of one method
+@pytest.mark.parametrize(("names", "lanes"), [(EVERY, ["strang[axis]", "srkn-14-6[attitude]"])], ids=["every"])
 def test_a_second_process_finds_the_kernels_of_every_family_on_disk(names, lanes, tmp_path):
     environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path)}
     counts = []

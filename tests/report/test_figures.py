@@ -174,21 +174,3 @@ def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_
     assert written[0][1].startswith(b"%PDF")
     with_pixels = np.frombuffer(written[0][0][16:24], ">u4")
     assert with_pixels[0] == round(style.WIDTH * style.DPI)
-
-
-def test_one_wide_panel_leads_small_ones_with_its_axes():
-    figure, axes = style.lead(6, ("step", "error"))
-    assert len(axes) == 6
-    for k, axis in enumerate(axes):
-        axis.plot([10.0**-k, 1.0], [1e-6, 10.0**-k])
-    axes[0].set_ylim(1e-9, 1.0)
-    assert axes[0].get_xlim() != axes[1].get_xlim()
-    style.same_limits(axes)
-    ((low, high),) = {axis.get_xlim() for axis in axes}
-    assert low < 1e-5
-    assert high > 1.0
-    assert {axis.get_ylim() for axis in axes} == {(1e-9, 1.0)}
-    figure.draw_without_rendering()
-    widths = [axis.get_window_extent().width for axis in axes]
-    assert widths[0] > 3.0 * max(widths[1:])
-    assert len(style.lead(1, ("step", "error"))[1]) == 1

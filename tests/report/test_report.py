@@ -31,7 +31,7 @@ def results(tmp_path_factory):
     study = runner.load("work_precision")
 
     def cases(_):
-        return [Case("spheroid", name, {"periods": [10.0, 40.0], "budget": 3e4}) for name in FEW]
+        return [Case("spheroid", name, {"periods": [10.0, 20.0], "budget": 1e4}) for name in FEW]
 
     def pictures(data):  # two of them open the report
         for place, picture in enumerate(study.pictures(data)):

@@ -278,9 +278,9 @@ def test_a_process_killed_while_it_writes_the_cache_harms_nobody(cache):
 
 
 def test_several_processes_share_a_cache(cache):
-    crowd = [call(cache) for _ in range(3)]
+    crowd = [call(cache) for _ in range(2)]
     shown = {process.communicate(timeout=120)[0] for process in crowd}
-    assert [process.returncode for process in crowd] == [0, 0, 0]
+    assert [process.returncode for process in crowd] == [0, 0]
     assert len(shown) == 1
     assert len(list(cache.glob("reference/*.nc"))) == 1
     assert not list(cache.glob("reference/.*.part"))
