@@ -34,6 +34,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.base.borrowed import borrowed
 from symtop.base.compiled import register_jitable, set_item
 from symtop.base.multiprecision import context
 from symtop.methods.fixed_step import FixedStep
@@ -65,8 +66,8 @@ class GaussRule(NamedTuple):
 
 @register_jitable
 def _opened(rows: Any) -> GaussRule:
-    s = rows.shape[1]
-    return GaussRule(rows[:s], rows[s], rows[s + 1 :])
+    table, s = borrowed(rows), rows.shape[1]
+    return GaussRule(table[:s], table[s], table[s + 1 :])
 
 
 def packed(rule: GaussRule) -> tuple[Callable[[Any], GaussRule], Array]:
