@@ -31,8 +31,9 @@ def findings(
     took = {item.name: item.seconds * 1e6 for item in items}
     slowest = max(one_step, key=lambda name: one_step[name])
     run = (
-        f"`simulate` takes {took['simulate']:.0f} us for {whole_run.STEPS} steps of {whole_run.METHOD} on "
-        f"{whole_run.SCENE}, {took['solver, every step shown']:.0f} in the solver and {took['guard']:.0f} in the guard."
+        f"`simulate` takes {took['simulate']:.0f} us for {whole_run.STEPS} steps of "
+        f"{whole_run.METHOD}[{whole_run.CHART}] on {whole_run.SCENE}, {took['solver, every step shown']:.0f} in the "
+        f"solver and {took['guard']:.0f} in the guard."
     )
     kernel_rows = [
         [f"{row.name}[{row.chart}]", f"{row.nanoseconds:.1f}", f"{row.in_c:.1f}", f"{row.ratio:.2f}",

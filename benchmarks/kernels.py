@@ -136,10 +136,11 @@ def verdict(rows: Sequence[Row]) -> list[str]:
         ),
     ]
     if slow:
-        said.append(f"Slower than that: {', '.join(f'{row.name}[{row.chart}] {row.ratio:.2f}' for row in slow)}.")
+        beyond = ", ".join(f"{row.name}[{row.chart}] {row.ratio:.2f}" for row in slow)
+        said.append(f"Slower than {LIMIT:g} times their twin are {beyond}.")
     for name in ("midpoint", "trapezoidal"):
         said += [
-            f"{name}, solved to rounding, takes {row.verlet_steps:.2f} steps of stormer-verlet."
+            f"A step of {name}, solved to rounding, takes as long as {row.verlet_steps:.2f} steps of stormer-verlet."
             for row in rows
             if row.name == name
         ]

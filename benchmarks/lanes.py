@@ -236,8 +236,8 @@ def verdict(measured: Measured) -> list[str]:
     ]
     said += [
         f"heyoka's batch mode at a tolerance of {row.tolerance:g} takes {row.batch * 1e6:.1f} us a top to t = "
-        f"{HORIZON:g}, alone {row.alone * 1e6:.1f}; {RIVAL[0]}[{RIVAL[1]}] in lanes takes {row.in_lanes * 1e6:.1f} to "
-        f"the same error of {row.error:.0e}."
+        f"{HORIZON:g}, and {row.alone * 1e6:.1f} us alone; {RIVAL[0]}[{RIVAL[1]}] in lanes takes "
+        f"{row.in_lanes * 1e6:.1f} us to the same error of {row.error:.0e}."
         for row in measured.batches
     ]
     return said

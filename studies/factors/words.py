@@ -148,11 +148,12 @@ def scipy_sentence(data: xr.Dataset) -> str:
     if not pairs:
         return ""
     user, author = (sorted(values) for values in zip(*((pair.user, pair.author) for pair in pairs), strict=True))
+    methods = abridged(list(dict.fromkeys(pair.public.method for pair in pairs)))
     return (
-        f"SciPy's {abridged(list(dict.fromkeys(pair.public.method for pair in pairs)))} take {times_faster(user[0])} "
-        f"to {times_faster(user[-1])} times as long as the fastest compiled row where a user measures, solve_ivp "
-        f"against simulate. They take {times_faster(author[0])} to {times_faster(author[-1])} times as long in the "
-        "inner loop, kernel against kernel."
+        f"SciPy's {methods} take {times_faster(user[0])} to {times_faster(user[-1])} times as long as the fastest "
+        "compiled row of this study (series[axis] takes no part) where a user measures, solve_ivp against simulate. "
+        f"They take {times_faster(author[0])} to {times_faster(author[-1])} times as long in the inner loop, kernel "
+        "against kernel."
     )
 
 
@@ -313,7 +314,9 @@ def _scipy(data: xr.Dataset) -> Table:
         for scene, span, target, part in goals_of(data)
         for pair in against_scipy(times(part))
     ]  # fmt: skip
-    return Table("SciPy's methods, each in its fastest chart, beside the fastest compiled row", SCIPY, lines)
+    return Table(
+        "SciPy's methods, each in its fastest chart, beside the fastest compiled row of this study", SCIPY, lines
+    )
 
 
 def _families(data: xr.Dataset) -> Table:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.report.sentences import counted
+from symtop.report.sentences import counted, joined
 from symtop.runner.study import Table
 
 from . import tables as diagrams
@@ -84,11 +84,12 @@ def spot_sentence(data: xr.DataTree) -> str:
     if not each:
         return "No predicted cell was run: none is cheap enough."
     off = [abs(one.foretold / one.measured[0] - 1.0) for one in each]
+    lengths = [f"{count} at {horizon:.2g}" for horizon, count in sorted(Counter(one.horizon for one in each).items())]
     return (
-        f"To check the prediction, {counted(len(each), 'predicted cell')} were run in full on {SCENE}, to "
-        f"{max(one.horizon for one in each):.2g} nutations: {sum(one.winner for one in each)} have the predicted "
-        f"winner, and {sum(one.close for one in each)} its cost within {CLOSE:.0%} (off by {np.median(off):.1%} in the "
-        f"median, {max(off):.1%} at most)."
+        f"To check the prediction, {counted(len(each), 'predicted cell')} were run in full on {SCENE}, "
+        f"{joined(lengths)} nutations, and none beyond: {sum(one.winner for one in each)} have the predicted winner, "
+        f"and {sum(one.close for one in each)} its cost within {CLOSE:.0%} (off by {np.median(off):.1%} in the median, "
+        f"{max(off):.1%} at most)."
     )
 
 

@@ -12,7 +12,7 @@ from symtop.run.guard import EXPECTED
 
 from . import verdicts
 from .costs import TIE, Share
-from .ladder import KEPT, WRONG
+from .ladder import GUARDED_LEVELS, KEPT, WRONG
 from .verdicts import ALL, Cell
 
 UNIT = "alone"  # of the verdicts; tables have the others
@@ -20,8 +20,11 @@ QUANTITIES_ASKED = ("axis", "attitude", "energy")
 FINE = 50.0  # steps a nutation that look like enough
 
 LEFT_OUT = {  # methods, by the reason
-    "the same maps in three coordinates, at ten times the time": ("midpoint-unreduced", "trapezoidal-unreduced"),
-    "the same steps as taylor in slower arithmetic": ("taylor-longdouble", "taylor-quad"),
+    "the same maps in three coordinates, at two to three times the time": (
+        "midpoint-unreduced",
+        "trapezoidal-unreduced",
+    ),
+    "the same steps as taylor in slower arithmetic, which meets smaller errors": ("taylor-longdouble", "taylor-quad"),
     "a step of any size is the motion itself, so that no step is too coarse": ("exact-discrete",),
 }
 
@@ -31,8 +34,9 @@ HOW_TO_READ = (
     "for an error is that at which it begins to meet it for good. Seconds are force evaluations times the measured "
     "time of one, in the bare compiled loop: alone, or in a call for many tops. The slowdown of a row on a top is its "
     "cost over the least of all rows there. A row wins on a top if all others cost at least "
-    f"{TIE:g} times as much. Shares have 95 % intervals (Wilson). A winner is sure if its lead is three standard "
-    "errors with the times of either half of the rounds. The last table has the rules of the runs and what is left out."
+    f"{TIE:g} times as much. Shares have 95 % intervals (Wilson) for the draw of the tops; times that are measured "
+    "again move a close contest by more. A winner is sure if its lead is three standard errors with the times of "
+    "either half of the rounds. The last table has the rules of the runs and what is left out."
 )
 
 
@@ -98,7 +102,7 @@ def quantity_sentence(data: xr.DataTree, quantity: str) -> str:
 def strata_sentence(data: xr.DataTree, horizon: str = "short") -> str:
     """How many rows win somewhere, and the strata whose winner is another than that of all tops."""
     owners: Counter[str] = Counter()
-    others = []
+    others: dict[tuple[str, str], list[str]] = {}
     for target in verdicts.targets(data):
         taken, first = verdicts.best(data, Cell(horizon, "axis", target), UNIT)
         if first is None:
@@ -109,12 +113,12 @@ def strata_sentence(data: xr.DataTree, horizon: str = "short") -> str:
             if won is not None:
                 owners[part.names[won.row]] += 1
                 if won.sure and part.names[won.row] != overall:
-                    others.append(stratum)
+                    others.setdefault((part.names[won.row], stratum), []).append(f"{target:.0e}")
     total = sum(owners.values())
     most = joined([f"{name} {count}" for name, count in owners.most_common(4)])
+    told = [f"{name} on {stratum} tops at {joined(errors)}" for (name, stratum), errors in others.items()]
     differ = (
-        f"In {len(others)} of them, of the kinds {joined(list(dict.fromkeys(others)))}, the winner is, beyond doubt, "
-        "another than that of all tops."
+        f"Beyond doubt some kinds have another winner than all tops: {joined(told)}."
         if others
         else "No kind of tops has, beyond doubt, another winner than all tops together."
     )
@@ -175,13 +179,15 @@ def guard_sentence(data: xr.DataTree) -> str:
     said = []
     for horizon in verdicts.horizons(data):
         hits, alarms = verdicts.caught(data, horizon)
+        wrong, right = ("", "") if said else (" wrong runs", " right ones")
         said.append(
-            f"Over {verdicts.nutations(data, horizon):g} nutations it warned of {hits.count:,} of {hits.total:,} wrong "
-            f"runs and of {percent(alarms)} of {alarms.total:,} right ones."
+            f"over {verdicts.nutations(data, horizon):g} nutations ({asked_of(data, horizon)} tops) of {hits.count:,} "
+            f"of {hits.total:,}{wrong} and {percent(alarms)} of {alarms.total:,}{right}"
         )
     return (
-        f"The guard tries a method on two nutations before a run. {' '.join(said)} A wrong run ends more than "
-        f"{WRONG:g} rad off, a right one within {EXPECTED:g} rad."
+        f"The guard tries a method on two nutations before a run. Asked about the {GUARDED_LEVELS} coarsest settings "
+        f"of each row, it warned {', '.join(said)}. Wrong is more than {WRONG:g} rad off, right less than {EXPECTED:g} "
+        "rad, at which it warns; the others are not counted."
     )
 
 

@@ -51,7 +51,8 @@ STUDY = Study(
     title="Truth",
     question="How well is the truth known?",
     how_to_read=(
-        "Every error elsewhere in this report is measured against these sources. A line is the true error of a source, "
+        "Errors elsewhere in this report are measured against the closed form in double; oscillators and damped tops "
+        "have references of their own. A line is the true error of a source, "
         "the shade above it reaches up to the bound that the reference claims. A valid bound lies above the measured "
         "error; a useful one lies close to it. Points of other figures within ten times of the bound are drawn hollow."
     ),

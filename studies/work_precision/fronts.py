@@ -76,7 +76,7 @@ def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     headline(figure, message(most, sum(owners[row] for row in most), whole, BEATEN[cost], words.spans(data)[far]))
     timed = (
         " Only timed runs are shown: a row's cheapest for some error, and those of the comparison of energies. Dotted: "
-        "the closed form, which is not ranked. Lines bend near ten microseconds, which a call takes by itself."
+        "the closed form, which is not ranked. Of times below ten microseconds 2 to 4 are the call itself."
         if cost == "seconds"
         else " A high derivative, a kick and a stage count alike and take different times."
     )

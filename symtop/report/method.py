@@ -50,24 +50,27 @@ TOP = (
         "A rigid body turns about a fixed point on its axis of symmetry. I1 and I3 are its moments of inertia about "
         "that point, across and along the axis; mgl is its weight times the distance of its centre of gravity. Euler's "
         "angles, z-x-z, are phi (precession), theta (the inclination of the axis from the upward vertical) and psi "
-        "(spin). The Lagrangian is"
+        "(spin). The Lagrangian, kinetic less potential energy, is"
     ),
-    Block(formula="L = I1/2 (theta'^2 + phi'^2 sin^2 theta) + I3/2 (psi' + phi' cos theta)^2 - mgl cos theta"),
+    Block(formula="T - U = I1/2 (theta'^2 + phi'^2 sin^2 theta) + I3/2 (psi' + phi' cos theta)^2 - mgl cos theta"),
     Block("It does not depend on phi and psi. Their momenta are therefore conserved:"),
     Block(formula="p_psi = I3 (psi' + phi' cos theta),   p_phi = I1 phi' sin^2 theta + p_psi cos theta"),
     Block("The inclination moves like a particle in an effective potential, and its oscillation is the nutation:"),
-    Block(formula="I1 theta'' = -dV/dtheta,   V = (p_phi - p_psi cos theta)^2/(2 I1 sin^2 theta) + mgl cos theta"),
+    Block(
+        formula="I1 theta'' = -dV/dtheta,   "
+        "V = (p_phi - p_psi cos theta)^2/(2 I1 sin^2 theta) + p_psi^2/(2 I3) + mgl cos theta"
+    ),
     Block(
         "Methods [angles] integrate these angles. Methods [axis] integrate the direction e of the axis and the angular "
-        "momentum J in space, with k the upward vertical:"
+        "momentum L in space, with k the upward vertical:"
     ),
-    Block(formula="e' = (J x e)/I1,   J' = mgl k x e"),
-    Block("Methods [attitude] integrate J and the quaternion q that turns the body into space:"),
-    Block(formula="q' = 1/2 omega q,   omega = J/I1 + (1/I3 - 1/I1) p_psi e"),
+    Block(formula="e' = (L x e)/I1,   L' = mgl k x e"),
+    Block("Methods [attitude] integrate L and the quaternion q that turns the body into space:"),
+    Block(formula="q' = 1/2 omega q,   omega = L/I1 + (1/I3 - 1/I1) p_psi e"),
 )
 ENERGY = (
-    "difference of the energies over E0 - min V, the energy of the nutation: that of the start above the steady "
-    "precession with the same momenta, without the spin"
+    "difference of the energies over E0 - min V, the energy of the nutation: the height of the start above the steady "
+    "precession with the same momenta; where that is 0, over I1 omega^2/2, omega the frequency of small nutations"
 )
 ERRORS = {  # what is measured, and its unit
     "axis": ("angle between the axis e and the true axis r: atan2(|e x r|, e.r)", "rad"),
@@ -119,9 +122,10 @@ def _scenes(catalogue: Sequence[Scene], bounds: dict[str, float]) -> list[Block]
         starts.append([scene.name, *(repr(number).removesuffix(".0") for number in numbers)])
     units = ", ".join(scene.name for scene in catalogue if scene.units == "SI")
     words = (
-        "A scene is a top, a start and a horizon. Times are in any unit that fits I1, I3 and mgl"
-        + (f", and in seconds on {units}" if units else "")
-        + ". Angles are in radians, and every number below is to be read as the nearest double."
+        "A scene is a top, a start and a horizon. Times are in the unit that fits I1, I3 and mgl"
+        + (f", which is the second on {units}" if units else "")
+        + "; tables write s for it on every scene. Angles are in radians, and every number below is to be read as the "
+        "nearest double."
     )
     return [
         Block(words),
