@@ -57,13 +57,18 @@ def constant_sentence(histories: xr.Dataset, constant: str) -> str:
     groups = fates(histories, constant)
     kept, held, failed = (groups.get(word, []) for word in ("kept", "bounded", FAILED))
     lost = sorted(one for word in ("random walk", "growing", "drift") for one in groups.get(word, []))
-    parts = [f"stays at rounding with {len(kept)} (up to {kept[-1].largest:.1e})"] if kept else []
+    parts = [f"is no more than rounding with {len(kept)} (up to {kept[-1].largest:.1e})"] if kept else []
     for group, does in ((held, "is bounded"), (lost, "grows in time")):
         if group:
             parts.append(f"{does} with {len(group)} (up to {group[-1].largest:.1e}, {group[-1].row})")
     parts += [f"is unknown with {len(failed)} whose run ended early"] if failed else []
     count = sum(map(len, groups.values()))
-    return f"Of {counted(count)}, the relative change of {_the(constant)} {', '.join(parts)}."
+    return f"Of {counted(count)}, the relative change of {_the(constant)} {_said(parts)}."
+
+
+def _said(parts: Sequence[str]) -> str:
+    """Parts of a sentence that have commas of their own."""
+    return f"{', '.join(parts[:-1])}, and {parts[-1]}" if len(parts) > 2 else " and ".join(parts)
 
 
 def _the(constant: str) -> str:
@@ -106,6 +111,8 @@ def phase_sentence(histories: xr.Dataset) -> str:
         )
     if unclear:
         parts.append(f"With {_rows(unclear)} no one power fits all scenes.")
+    if parts and (unseen := histories.sizes["integrator"] - sum(map(len, groups.values()))):
+        parts.append(f"With {counted(unseen)} none is seen.")
     return " ".join(parts)
 
 
@@ -129,7 +136,8 @@ def tables(histories: xr.Dataset) -> list[Table]:
     for constant in CONSTANTS:
         for word, group in fates(histories, constant).items():
             for one in group:
-                cells[one.row] += [f"{one.largest:.1e}", f"{MEANING[word]}, t^{one.exponent:.2f}"]
+                power = f", t^{one.exponent:.2f}" if np.isfinite(one.exponent) else ""
+                cells[one.row] += [f"{one.largest:.1e}", f"{MEANING[word]}{power}"]
     for row, cell in cells.items():
         phase, word = grown.get(row, (None, "not seen"))
         cell.extend([f"{phase.largest:.1g}", phase.powers, word] if phase else ["", "", word])

@@ -82,7 +82,10 @@ def _residuals(histories: xr.Dataset) -> Picture:
         f"the energy stays at rounding or within bounds with {len(words.holding(data))} of these "
         f"{data.sizes['integrator']} rows, which does not bound the error of the motion."
     )
-    alt = "Log-log plots of residuals over time: level for the discrete methods, rising for adaptive Runge-Kutta."
+    alt = (
+        "Log-log plots of residuals over time: level for discrete Lagrangians and splittings, rising for explicit or "
+        "adaptive Runge-Kutta methods."
+    )
     return Picture("residuals", figure, caption, alt)
 
 

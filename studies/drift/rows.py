@@ -117,8 +117,8 @@ def charts_apart(histories: xr.Dataset) -> str:
         for one in examples
     )
     return (
-        f"The chart alone, same method and step: {listed}. It matters more than {APART:g}-fold for {len(differing)} of "
-        f"{counted(len(methods), 'method')} that have two charts."
+        f"The chart alone, same method, same step or tolerance: {listed}. It matters more than {APART:g}-fold for "
+        f"{len(differing)} of {counted(len(methods), 'method')} that have two charts."
     )
 
 

@@ -24,7 +24,7 @@ ROUNDED_PHASE = 1e-9  # rad: symplectic methods of order 8 reach 4.6e-10 in a mi
 CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
 ROUNDING_COLUMNS = {  # header: variable
     "exponent": "exponent",
-    "+- (95 %)": "exponent_interval",
+    "+- (95%)": "exponent_interval",
     "late drift": "late",
     "exponent, plain sums": "plain_exponent",
     "late drift, plain sums": "plain_late",
@@ -65,16 +65,19 @@ def _residual_table(histories: xr.Dataset) -> Table:
         cell = histories.sel(scene=scene, integrator=integrator)
         row = [str(scene), str(integrator), used(cell), f"{cell['nutations']:.4g}", str(cell["outcome"].item())]
         for name in CONSTANTS:
-            doubt = cell[f"{name}_interval"] * cell["sample_time"].max()  # 95 %, of the rise over the whole run
+            doubt = cell[f"{name}_interval"] * cell["sample_time"].max()  # 95%, of the rise over the whole run
             trend = f"{_number(cell[f'{name}_rise'])} +- {_number(doubt)}"
             row += [_number(cell[f"{name}_largest"]), trend, law(cell, name)]
         rows.append([*row, law(cell, "phase")])
-    title = "Relative residuals, linear trends with 95 % intervals, growth ~ t^exponent, its law and where it changes"
+    title = "Relative residuals, linear trends with 95% intervals, growth ~ t^exponent, its law and where it changes"
     return Table(title, [*header, "exponent, law of phase"], rows)
 
 
 def _number_table(title: str, runs: Mapping[str, xr.Dataset], columns: Mapping[str, str], form: str) -> Table:
-    rows = [[name, *(format(cell[column], form) for column in columns.values())] for name, cell in runs.items()]
+    rows = [
+        [name, *(format(cell[column], form) if np.isfinite(cell[column]) else "" for column in columns.values())]
+        for name, cell in runs.items()
+    ]
     return Table(title, ["row", *columns], rows)
 
 
@@ -120,7 +123,7 @@ def shortened(histories: xr.Dataset) -> str:
     shares = shares[shares < FULL_LENGTH].sort_values(ascending=False, kind="stable")
     if not len(shares):
         return ""
-    least, most = (f"{100.0 * share:.2g} %" for share in (shares.iloc[-1], shares.iloc[0]))
+    least, most = (f"{100.0 * share:.2g}%" for share in (shares.iloc[-1], shares.iloc[0]))
     part = most if least == most else f"{least} ({shares.index[-1]}) to {most}"
     return f"To save time, {few(list(shares.index))} ran over {part} of the horizon only, and are judged on that part."
 
@@ -163,8 +166,8 @@ def predictions(runs: Mapping[str, xr.Dataset], where: str = "") -> str:
     off = {name: abs(float(cell["ratio"]) - 1.0) for name, cell in runs.items()}  # NaN: not reached
     times = [float(cell["measured"] / cell["short"]) for name, cell in runs.items() if math.isfinite(off[name])]
     hits = [100.0 * error for error in off.values() if error <= CLOSE]
-    missed = [f"{name} ({f'{error:.0%} off' if math.isfinite(error) else 'not reached'})"
-              for name, error in off.items() if not error <= CLOSE]  # fmt: skip
+    missed = [f"{name} ({error:.0%} off)" for name, error in off.items() if error > CLOSE]
+    never = [name for name, error in off.items() if math.isnan(error)]
     if not runs:
         return ""
     short = max(float(cell["short"]) for cell in runs.values())
@@ -173,8 +176,9 @@ def predictions(runs: Mapping[str, xr.Dataset], where: str = "") -> str:
         f"{f', {np.median(times):.2g} times as late in the median' if times else ''}"
     )
     if hits:
-        text += f": right to {max(hits):.2g} % for {len(hits)} of {counted(len(off))}"
-    return f"{text}." + (f" Off by more than {CLOSE:.0%}: {few(missed)}." if missed else "")
+        text += f": right to {max(hits):.2g}% for {len(hits)} of {counted(len(off))}"
+    rest = (f" Off by more than {CLOSE:.0%}: {few(missed)}.", f" Not reached by the end of a run: {few(never)}.")
+    return f"{text}." + "".join(said for said, rows in zip(rest, (missed, never), strict=True) if rows)
 
 
 def verdict(data: xr.DataTree) -> list[str]:

@@ -189,8 +189,8 @@ def spherical(data: xr.DataTree) -> str:
     turned = span((1.0 + frame(data, row, "precession", USUAL, scene=FAST) for row in there), "{:.2f}".format)
     return (
         f"Without a gyroscopic term a map follows another top, the spherical one with I3 := I1: {few(there)} are off "
-        f"it by {near} at 1/{USUAL:g} s on {SLOW}, which shrinks with order {orders}. The true top is missed by "
-        f"{missed}, and {FAST} precesses at {turned} of its rate."
+        f"it by {near} at 1/{USUAL:g} s on {SLOW}, with order {orders}. The true top is missed by {missed}; "
+        f"on the scene {FAST} the precession has {turned} of its rate."
     )
 
 

@@ -5,11 +5,13 @@ from collections.abc import Mapping, Sequence
 
 import xarray as xr
 
-from symtop.report.sentences import few
+from symtop.report.sentences import few, joined
 from symtop.runner.study import Table
 
 from .long_energy import better_from, energy_until, notebook_end
 from .tables import SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION, Column
+
+UNCHANGED = 0.005  # relative: an error that grew by less is said not to have changed
 
 
 def answer(data: xr.Dataset, named: tuple[str, ...]) -> list[str]:
@@ -22,7 +24,9 @@ def answer(data: xr.Dataset, named: tuple[str, ...]) -> list[str]:
         values = {name: float(largest.sel(integrator=name)) for name in shown}
         worse, better = ([n for n in shown if (values[n] < limit) is wanted] for wanted in (False, True))
         parts = [
-            f"{word} than {_listed(values, part)}" for word, part in (("better", worse), ("worse", better)) if part
+            f"{word} than {_listed(values, part, most)}"
+            for word, part, most in (("better", worse, 2), ("worse", better, 4))  # the worse are named below
+            if part
         ]
         sentences.append(
             f"On {scene}, to the notebook's t = {notebook_end(data, scene):g}, {SOLVER} keeps the energy to "
@@ -31,29 +35,30 @@ def answer(data: xr.Dataset, named: tuple[str, ...]) -> list[str]:
     return sentences
 
 
-def _listed(values: Mapping[str, float], names: Sequence[str]) -> str:
-    """Rows with their errors, from the least to the largest."""
+def _listed(values: Mapping[str, float], names: Sequence[str], most: int) -> str:
+    """Rows, by name if at most so many, with their errors, from the least to the largest."""
     ends = dict.fromkeys(f"{pick(values[name] for name in names):.0e}" for pick in (min, max))
-    return f"{few(names)} ({' to '.join(ends)})"
+    return f"{few(names, most=most)} ({' to '.join(ends)})"
 
 
 def _later(data: xr.Dataset, scene: str, names: list[str]) -> str:
-    """From when on the rows that are worse at first are better."""
+    """From when on the rows that are worse at first are better, row by row."""
     if not names:
         return ""
     last, end = float(data[Column.LONG_TIME].sel(scene=scene).max()), notebook_end(data, scene)
     since = {name: better_from(data, scene, name) for name in names}
-    true = sorted(time for time in since.values() if math.isfinite(time))
+    true = sorted((name for name, time in since.items() if math.isfinite(time)), key=lambda name: since[name])
     never = [name for name, time in since.items() if math.isinf(time)]
     grown = max(energy_until(data, scene, name, last) / energy_until(data, scene, name, end) - 1.0 for name in names)
-    said = (
-        f"Up to t = {last:g} its error grows to {energy_until(data, scene, SOLVER, last):.0e}, that of the rows it "
-        f"beat by {grown:.0%}"
-    )
+    whose = "theirs" if len(names) > 1 else "the other's"
+    change = f"has grown by {grown:.0%}" if grown >= UNCHANGED else "has not changed"
+    said = f"By t = {last:g} its error is {energy_until(data, scene, SOLVER, last):.0e}, {whose} {change}"
     if true:
-        ends = dict.fromkeys(f"{time:.3g}" for time in (true[0], true[-1]))
-        said += f"; theirs is smaller from t = {' to '.join(ends)} on"
-    return said + (f"; with {few(never)} it never is." if never else ".")
+        first, *others = true
+        said += ": " + joined([
+            f"{first} is better from t = {since[first]:.3g} on", *(f"{name} from {since[name]:.3g}" for name in others)
+        ])  # fmt: skip
+    return said + (f"; {few(never)} {'is' if len(never) == 1 else 'are'} never better." if never else ".")
 
 
 def long_table(data: xr.Dataset, named: Sequence[str]) -> Table:

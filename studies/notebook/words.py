@@ -55,9 +55,9 @@ def momenta(data: xr.Dataset) -> str:
     rest = f", not with {few(lost)}" if lost else " (theory: at any step)"
     solver = data[list(MOMENTA)].sel(scene="spheroid", integrator=SOLVER)
     return (
-        f"With {kept} discrete methods both momenta are constant to rounding {step}{rest}. The largest relative change "
-        f"is {max(largest.values()):.0e}, against {float(solver.to_dataarray().max()):.0e} with the solver on the "
-        "first scene."
+        f"With {kept} discrete Lagrangians and splittings both momenta are constant to rounding {step}{rest}. The "
+        f"largest relative change is {max(largest.values()):.0e}, against {float(solver.to_dataarray().max()):.0e} "
+        "with the solver on the first scene."
     )
 
 
@@ -134,7 +134,7 @@ def energy(data: xr.Dataset) -> str:
     midpoint = data.sel(scene="spheroid", integrator=MIDPOINT)
     gain = float(midpoint[Column.ENERGY_CHANGE][0] / midpoint[Column.MODIFIED_CHANGE][0])
     return (
-        "The energy error of the discrete methods is bounded, not small: "
+        "The energy error of discrete Lagrangians and splittings is bounded, not small: "
         f"{sum(error < limit for error in errors.values())} of {len(errors)} have a smaller one than the solver "
         f"({limit:.0e}) on the first scene to t = 8. Their map conserves a modified Hamiltonian: at 40 steps a "
         f"nutation its first term lowers the energy change of the midpoint rule {gain:.0f}-fold."

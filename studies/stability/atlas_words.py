@@ -224,8 +224,8 @@ def summary(data: xr.Dataset, family: str) -> list[str]:
         median = float(np.median([one.silent for one in by_name.values()]))
         sentences.append(
             f"With the median row {median:.0%} of inaccurate runs end without an error, whether or not they keep the "
-            f"energy, and {len(never)} of {counted(len(by_name))} never end a run early. Only the comparison with the "
-            "truth shows that they are wrong."
+            f"energy, and {len(never)} of {counted(len(by_name))} never end a run early. That a run ends "
+            "without an error says little: what energy, momenta and the guard notice is in Populations."
         )
     return sentences
 

@@ -187,7 +187,7 @@ def _sampling(axis: Any, data: xr.Dataset) -> None:
     axis.axhspan(0.0, LEAST_SAMPLED, color=GREY, alpha=0.15, lw=0)
     axis.plot([1e-15, 1e-2], [1e-15, 1e-2], **GUIDE)
     axis.set(xscale="log", yscale="log", ylabel="the same, sampled once a nutation")
-    axis.set_xlabel("largest relative energy error, sampled at every step")
+    axis.set_xlabel("largest absolute energy error, sampled at every step")
     axis.annotate("rounding: nothing is seen here\n(zeros are drawn at $10^{-16}$)", (0.99, 0.01), va="bottom",
                   xycoords="axes fraction", ha="right", **NOTE)  # fmt: skip
     axis.annotate("equal", (1e-3, 1e-3), (-4, 2), textcoords="offset points", ha="right", **NOTE)
@@ -211,7 +211,7 @@ def _solver(axis: Any, data: xr.Dataset) -> None:
         last = int(np.argmax(x))
         ends[label] = float(x[last]), float(y[last]), color
     axis.set(xscale="log", yscale="log", xlabel=f"solver tolerance of {cell['integrator'].values}, step fixed")
-    axis.set_ylabel("largest relative change")
+    axis.set_ylabel("largest absolute change")
     loose = x[np.isclose(cell[Column.TEXTBOOK_ENERGY].values, float(cell[Column.ONE_ITERATION_ENERGY]), rtol=1e-3)]
     if loose.size:
         axis.axvspan(loose.min() / 2.0, x.max() * 2.0, color=GREY, alpha=0.12, lw=0)
@@ -233,6 +233,6 @@ ALTS = {
     "resonances": "Surviving displacement against the step.",
     "sleeping": "Least sleeping spin against the step.",
     "separatrix": "Accurate time against the early error.",
-    "sampling": "Energy errors sampled in two ways.",
-    "solver": "Residuals against the solver's tolerance.",
+    "sampling": "Absolute energy errors sampled in two ways.",
+    "solver": "Absolute residuals against the solver's tolerance.",
 }

@@ -15,7 +15,7 @@ from .tables import Column
 from .words import BARELY, LEAST_SAMPLED, misses, outlasting, resonant
 
 SLEEPERS = ("strang", "cayley", "midpoint", "gauss-4", "yoshida-4")  # methods, of the figure of the sleeping top
-ROUNDED, ROUNDED_ENERGY = 1e-14, 1e-12  # rad, and relative: errors up to these are rounding
+ROUNDED, ROUNDED_ENERGY = 1e-14, 1e-12  # rad, and absolute: errors up to these are rounding
 SHIFTED = 1e-3  # of the threshold: less is kept
 
 
@@ -50,7 +50,8 @@ def _pole(part: xr.Dataset) -> str:
             early.append(not lasts(name, gaps, errors))
         else:
             spread.append(float(np.max(errors)) / max(float(np.nanmin(errors)), ROUNDED))
-    text = f"{sum(early)} of {len(early)} fixed-step methods in angles end early within {number(NEAR, 1)} rad of a pole"
+    near = f"within {number(NEAR, 1)} rad of a pole"
+    text = f"At one step {sum(early)} of {len(early)} fixed-step methods in angles end early {near}"
     most = max(spread, default=np.nan)
     if not np.isfinite(most):
         return text
@@ -120,8 +121,8 @@ def _solver(part: xr.Dataset) -> str:
     solved = float(part[Column.TEXTBOOK_ENERGY].isel(tolerance_setting=-1).max())
     one = float(part[Column.ONE_ITERATION_ENERGY].max())
     return (
-        f"One textbook Newton iteration a step leaves an energy error of {number(one)}; iterated to the end it leaves "
-        f"{number(solved)}"
+        f"One textbook Newton iteration a step leaves an absolute energy error of {number(one)}; iterated to the end "
+        f"it leaves {number(solved)}"
     )
 
 

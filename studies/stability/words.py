@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from symtop.model.scenes import scenes
 from symtop.report.sentences import counted, few
 from symtop.runner.study import Table
 
@@ -94,26 +95,29 @@ def poles(part: xr.Dataset) -> str:
     if not halved[True] + halved[False]:
         return ""
     return (
-        f"A pole closer than {NEAR:g} rad to the path at least halves the accurate step of {sum(halved[True])} of "
-        f"{len(halved[True])} rows of fixed step in the angles chart, and of {sum(halved[False])} of "
+        f"A pole closer than {NEAR:g} rad to the path at least halves the longest accurate step of {sum(halved[True])} "
+        f"of {len(halved[True])} rows of fixed step in the angles chart, and of {sum(halved[False])} of "
         f"{len(halved[False])} in charts without poles. Each run is one fall past the pole, all else is held fixed."
     )
 
 
 def limits(part: xr.Dataset) -> str:
-    """Linear limits of the step, and the methods that have none."""
+    """Linear limits of the step, the methods that have none, and those of which neither is known."""
     phases = {name: float(cell[Column.LIMIT_PHASE]) for name, cell in _rows(part, Column.LIMIT_PHASE).items()}
     free, subject, parts = unlimited(part), "Small nutations about a steady precession", []
     if phases:
         parts.append(
-            f"{subject} grow beyond a step limit with {few(list(phases), most=2)}. As h omega, step times "
-            f"nutation frequency, the limits reach {_ends(phases)}."
+            f"{subject} grow beyond a step limit with {few(list(phases), most=2)}: h omega, step times nutation "
+            f"frequency, {_ends(phases)}."
         )
     if free:
         parts.append(
             f"{'They' if phases else subject} grow at no step up to h omega = {max(free.values()):g} with "
             f"{few(list(free))}."
         )
+    neither = [name for name in _rows(part, Column.SOUGHT_PHASE) if name not in phases and name not in free]
+    if parts and neither:
+        parts[-1] = f"{parts[-1][:-1]}; {counted(len(neither))} show{'s' * (len(neither) == 1)} neither."
     return " ".join(parts)
 
 
@@ -221,6 +225,11 @@ def _longer(part: xr.Dataset) -> str:
     return f" {few(apart)} {'last' if len(apart) > 1 else 'lasts'} more than {OUTLASTS:g}/λ longer."
 
 
+def absolute() -> str:
+    """What the energy errors of sampling and of the solver are: not divided by the energy of the nutation."""
+    return f"absolute; the energy of the nutation is {scenes()['goldstein'].energy_scale:.2g}"
+
+
 def sampling(part: xr.Dataset) -> str:
     """What an energy error sampled once a nutation hides: no ratio is formed with a number at rounding."""
     once, every = part[Column.ENERGY_ONCE].values, part[Column.ENERGY_EVERY].values
@@ -238,7 +247,7 @@ def sampling(part: xr.Dataset) -> str:
     if VERLET in part["integrator"].values:
         verlet = part.sel(integrator=VERLET)
         true, shown = float(verlet[Column.ENERGY_EVERY]), float(verlet[Column.ENERGY_ONCE])
-        text += f" With {VERLET} it is {true:.2g} and looks like {shown:.1g}."
+        text += f" With {VERLET} it is {true:.2g} and looks like {shown:.1g} ({absolute()})."
     return text
 
 
@@ -252,10 +261,10 @@ def solver(part: xr.Dataset) -> str:
         lost = {"energy": energy[0] > LOOSE * energy[-1], "momenta": momenta[0] > LOOSE * momenta[-1]}
         verbs = {name: f"{'loses' if gone else 'conserves'} the {name}" for name, gone in lost.items()}
         return (
-            f"With one Newton iteration a step the energy error of {name} {first}, with its equation solved it stays "
-            f"within {solved:.1e}{cause}. This package's kernel, stopped after one iteration, {verbs['energy']} "
+            f"With one Newton iteration a step the energy error of {name} {first}; solved, it stays within "
+            f"{solved:.1e}{cause}. This package's kernel, stopped after one iteration, {verbs['energy']} "
             f"({energy[0]:.1e}; solved: {energy[-1]:.1e}) {'and' if len(set(lost.values())) == 1 else 'but'} "
-            f"{verbs['momenta']} ({momenta[0]:.0e}; solved: {momenta[-1]:.0e})."
+            f"{verbs['momenta']} ({momenta[0]:.0e}; solved: {momenta[-1]:.0e}). All are absolute."
         )
     return ""
 
@@ -289,7 +298,7 @@ LIMITS = (  # scene, variable, header, format
     ("steady-fast", Column.THIRD_TURN_PHASE, "a third of a turn a step, h omega", "{:.4f}"),
     ("steady-fast", Column.SURVIVING_AT_THIRD_TURN, "largest displacement that stays near there (rad)", "{:.2g}"),
     ("sleeping", Column.SLEEPING_THRESHOLD, "sleeps from a spin I3 w3 of (largest step)", "{:.6f}"),
-    ("goldstein", Column.ENERGY_EVERY, "largest energy error, every step", "{:.1e}"),
+    ("goldstein", Column.ENERGY_EVERY, "largest absolute energy error, every step", "{:.1e}"),
     ("goldstein", Column.ENERGY_ONCE, "the same, once a nutation", "{:.1e}"),
 )
 

@@ -345,7 +345,7 @@ def test_the_message_of_the_pole_is_that_of_the_step_drawn():
     }
     part = xr.Dataset(columns, coords={"integrator": ["stormer-verlet[angles]", "strang[axis]"]})
     said = messages.of_mechanism("pole", part)
-    assert said.startswith("1 of 1 fixed-step methods in angles end early within 0.0001 rad of a pole")
+    assert said.startswith("At one step 1 of 1 fixed-step methods in angles end early within 0.0001 rad of a pole")
     assert said.endswith("the 1 in other charts have errors that differ at most 2 times between all gaps")
     part[Column.GRAZING_ERROR][1, 2] = 4e-5  # the base is the smallest error at any gap
     assert "differ at most 5 times" in messages.of_mechanism("pole", part)

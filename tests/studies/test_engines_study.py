@@ -120,7 +120,7 @@ def test_at_the_same_cost_a_method_of_four_evaluations_takes_a_quarter_of_the_st
 
 def test_without_the_term_the_spherical_top_is_followed_by_order_h_and_with_it_not_at_all(measured):
     assert "no-gyro[axis] are off it by" in words.spherical(measured)
-    assert "which shrinks with order 1.00" in words.spherical(measured)
+    assert "on goldstein, with order 1.00. The" in words.spherical(measured)
     (table,) = listed.spherical(measured)
     assert [line[0] for line in table.rows] == ["no-gyro[axis]"]
     off = [

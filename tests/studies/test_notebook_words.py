@@ -15,9 +15,9 @@ def test_the_notebook_study_names_discrete_methods_that_lose_their_momenta():
     sizes = np.array([[1e-15, 1e-15, 1e-6]])
     coords = {"scene": ["spheroid"], "integrator": ["midpoint[angles]", "strang[axis]", SOLVER]}
     data = xr.Dataset(dict.fromkeys(notebook_words.MOMENTA, (("scene", "integrator"), sizes)), coords=coords)
-    assert "With all 2 discrete methods" in notebook_words.momenta(data)
+    assert "With all 2 discrete Lagrangians and splittings" in notebook_words.momenta(data)
     lost = data.assign({"p_phi_largest": (("scene", "integrator"), [[1e-15, 1e-9, 1e-6]])})
-    assert "With 1 of 2 discrete methods" in notebook_words.momenta(lost)
+    assert "With 1 of 2 discrete Lagrangians and splittings" in notebook_words.momenta(lost)
     assert "not with strang[axis]" in notebook_words.momenta(lost)
 
 
@@ -50,12 +50,12 @@ def test_the_notebooks_question_is_answered_and_the_time_from_which_its_hope_is_
     assert better_from(late, "spheroid", "midpoint[angles]") == pytest.approx(300.0, rel=0.03)
     (said,) = notebook_words.hopes(late)
     assert "t = 8, lsoda[angles] keeps the energy to 8e-07, better than midpoint[angles] (3e-05)." in said
-    assert said.endswith("that of the rows it beat by 0%; theirs is smaller from t = 302 on.")
+    assert said.endswith("the other's has not changed: midpoint[angles] is better from t = 302 on.")
     table = long_table(late, ["midpoint[angles]"])
     assert list(table.rows[-1]) == ["spheroid", "midpoint[angles]", "8", "3e-05", "3e-05", "302"]
     never, always = long_runs(3e-5, 1e-9), long_runs(1e-9, 1e-7)
     assert better_from(never, "spheroid", "midpoint[angles]") == math.inf
-    assert "with midpoint[angles] it never is" in notebook_words.hopes(never)[0]
+    assert "has not changed; midpoint[angles] is never better." in notebook_words.hopes(never)[0]
     assert better_from(always, "spheroid", "midpoint[angles]") == 0.0
     assert "worse than midpoint[angles]" in notebook_words.hopes(always)[0]
 

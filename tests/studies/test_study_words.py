@@ -41,7 +41,7 @@ def test_runs_over_a_part_of_the_horizon_are_named():
     time = np.linspace(0.0, 1.0, 5) * np.array([1.0, 0.2, 0.5])[:, None]
     data = xr.Dataset({"sample_time": (("scene", "integrator", "sample"), time[None])},
                       coords={"scene": ["spheroid"], "integrator": ["rk4", "rk45", "radau"]})  # fmt: skip
-    said = "radau, rk45 ran over 20 % (rk45) to 50 % of the horizon only, and are judged on that part."
+    said = "radau, rk45 ran over 20% (rk45) to 50% of the horizon only, and are judged on that part."
     assert words.shortened(data).endswith(said)
     assert words.shortened(data.sel(integrator=["rk4"])) == ""
 
@@ -146,7 +146,7 @@ def test_what_is_said_of_the_phase_follows_from_its_exponents():
         "The phase error grows as t with strang. It grows faster, as it does where the energy drifts"
     )
     assert "with rk4, taylor: most with rk4 (t^2.09 and t^1.90, to 1 rad)." in said
-    assert said.endswith("With mixed no one power fits all scenes.")
+    assert said.endswith("With mixed no one power fits all scenes. With 1 row none is seen.")
     assert "exact" not in said
     groups = behaviours.phases(data)
     assert {word: [one.row for one in group] for word, group in groups.items()} == {
@@ -233,12 +233,14 @@ def test_a_loss_that_is_off_by_a_fifth_was_not_predicted():
                   for k, ratio in enumerate(ratios)}  # fmt: skip
         return words.predictions(losses)
 
-    assert "right to 3 % for 2 of 2" in sentence(1.01, 0.97)
+    assert "right to 3% for 2 of 2" in sentence(1.01, 0.97)
     assert "Off by more" not in sentence(1.01, 0.97)
     assert "for 1 of 2 rows. Off by more than 10%: method-1 (20% off)" in sentence(1.01, 1.2)
     assert "predicts when the phase error reaches 0.01 rad, 2.5 times as late" in sentence(1.01)
     assert "right to" not in sentence(1.3)
-    assert "method-0 (not reached)" in sentence(math.nan)
+    unreached = sentence(1.01, math.nan)
+    assert unreached.endswith("for 1 of 2 rows. Not reached by the end of a run: method-1.")
+    assert "Off by more" not in unreached
 
 
 @pytest.mark.parametrize(
@@ -326,12 +328,14 @@ def test_the_fates_of_all_rows_are_counted_in_a_sentence_and_listed_in_tables():
     data = xr.Dataset(columns, coords={"integrator": list(sizes), "scene": ["spheroid"]})
     data = data.assign(outcome=(("integrator", "scene"), [["ok"]] * 4))
     assert behaviours.constant_sentence(data, "p_phi") == (
-        "Of 4 rows, the relative change of p_phi stays at rounding with 2 (up to 2.0e-15), is bounded with 1 (up to "
-        "1.0e-04, verlet), grows in time with 1 (up to 1.0e-02, rk4)."
+        "Of 4 rows, the relative change of p_phi is no more than rounding with 2 (up to 2.0e-15), is bounded with 1 "
+        "(up to 1.0e-04, verlet), and grows in time with 1 (up to 1.0e-02, rk4)."
     )
     counts, every = behaviours.tables(data)
     assert list(counts.rows[0]) == ["energy", "at rounding", "2", "1.0e-15", "strang", "2.0e-15", "cayley"]
     assert [row[0] for row in every.rows] == list(sizes)
+    zero = data.assign(p_phi_exponent=data["p_phi_exponent"] * math.nan)
+    assert not any("nan" in text for row in behaviours.tables(zero)[1].rows for text in row)
     assert {len(row) for row in every.rows} == {len(every.header)}
     ended = data.assign(outcome=data["outcome"].where(data["integrator"] != "rk4", "left_chart"))
     assert behaviours.constant_sentence(ended, "energy").endswith("is unknown with 1 whose run ended early.")
