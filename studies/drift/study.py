@@ -90,9 +90,9 @@ STUDY = Study(
         "A row is a method in one chart, method[chart]: rk4[angles] and rk4[axis] take the same step and differ in "
         "their equations only. Energies are relative to E0 - min V, the energy of the nutation, momenta to the larger "
         "one. A flat line is a bounded error, slope one a steady drift, slope one half the random walk of rounding. "
-        "The discrete methods have a larger but bounded energy error and conserve the momenta to rounding. A "
-        "Runge-Kutta method begins with a smaller error and loses energy and momenta in time. The tables hold every "
-        "row; momenta are recomputed from the increments of the trajectory."
+        "Discrete Lagrangians and splittings have a larger but bounded energy error and conserve the momenta to "
+        "rounding. An explicit or adaptive Runge-Kutta method begins with a smaller error and loses energy and momenta "
+        "in time. The tables hold every row; momenta are recomputed from the increments of the trajectory."
     ),
     cases=cases, full=full, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
 )  # fmt: skip

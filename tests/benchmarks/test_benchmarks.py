@@ -117,7 +117,7 @@ def test_what_the_benchmark_leaves_is_what_the_report_shows(tmp_path):
         "other implicit: no limit is set; 3.0 times in the median",
         "4.5 times with rk4[axis], the least",
         "Two threads run strang[axis] in lanes 1.90 times as fast",
-        "srkn-14-6[axis] in lanes takes 2.6 to the same error of 1e-06",
+        "srkn-14-6[axis] in lanes takes 2.6 us to the same error of 1e-06",
         "2001-02-03",
         "an abacus",
     ):
