@@ -57,7 +57,7 @@ def _parts(data: xr.Dataset) -> Picture:
         axis.axvline(at, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
         axis.annotate(said, (at, 1.0), (0, 3), xycoords=("data", "axes fraction"), textcoords="offset points",
                       ha="center", fontsize=LEAST_TEXT)  # fmt: skip
-    axis.set(xscale="log", ylim=(len(rows) - 0.5, -0.5), yticks=range(len(rows)), yticklabels=rows)
+    axis.set(xscale="log", ylim=(max(len(rows), 1) - 0.5, -0.5), yticks=range(len(rows)), yticklabels=rows)
     axis.set_xlabel(f"error over {last} nutations / error over {first}, at equal steps or tolerances")
     axis.grid(visible=False, axis="y")
     axis.tick_params(axis="y", length=0)
