@@ -329,7 +329,8 @@ def draw_guard(data: xr.DataTree) -> Picture:
         figure,
         "Wrong runs that are noticed against right ones that are suspected. Black: by the guard's "
         f"forecast before the run (dot: it warns at {EXPECTED:g} rad). Orange: by the larger error of energy and "
-        f"momenta after the run (dot: {KEPT:.0%}). All rows, method[chart], at their ten coarsest settings, on "
+        f"momenta after the run (dot: {KEPT:.0%}). All rows, method[chart], at their ten coarsest steps or "
+        "tolerances, on "
         f"{' and on '.join(messages.guarded(data, one) for one in spans)}; no named scene. The higher a line, the more "
         "wrong runs are found at equal false alarms. Silent failures are counted on all tops instead.",
         "Receiver operating characteristics of the guard and of the conserved quantities, with their thresholds.",
