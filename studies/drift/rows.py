@@ -128,10 +128,10 @@ def _size(value: float) -> str:
 
 def charts_table(histories: xr.Dataset) -> list[Table]:
     """Every method and constant for which the chart matters, with the largest change in each chart; none if none."""
-    found = dict.fromkeys((one.constant, split_name(one.worse)[0]) for one in _apart(histories))
+    losing = dict.fromkeys((one.constant, split_name(one.worse)[0]) for one in _apart(histories))
     names = list(map(str, histories["integrator"].values))
     lines = []
-    for constant, method in found:
+    for constant, method in losing:
         cells = []
         for chart in CHARTS:
             row = f"{method}[{chart}]"

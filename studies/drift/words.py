@@ -112,8 +112,8 @@ def law(cell: xr.Dataset, name: str) -> str:
 def holding(histories: xr.Dataset) -> list[str]:
     """Integrators whose energy error is at rounding or bounded on every scene."""
     names = [str(name) for name in histories["integrator"].values]
-    found = {name: worst_behaviour(histories.sel(integrator=name), "energy") for name in names}
-    return [name for name, word in found.items() if word in ("kept", "bounded")]
+    fates = {name: worst_behaviour(histories.sel(integrator=name), "energy") for name in names}
+    return [name for name, word in fates.items() if word in ("kept", "bounded")]
 
 
 def shortened(histories: xr.Dataset) -> str:
@@ -161,7 +161,7 @@ def walks(ensembles: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def predictions(runs: Mapping[str, xr.Dataset], where: str = "") -> str:
+def predictions(runs: Mapping[str, xr.Dataset], place: str = "") -> str:
     """Which losses of phase were predicted, and which were not."""
     off = {name: abs(float(cell["ratio"]) - 1.0) for name, cell in runs.items()}  # NaN: not reached
     times = [float(cell["measured"] / cell["short"]) for name, cell in runs.items() if math.isfinite(off[name])]
@@ -172,7 +172,7 @@ def predictions(runs: Mapping[str, xr.Dataset], where: str = "") -> str:
         return ""
     short = max(float(cell["short"]) for cell in runs.values())
     text = (
-        f"A run of {short:g} nutations predicts when the phase error reaches {LOST:g} rad{where}"
+        f"A run of {short:g} nutations predicts when the phase error reaches {LOST:g} rad{place}"
         f"{f', {np.median(times):.2g} times as late in the median' if times else ''}"
     )
     if hits:

@@ -203,7 +203,7 @@ def tables(data: xr.Dataset) -> list[Table]:
         f"Largest relative residuals over the notebook's own horizons ({STEPS_A_NUTATION:g} steps a nutation; {SOLVER} "
         f"at tolerance {SOLVER_TOLERANCE:g}), and the time from which the energy is kept better than by {SOLVER}"
     )
-    powers = [[*where, *(f"{slope:.2f}" for slope in both)] for where, both in modified_orders(data).items()]
+    powers = [[*place, *(f"{slope:.2f}" for slope in both)] for place, both in modified_orders(data).items()]
     modified = Table("Powers of the step with which the energy and the modified energy change",
                      ["scene", "row", "energy", "modified energy"], powers)  # fmt: skip
     return [long_table(data, DRAWN), modified, Table(title, header, rows)]

@@ -79,11 +79,11 @@ def draw(data: xr.DataTree, name: str) -> Picture:
     )
     headline(figure, words.message(data, name))
     tops = "random tops (medians)" if name == POPULATION else f"the scene {name}"
-    where = "random tops (medians, no named scene)" if name == POPULATION else tops
+    place = "random tops (medians, no named scene)" if name == POPULATION else tops
     return Picture(
         "map" if name == POPULATION else name,
         figure,
-        f"The cheapest row, method[chart], or its family, for an allowed error up to a horizon, on {where}; every row "
+        f"The cheapest row, method[chart], or its family, for an allowed error up to a horizon, on {place}; every row "
         "has the step or tolerance that suits a cell. Phase is the angle between the axes at one time, energy is "
         "relative to E0 - min V, shape is the distance of height and vertical velocity from the true orbit, whatever "
         "the delay. A name is that of the method with the most cells of a region. Hatched (foretold, not run): "

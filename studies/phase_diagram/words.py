@@ -63,7 +63,7 @@ def spots(data: xr.DataTree) -> list[Spot]:
     """The checks."""
     if CHECKS not in data.children:
         return []
-    group, found = data[CHECKS].to_dataset().isel(scene=0), []
+    group, checks = data[CHECKS].to_dataset().isel(scene=0), []
     panels = {name: diagram(data, SCENE, name) for name in QUANTITIES}
     for name in group["integrator"].values:
         one = group.sel(integrator=name)
@@ -74,8 +74,8 @@ def spots(data: xr.DataTree) -> list[Spot]:
         costs = [
             1e9 * float(n) * diagrams.price(data, row) for n, row in zip(one["evaluations"].values, rows, strict=True)
         ]
-        found.append(Spot(quantity, target, horizon, rows, foretold, costs))
-    return found
+        checks.append(Spot(quantity, target, horizon, rows, foretold, costs))
+    return checks
 
 
 def spot_sentence(data: xr.DataTree) -> str:
@@ -110,7 +110,7 @@ class Share(NamedTuple):
 
 def winners(data: xr.DataTree, quantity: str) -> list[Share]:
     """Which rows own how much of the panels of an error, measured and predicted."""
-    found = []
+    shares = []
     for name in diagrams.tops_run(data):
         panel = diagram(data, name, quantity)
         won = panel.winner >= 0
@@ -118,8 +118,8 @@ def winners(data: xr.DataTree, quantity: str) -> list[Share]:
         owners = Counter(panel.names[k] for k in panel.winner[won].tolist())
         most = [(row, cells / count) for row, cells in owners.most_common(1 + NEXT)]
         close = float((panel.ratio[won] < TIE).mean()) if won.any() else 0.0
-        found.append(Share(named(name), int(won.sum()), int(panel.foretold.sum()), close, most))
-    return found
+        shares.append(Share(named(name), int(won.sum()), int(panel.foretold.sum()), close, most))
+    return shares
 
 
 def winners_sentence(data: xr.DataTree, quantity: str) -> str:

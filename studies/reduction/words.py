@@ -146,10 +146,10 @@ def larger_charts(data: xr.Dataset) -> list[Larger]:
 
 def larger_sentence(data: xr.Dataset) -> str:
     """What a larger chart costs, from the least to the most over families and charts; empty without any."""
-    found = sorted(larger_charts(data), key=lambda one: one.time)
-    if not found:
+    longer = sorted(larger_charts(data), key=lambda one: one.time)
+    if not longer:
         return ""
-    said = [f"{one.time:.2g} times as long ({one.chart} over {one.base}, {one.family})" for one in found]
+    said = [f"{one.time:.2g} times as long ({one.chart} over {one.base}, {one.family})" for one in longer]
     return (
         "A run in a larger chart, with the same steps or tolerances, takes in the median of a family "
         f"{' to '.join(dict.fromkeys((said[0], said[-1])))} over {CHART_PERIODS:g} nutations."
