@@ -15,6 +15,11 @@ from click.testing import CliRunner
 
 os.environ.setdefault("SYMTOP_CACHE", str(Path(__file__).resolve().parent.parent / ".pytest_cache" / "symtop"))
 
+# processes that tests start import dask only where they say so
+os.environ["PYTHONPATH"] = os.pathsep.join(
+    [str(Path(__file__).resolve().parent / "bare"), *filter(None, [os.environ.get("PYTHONPATH")])]
+)
+
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what runs in its background like that
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -43,6 +48,14 @@ def pytest_collection_modifyitems(items):
             item.add_marker("quick")
     place = {name: k for k, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path.stem, len(place)))
+
+
+@pytest.fixture(scope="module")
+def processes_with_dask():
+    """Processes that a file's tests start may import dask."""
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("SYMTOP_TESTS_DASK", "1")
+        yield
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ from benchmarks.peers.study import STUDY, measured
 from benchmarks.peers.summary import lines
 from symtop.base import datasets
 from symtop.report import style
-from symtop.runner import run, store
+from symtop.runner import conclude, store
 
 
 def main() -> None:
@@ -36,7 +36,7 @@ def main() -> None:
         data = datasets.describe(measure(peers, options.scenes), STUDY.title, question=STUDY.question)
         datasets.write(data, file)
         many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())
-    findings = run.findings_of(
+    findings = conclude.findings_of(
         STUDY, data, options.results, style.publish, failures=missing, cases=data["seconds"].count().item()
     )
     if many:

@@ -2,8 +2,8 @@
 
 import json
 import textwrap
-from collections import Counter
-from collections.abc import Callable, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from symtop.base.signals import INTERRUPTED, TERMINATED, TerminatedError, ending
 from symtop.base.validate import SymtopError
 from symtop.cli.common import terminal_width, warn
 from symtop.methods.registry import integrator
-from symtop.runner import check, run, scripts, status
+from symtop.runner import check, run, scripts, status, store
 from symtop.runner.pools import Workers
 from symtop.runner.study import Study
 
@@ -46,12 +46,12 @@ def conduct(task: Callable[[Workers], int], jobs: int | None, scheduler: str | N
 def run_all(
     workers: Workers, studies: list[Study], results: Path, fresh: bool, limit: float | None, as_json: bool, **grid: bool
 ) -> int:
-    """Bring studies up to date; 1 if cases failed."""
+    """Bring studies up to date, each concluded while the next one is computed; 1 if cases failed."""
     from symtop.report import style
 
     summaries: list[dict[str, Any]] = []
-    for study in studies:
-        findings = run.run(study, results, fresh=fresh, workers=workers, limit=limit, save=style.publish, **grid)
+    options = {"fresh": fresh, "limit": limit, "save": style.publish, "beside": len(studies) > 1, **grid}
+    for study, findings in _one_behind(workers, studies, results, options):
         summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
         summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
         summaries.append(summary)
@@ -65,6 +65,34 @@ def run_all(
     elif summaries:
         click.echo(f"next: symtop report --results {results}, one page of all findings")
     return 1 if any(summary["failures"] for summary in summaries) else 0
+
+
+def _one_behind(
+    workers: Workers, studies: list[Study], results: Path, options: dict[str, Any]
+) -> Iterator[tuple[Study, dict[str, Any]]]:
+    """Studies with their findings, each when the cases of the next one are computed; then what stopped one, if any."""
+    begun: deque[tuple[Study, Callable[[], dict[str, Any]]]] = deque()
+    refused: SymtopError | None = None
+    try:
+        for study in studies:
+            try:
+                begun.append((study, run.begin(study, results, workers, **options)))
+            except SymtopError as error:
+                refused = error
+                break
+            if len(begun) > 1:
+                yield begun[0][0], begun[0][1]()
+                begun.popleft()
+        while begun:
+            yield begun[0][0], begun[0][1]()
+            begun.popleft()
+    except BaseException:
+        workers.close()
+        for study, _ in begun:
+            store.tidy(results.resolve(), study)
+        raise
+    if refused is not None:
+        raise refused
 
 
 def _tell(study: Study, findings: dict[str, Any], results: Path) -> None:

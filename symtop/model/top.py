@@ -272,8 +272,6 @@ def nutation_cubic(top: Any, at: Any) -> tuple[float, float, float, float]:
 @functools.lru_cache(maxsize=1024)
 def _steady_theta(top: SymmetricTop, momenta: Momenta) -> float:
     """The minimum of V, kept: the guard, the scale of the energy and the landmarks of a new start ask for one."""
-    from scipy.optimize import brentq  # scipy.optimize costs 0.2 s to import
-
     if momenta.north == 0.0 and top._sleeps(momenta.south, top.mgl):
         return 0.0
     if momenta.south == 0.0 and top._sleeps(momenta.north, -top.mgl):
@@ -283,7 +281,24 @@ def _steady_theta(top: SymmetricTop, momenta: Momenta) -> float:
         return 0.0
     if top.potential_slope(above, momenta) <= 0.0:
         return math.pi
-    return float(brentq(top.potential_slope, below, above, args=(momenta,), xtol=4e-16, rtol=1e-15))
+    theta, before = 0.5 * math.pi, math.inf
+    while theta != before:
+        slope = float(top.potential_slope(theta, momenta))
+        below, above = (theta, above) if slope < 0.0 else (below, theta)
+        theta, before = _within(theta, slope, float(top.potential_curvature(theta, momenta)), below, above), theta
+    return theta
+
+
+def _within(theta: float, slope: float, curvature: float, below: float, above: float) -> float:
+    """A step of Newton's method, or half of the interval where that leaves it; the same angle at its end.
+
+    Half of the searches take 11 steps, the longest, next to a pole, 55; on spheroid 18 us, where SciPy's `brentq` takes
+    30, and 0.25 s to import.
+    """
+    newton = theta - slope / curvature if curvature > 0.0 else below
+    if abs(newton - theta) <= 2.0 * math.ulp(theta):  # what rounding leaves of the slope
+        return theta
+    return newton if below < newton < above else 0.5 * (below + above)
 
 
 @shared

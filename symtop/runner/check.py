@@ -13,8 +13,8 @@ import xarray as xr
 
 from symtop.base import datasets
 from symtop.runner import store
+from symtop.runner.cases import Round
 from symtop.runner.pools import Workers
-from symtop.runner.run import Round
 from symtop.runner.study import Combined, Study
 
 SAMPLE = 5  # cases of each study

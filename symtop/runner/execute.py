@@ -32,6 +32,8 @@ def execute(study: Study, tasks: Iterable[Task], workers: Workers, on_result: On
     for timed in (False, True):
         group = [task for task in chosen if study.is_timed(task.case) == timed]
         if group:
+            if timed:
+                workers.quieten()
             _run_until_done(study, group, workers, size_for(group, workers, timed=timed), on_result, timed=timed)
 
 

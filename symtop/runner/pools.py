@@ -8,7 +8,7 @@ import contextlib
 import multiprocessing
 import os
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
 from typing import Any
 
 from symtop.base import cluster
@@ -38,6 +38,8 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         self.jobs = jobs or cores()
         self.scheduler = scheduler
         self._client: Any = None
+        self._beside: ProcessPoolExecutor | None = None
+        self._promised: list[Future[Any]] = []
         self._pools: dict[int, Executor] = {HERE: InProcess()}
         if scheduler:
             self._client = cluster.connect(scheduler)
@@ -46,13 +48,29 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
     def pool(self, size: int) -> Executor:
         """The executor of so many processes, of HERE or of the CLUSTER."""
         if size not in self._pools:
-            context = multiprocessing.get_context("spawn")
-            self._pools[size] = ProcessPoolExecutor(size, context, work.begin_worker, (os.getpid(),))
+            self._pools[size] = self._spawned(size)
         return self._pools[size]
+
+    @staticmethod
+    def _spawned(size: int) -> ProcessPoolExecutor:
+        context = multiprocessing.get_context("spawn")
+        return ProcessPoolExecutor(size, context, work.begin_worker, (os.getpid(),))
 
     def open_size(self) -> int:
         """The size of the largest pool of processes that is open, or 0."""
         return max(self._pools, default=HERE)
+
+    def beside(self, function: Callable[..., Any], *args: Any) -> "Future[Any]":
+        """Call a function in one more process, which works beside the others."""
+        if self._beside is None:
+            self._beside = self._spawned(1)
+        self._promised = [future for future in self._promised if not future.done()]
+        self._promised.append(self._beside.submit(function, *args))
+        return self._promised[-1]
+
+    def quieten(self) -> None:
+        """Wait for what works beside the others."""
+        wait(self._promised)
 
     def width(self, size: int) -> int:
         """How many cases to hand over at a time: enough that nobody waits, few enough to stop soon."""
@@ -75,6 +93,9 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         """
         for size in list(self._pools):
             self.drop(size)
+        if self._beside is not None:
+            _kill(self._beside)
+        self._beside, self._promised = None, []
         self._leave()
 
     def _leave(self) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 from symtop.base import datasets, fingerprint
 from symtop.base.validate import SymtopError
 from symtop.runner import depends, store
-from symtop.runner.run import Round
+from symtop.runner.cases import Round
 from symtop.runner.study import Case, Study
 
 DONE, FAILED, STALE, MISSING = STATES = ("done", "failed", "stale", "missing")

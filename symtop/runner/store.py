@@ -288,10 +288,16 @@ def forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
 
 
 def tidy(results: Path, study: Study) -> None:
-    """Remove what processes that were killed have left beside the cases of a study, and nobody holds any more."""
+    """Remove what processes that were killed have left of a study's files, and nobody holds any more."""
     for lock in (results / "cases" / study.name).glob(".*.lock"):
         path = lock.with_name(f"{lock.stem[1:]}.nc")
         with locked(path, wait=False) as ours:
             if ours:
                 datasets.sweep(path)
                 trace_path(path).unlink(missing_ok=True)
+    with locked(results / f"{study.name}.nc", wait=False) as ours:
+        if ours:
+            for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
+                datasets.sweep(file)
+            for partial in (results / "figures").glob(f".{study.name}-*.part*"):
+                partial.unlink(missing_ok=True)

@@ -14,7 +14,7 @@ import pytest
 from tests.commands import PROBE, ended, leftovers, stop, symtop
 
 pytest.importorskip("distributed")
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask")]
 
 SECONDS = 30.0  # from what happens to the cluster to the end of the command
 STARTS = 10.0  # s that a command may take to import and to connect, on a machine with other work
@@ -59,7 +59,7 @@ def log(tmp_path):
 
 
 @pytest.fixture
-def cluster(log):
+def cluster(log, processes_with_dask):
     with contextlib.ExitStack() as stack:
         made = Cluster(log)
         stack.callback(made.end)

@@ -18,7 +18,11 @@ from symtop.runner.pools import Workers
 from tests.commands import PROBE, contents, ended, leftovers, symtop
 
 distributed = pytest.importorskip("distributed")
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]  # of the cluster's own making
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.usefixtures("processes_with_dask"),
+    pytest.mark.filterwarnings("ignore"),
+]  # of the cluster's own making
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +32,7 @@ def log(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def cluster(log):
+def cluster(log, processes_with_dask):
     with distributed.LocalCluster(
         n_workers=2,
         threads_per_worker=1,

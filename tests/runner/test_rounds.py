@@ -12,8 +12,8 @@ from symtop_studies.work_precision.timing_rounds import TimedRun
 
 from symtop.base import datasets
 from symtop.runner import execute, run as runner
+from symtop.runner.cases import Round
 from symtop.runner.pools import Workers
-from symtop.runner.run import Round
 
 ROUNDS = """
 import os

@@ -1,0 +1,130 @@
+"""Studies that are concluded in a process of their own, beside the next one: the same files, whatever happens to it."""
+
+import json
+import os
+
+import pytest
+from click.testing import CliRunner
+
+from symtop.base.validate import SymtopError
+from symtop.cli.main import main
+from symtop.runner import run as runner, store
+from symtop.runner.pools import Workers
+from tests.commands import contents, leftovers
+
+SCRIPT = """
+import os, signal
+import xarray as xr
+from symtop.base.validate import SymtopError
+from symtop.runner.study import Case, Study
+
+def cases(quick):
+    if NAME == "refused":
+        raise SymtopError("study refused has no grid")
+    return [Case("spheroid", name) for name in ("midpoint", "strang")]
+
+def measure(case):
+    return xr.Dataset({"letters": float(len(case.integrator))})
+
+def verdict(data):
+    if NAME == "killed" and os.getpid() != int(os.environ["SYMTOP_TESTS_PARENT"]):
+        os.kill(os.getpid(), signal.SIGKILL)
+    if NAME == "silent":
+        raise SymtopError("study silent has nothing to say")
+    return [str(float(data["letters"].sum())), f"said by {os.getpid()}"]
+
+STUDY = Study(NAME, NAME, "Who?", "", cases, measure, lambda data: [], verdict)
+"""
+
+
+@pytest.fixture
+def script(tmp_path, monkeypatch):
+    """Writes the study of a name, and returns its file."""
+    monkeypatch.setenv("SYMTOP_TESTS_PARENT", str(os.getpid()))
+
+    def written(name):
+        file = tmp_path / f"{name}.py"
+        file.write_text(f"NAME = {name!r}\n{SCRIPT}")
+        return str(file)
+
+    return written
+
+
+def studied(results, *files):
+    """Exit code and output of one command for several studies."""
+    done = CliRunner().invoke(main, ["study", *files, "--results", str(results), "--jobs", "2"])
+    return done.exit_code, done.output
+
+
+def said_by(results, name):
+    (sentence,) = [one for one in json.loads((results / f"{name}.json").read_text())["verdict"] if "said by" in one]
+    return int(sentence.split()[-1])
+
+
+def test_each_of_several_is_concluded_by_another_process_to_the_same_files(script, tmp_path):
+    files = [script("first"), script("second")]
+    code, told = studied(tmp_path / "together", *files)
+    assert code == 0, told
+    assert told.index("first: 2 of 2") < told.index("second: 2 of 2")
+    assert {said_by(tmp_path / "together", name) == os.getpid() for name in ("first", "second")} == {False}
+    for file in files:
+        assert studied(tmp_path / "alone", file)[0] == 0  # the control: one by itself has nothing to run beside
+    assert {said_by(tmp_path / "alone", name) for name in ("first", "second")} == {os.getpid()}
+    one, other = contents(tmp_path / "together"), contents(tmp_path / "alone")
+    assert one.keys() == other.keys()
+    assert len(one) == 6
+    assert all(one[name].identical(other[name]) for name in one)
+    assert "0 of 2 cases computed" in studied(tmp_path / "together", *files)[1]
+    assert not leftovers(tmp_path / "together")
+
+
+def test_a_process_that_is_killed_is_done_without(script, tmp_path):
+    code, told = studied(tmp_path / "r", script("killed"), script("second"))
+    assert code == 0, told
+    assert said_by(tmp_path / "r", "killed") == os.getpid()
+    assert said_by(tmp_path / "r", "second") == os.getpid()  # it had waited for the same process
+    assert not leftovers(tmp_path / "r")
+
+
+@pytest.mark.parametrize("bad", ["refused", "silent"])
+def test_what_stops_one_study_does_not_stop_those_before_it(script, tmp_path, bad):
+    code, told = studied(tmp_path / "r", script("first"), script(bad), script("second"))
+    assert code == 2
+    assert "first: 2 of 2 cases computed" in told
+    assert (tmp_path / "r" / "first.json").is_file()
+    assert f"study {bad} has" in told
+    assert not (tmp_path / "r" / "second.json").is_file()
+    assert not leftovers(tmp_path / "r")
+
+
+def test_timed_cases_wait_for_what_runs_beside(tmp_path):
+    """Or their times would be those of a machine that draws."""
+    with Workers(2) as workers:
+        promised = workers.beside(os.system, f"sleep 0.5; touch {tmp_path / 'done'}")
+        assert not promised.done()  # the control
+        workers.quieten()
+        assert (tmp_path / "done").is_file()
+        assert promised.done()
+
+
+def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
+    study = runner.load(script("first"))
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "cases" / "first").mkdir(parents=True)
+    left = [tmp_path / name for name in (".first.nc.x.part", ".first.json.y.part", "figures/.first-a.png.z.part.png")]
+    others = [tmp_path / name for name in (".other.nc.x.part", "figures/.other-a.png.z.part.png")]
+    for file in (*left, *others):
+        file.touch()
+    with store.locked(tmp_path / "first.nc", wait=True):
+        store.tidy(tmp_path, study)
+        assert all(file.is_file() for file in left)  # somebody writes them
+    store.tidy(tmp_path, study)
+    assert not any(file.is_file() for file in left)
+    assert all(file.is_file() for file in others)
+
+
+def test_a_study_that_says_nothing_is_told_when_it_is_asked(script, tmp_path):
+    with Workers(2) as workers:
+        answer = runner.begin(runner.load(script("silent")), tmp_path / "r", workers, quiet=True, beside=True)
+        with pytest.raises(SymtopError, match="study silent has nothing to say"):
+            answer()
