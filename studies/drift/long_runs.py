@@ -10,7 +10,9 @@ between its means over (0, c] and over (a, b], a >= c, such a walk has the varia
 Reference: Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,11 +20,14 @@ import xarray as xr
 
 from symtop.base.validate import whole
 from symtop.measure.growth import ensemble_growth
+from symtop.methods.loop import Loop
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
-from symtop.run.long_run import long_run
+from symtop.model.top import flat
+from symtop.run.long_run import QUANTITIES, chart_of, long_run, scattered, summary, watch, windows as windows_until
 
 SPACING = 0.01  # rad, between the starts of an ensemble
+MEAN = 2  # place of the mean among least, largest and mean
 PLAIN_MEMBERS = 8  # members that run with plain sums as well, for comparison
 
 
@@ -37,6 +42,31 @@ def members(scene: Scene, count: int) -> list[Scene]:
     number = whole("members", count, 1)
     starts = [replace(scene.start, theta=scene.start.theta + SPACING * k) for k in range(number)]
     return [Scene(f"{scene.name}-{k}", scene.top, start, scene.horizon) for k, start in enumerate(starts)]
+
+
+def side_by_side(
+    scenes: Sequence[Scene], method: Integrator, steps: int, per_nutation: float, *, compensated: bool
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Long runs of one method in one call, in lanes where its sums have them; each has the bits of `long_run`.
+
+    The steps at which windows end (windows,), and the least, largest and mean (members, windows, 3) of the quantities.
+    """
+    _, solver = chart_of(method)
+    if not compensated:
+        assert isinstance(solver.loop, Loop)  # noqa: S101
+        solver = replace(solver, loop=solver.loop.plain())
+    h = np.array([one.nutation_period / per_nutation for one in scenes])
+    ends = windows_until(steps)
+    stretches = [scattered(begin, end) for begin, end in pairwise([0, *ends])]
+    marks, cuts = np.concatenate(stretches), np.cumsum([0, *map(len, stretches)])
+    done = solver.many(np.array([flat(one.top, one.start) for one in scenes]), h, np.tile(marks, (len(scenes), 1)))
+    rows = np.empty((len(scenes), len(ends), len(QUANTITIES), 3))
+    for i, one in enumerate(scenes):
+        gauge = watch(one, method, float(h[i]))
+        for k, (first, last) in enumerate(pairwise(cuts)):
+            part = gauge(done.states[i, first:last], done.momenta[i, first:last], shown=True)
+            rows[i, k] = np.reshape(summary(part), (-1, 3))
+    return np.array(ends, dtype=float), {name: rows[:, :, q] for q, name in enumerate(QUANTITIES)}
 
 
 def elapsed_steps(ends: np.ndarray) -> np.ndarray:
@@ -58,13 +88,8 @@ def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, 
     """
     columns: dict[str, Any] = {}
     for prefix, compensated, many in (("", True, count), ("plain_", False, min(PLAIN_MEMBERS, count))):
-        runs = [
-            long_run(member, method, steps=steps, step_size=member.nutation_period / per_nutation,
-                     compensated=compensated, quiet=True)
-            for member in members(scene, many)
-        ]  # fmt: skip
-        ends = runs[0]["steps"].values
-        elapsed, drifts = elapsed_steps(ends), np.stack([run["modified_energy_mean"].values for run in runs])
+        ends, seen = side_by_side(members(scene, many), method, steps, per_nutation, compensated=compensated)
+        elapsed, drifts = elapsed_steps(ends), seen["modified_energy"][..., MEAN]
         grown = ensemble_growth(elapsed, drifts, ends[0])
         columns["elapsed"] = ("window", elapsed)
         columns[f"{prefix}drift"] = ((f"{prefix}member", "window"), drifts)
@@ -72,8 +97,7 @@ def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, 
         columns[f"{prefix}end"] = float(grown.rms[-1])
         columns[f"{prefix}exponent"], columns[f"{prefix}exponent_interval"] = grown.fit.slope, grown.fit.interval
         for momentum in ("p_phi", "p_psi") if compensated else ():
-            changes = [np.abs(run[f"{momentum}_{part}"].values) for run in runs for part in ("least", "largest")]
-            columns[momentum] = float(np.max(changes))
+            columns[momentum] = float(np.abs(seen[momentum]).max())
     late = elapsed > 0.1 * elapsed[-1]
     for prefix in ("", "plain_"):
         walks = columns[f"{prefix}drift"][1][:PLAIN_MEMBERS, late]

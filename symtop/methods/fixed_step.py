@@ -19,6 +19,8 @@ from symtop.methods.registry import Array, Solver
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop, flat
 
+LONGEST = 2  # stretches of the longest member that `many` steps with others; at its end an interrupt is heard
+
 Prepare = Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]
 Present = Callable[[Any, Array, Array], Array]
 
@@ -99,7 +101,7 @@ class FixedStep:
         marks = np.ascontiguousarray(marks)
         whole, check = self._whole, getattr(self.prepare, "check", None)
         out = refused(check, numbers)
-        alone = ~out & (self.in_python | (marks[:, -1] > loops.BLOCK))
+        alone = ~out & (self.in_python | (marks[:, -1] > LONGEST * loops.BLOCK))
         tops = zip(np.flatnonzero(alone).tolist(), members_of(numbers[alone]), strict=True)
         runs, most = dict[int, Run](), min(GROUP, loops.BLOCK)
         for i, top in tops:

@@ -40,7 +40,7 @@ from symtop.run import modified_energy as modified
 from symtop.run.simulation import MOST_STEPS
 
 Array = np.ndarray
-Gauge = Callable[[Array, Array], dict[str, Array]]  # states and momenta of samples -> quantities
+Gauge = Callable[..., dict[str, Array]]  # states and momenta of samples -> quantities
 
 PER_NUTATION = 1000.37  # steps, where nobody says otherwise: not commensurate with the nutation
 FIRST = 10_000  # steps of the first window
@@ -80,7 +80,8 @@ def chart_of(method: Integrator) -> tuple[str, FixedStep]:
 def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     """Relative changes of energy, modified energy and momenta since the start, and theta, of any samples of a run.
 
-    The oscillation that the modified energy leaves is fitted on the first `FIRST` steps, which are run here.
+    The oscillation that the modified energy leaves is fitted on the first `FIRST` steps, which are run here. States are
+    the loop's own, or, where they are `shown`, those of the chart.
     """
     chart, solver = chart_of(method)
     par, rule, state = solver.setup(scene.top, scene.start, h)
@@ -99,8 +100,8 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
         *modified.section(chart, first), modified.modified_energy(scene, method, chart, first, h)
     )
 
-    def gauge(states: Array, momenta: Array) -> dict[str, Array]:
-        states = presented(states)
+    def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
+        states = states if shown else presented(states)
         values = modified.modified_energy(scene, method, chart, states, h)
         return {
             "energy": (modified.energy(scene, chart, states) - energy_start) / energy_unit,
@@ -148,7 +149,7 @@ def long_run(
             done, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))
             outcome, reached = done.outcome, after.k
             if outcome == OK:
-                rows.append(_summary(gauge(done.states, done.momenta)))
+                rows.append(summary(gauge(done.states, done.momenta)))
                 bar.update(after.k - at.k)
                 at = after
                 book.note(at, rows)
@@ -168,7 +169,7 @@ def long_run(
     )  # fmt: skip
 
 
-def _summary(values: dict[str, Array]) -> list[float]:
+def summary(values: dict[str, Array]) -> list[float]:
     """Least, largest and mean of each quantity, in their order."""
     return [
         float(part) for name in QUANTITIES for part in (values[name].min(), values[name].max(), values[name].mean())
@@ -181,7 +182,7 @@ def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensate
     Code counts as it is compiled (`symtop.base.walk`), so that a checkpoint outlives a comment.
     """
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (scene.top, scene.start)]
-    made = code_of((method, watch, windows, scattered, _summary))
+    made = code_of((method, watch, windows, scattered, summary))
     return digest({
         **made.values(), **file_reasons(made.closure()),
         "numbers": hashed(json.dumps([numbers, h, steps, compensated, FIRST, PER_DECADE, LONGEST, SAMPLES])),

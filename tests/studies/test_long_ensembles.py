@@ -1,0 +1,48 @@
+"""The ensemble of the drift study: windows of many long runs at once, with the bits of one long run each."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from symtop_studies.drift.long_runs import members, rounding, side_by_side
+
+from symtop.methods import loop as loops
+from symtop.methods.registry import integrator
+from symtop.model.scenes import scene
+from symtop.run.long_run import QUANTITIES, long_run
+
+PER_NUTATION = 1000.37
+PARTS = ("least", "largest", "mean")
+
+
+@pytest.mark.parametrize("compensated", [True, False])
+@pytest.mark.parametrize("name", ["midpoint[angles]", "cayley[axis]"])
+def test_each_has_the_bits_of_a_long_run(name, compensated):
+    method, scenes = integrator(name), members(scene("spheroid"), 6)  # enough for lanes
+    ends, seen = side_by_side(scenes, method, 20_000, PER_NUTATION, compensated=compensated)
+    for i, one in ((0, scenes[0]), (5, scenes[5])):
+        h = one.nutation_period / PER_NUTATION
+        alone = long_run(one, method, steps=20_000, step_size=h, compensated=compensated, quiet=True)
+        np.testing.assert_array_equal(ends, alone["steps"])
+        for quantity in QUANTITIES:
+            for k, part in enumerate(PARTS):
+                np.testing.assert_array_equal(seen[quantity][i, :, k], alone[f"{quantity}_{part}"])
+    others = [seen["modified_energy"][i] for i in range(6)]
+    assert not any(np.array_equal(one, other) for one, other in pairwise(others))  # each is a run of its own
+
+
+def test_the_ordinary_ensemble_goes_in_lanes():
+    """Ten million steps are two stretches of the loop: longer members would run one after another, 8 times slower."""
+    steps = 10_000_000
+    assert steps <= 2 * loops.BLOCK
+    for name in ("midpoint[angles]", "stormer-verlet[angles]", "strang[axis]", "cayley[axis]"):
+        row = integrator(name)
+        assert row.solvers[row.charts()[0]].in_lanes
+
+
+def test_plain_sums_drift_more_than_compensated_ones():
+    data = rounding(scene("spheroid"), integrator("strang[axis]"), 300_000, PER_NUTATION, 4)
+    assert float(data["gain"]) > 3.0
+    assert data.sizes["member"] == data.sizes["plain_member"] == 4
+    assert float(data["p_psi"]) < 1e-12
+    assert np.abs(data["drift"].values[:, -1]).max() < 1e-11
