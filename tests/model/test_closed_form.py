@@ -275,10 +275,11 @@ def test_a_form_that_is_wrong_in_the_fifteenth_digit_breaks_the_claim(monkeypatc
 
 
 @pytest.mark.slow
-def test_ten_thousand_tops_keep_the_accuracy_and_need_no_more_than_quad_double():
-    found = accuracy.measure(385, jobs=2)  # 26 families
+def test_a_thousand_tops_keep_the_accuracy_and_need_no_more_than_quad_double():
+    """`python -m benchmarks.accuracy` measures ten thousand."""
+    found = accuracy.measure(40, jobs=2)  # 26 families
     print("\n".join(accuracy.lines(found)))
-    assert found.tops >= 10_000
+    assert found.tops >= 1000
     assert found.broken == []
     assert found.share("double-double") > 0.7
     assert found.share("40 digits") == 0.0
