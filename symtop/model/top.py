@@ -29,6 +29,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from symtop.base.numbers import newton_between
 from symtop.base.parts import inlined, shared
 from symtop.base.validate import SymtopError, finite, not_negative, positive
 from symtop.model import starts
@@ -281,24 +282,10 @@ def _steady_theta(top: SymmetricTop, momenta: Momenta) -> float:
         return 0.0
     if top.potential_slope(above, momenta) <= 0.0:
         return math.pi
-    theta, before = 0.5 * math.pi, math.inf
-    while theta != before:
-        slope = float(top.potential_slope(theta, momenta))
-        below, above = (theta, above) if slope < 0.0 else (below, theta)
-        theta, before = _within(theta, slope, float(top.potential_curvature(theta, momenta)), below, above), theta
-    return theta
-
-
-def _within(theta: float, slope: float, curvature: float, below: float, above: float) -> float:
-    """A step of Newton's method, or half of the interval where that leaves it; the same angle at its end.
-
-    Half of the searches take 11 steps, the longest, next to a pole, 55; on spheroid 18 us, where SciPy's `brentq` takes
-    30, and 0.25 s to import.
-    """
-    newton = theta - slope / curvature if curvature > 0.0 else below
-    if abs(newton - theta) <= 2.0 * math.ulp(theta):  # what rounding leaves of the slope
-        return theta
-    return newton if below < newton < above else 0.5 * (below + above)
+    return newton_between(
+        lambda theta: float(top.potential_slope(theta, momenta)),
+        lambda theta: float(top.potential_curvature(theta, momenta)), below, above,
+    )  # fmt: skip
 
 
 @shared

@@ -37,6 +37,7 @@ from symtop.model.view import View, axis_of
 NUDGE = 1e-6  # rad: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
 SINGLE_NUDGE = 1e-3  # rad, of a method in single precision: rounding is 1e-4
 BEGUN = 4  # strides before those that are compared: a multistep method has begun by then
+ROUNDING = 32.0 * EPSILON  # of an inclination after some steps, rad
 LEFT, LEFT_OUT = 2e-3, 5e-4  # of the difference that the recurrence may leave; of a method that leaves out a term: less
 STRIDE = 0.5  # rad of nutation between two places of a recurrence of `nutation_growth`
 SLOWEST = 1e-6  # growth of a step below which rounding adds up for a million of them
@@ -64,6 +65,7 @@ class Trace(NamedTuple):
     trace: float  # NaN if the method has no fixed point near the steady precession
     determinant: float
     theta: float  # the fixed point
+    doubt: float = 0.0  # of the trace: rounding over the way that theta goes, which is short where a step turns it back
 
     @property
     def growth(self) -> float:
@@ -102,12 +104,14 @@ def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None, 
         if run.outcome != "ok" or not np.isfinite(y).all():
             return NO_TRACE
         t, d, c = _recurrence(y, symmetric=bool(method.symmetric))
-        denominator = 1.0 - t + d
+        denominator, doubt = 1.0 - t + d, ROUNDING / max(float(np.ptp(y)), TINY)
+        if abs(denominator) <= doubt and abs(c) <= doubt * NUDGE:  # every inclination stays where it is
+            return Trace(t, d, theta, doubt)
         if denominator == 0.0:
             return NO_TRACE
         last, moved = moved, abs(c / denominator)
         if moved < NUDGE:
-            return Trace(t, d, theta)
+            return Trace(t, d, theta, doubt)
         if moved > 2.0 * last:
             return NO_TRACE
         theta += c / denominator
@@ -257,7 +261,7 @@ def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[f
     def unstable(at: Trace) -> bool:
         if not method.symmetric:
             return not at.growth <= 1.0 + GROWING
-        return not -2.0 <= at.trace <= 2.0 + STEADILY  # small steps have t just below 2, up to rounding
+        return not -2.0 - at.doubt <= at.trace <= 2.0 + max(STEADILY, at.doubt)  # small steps have t just below 2
 
     def turned(at: Trace) -> bool:
         return at.trace <= -1.0
