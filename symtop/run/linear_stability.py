@@ -258,17 +258,17 @@ def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[f
     """
     traces = [trace(method, scene, float(h)) for h in grid]
 
-    def unstable(at: Trace) -> bool:
+    def unstable(at: Trace, doubt: float = 0.0) -> bool:
         if not method.symmetric:
             return not at.growth <= 1.0 + GROWING
-        return not -2.0 - at.doubt <= at.trace <= 2.0 + max(STEADILY, at.doubt)  # small steps have t just below 2
+        return not -2.0 - doubt <= at.trace <= 2.0 + max(STEADILY, doubt)  # small steps have t just below 2
 
-    def turned(at: Trace) -> bool:
+    def turned(at: Trace, _: float = 0.0) -> bool:
         return at.trace <= -1.0
 
     ends = []
     for happens in (unstable, turned):
-        first = next((k for k, at in enumerate(traces) if happens(at)), 0)
+        first = next((k for k, at in enumerate(traces) if happens(at, at.doubt)), 0)
         a, b = (float(grid[first - 1]), float(grid[first])) if first else (math.nan, math.nan)
         for _ in range(40 if first else 0):
             middle = 0.5 * (a + b)
