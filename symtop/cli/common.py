@@ -4,6 +4,7 @@ import errno
 import re
 import shutil
 import sys
+import tempfile
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +14,7 @@ import click
 
 from symtop.base import cache
 from symtop.base.signals import told_apart
-from symtop.base.validate import SymtopError
+from symtop.base.validate import SymtopError, place
 
 LONGEST_NAME = 80  # characters of a file that are told
 FIGURES = (".png", ".svg", ".pdf")
@@ -134,9 +135,16 @@ def figure_file(option: str, file: str | None) -> None:
 
 
 def standing(option: str, file: str | None) -> None:
-    """Refuse a file whose folder is not there: a run should not end before its result has a place."""
-    if file is not None and not (file and Path(file).absolute().parent.is_dir()):
+    """Refuse a file whose folder is not there or not to be written to: a result should have a place before a run."""
+    if file is None:
+        return
+    if not (file and Path(file).absolute().parent.is_dir()):
         raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
+    try:
+        with tempfile.TemporaryFile(dir=place(option, file).absolute().parent):
+            pass
+    except OSError as error:
+        raise SymtopError(f"cannot write {file}: {error.strerror or error}") from error
 
 
 def terminal_width() -> int:

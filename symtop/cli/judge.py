@@ -5,7 +5,7 @@ import sys
 
 import click
 
-from symtop.cli.common import json_option, plugin_option, terminal_width
+from symtop.cli.common import json_option, plugin_option, standing, terminal_width
 from symtop.cli.completion import completing
 
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
@@ -63,6 +63,8 @@ def judge(
         if shown:
             click.echo(shown)
 
+    for option, file in (("--output", output), ("--card", card), ("--badge", badge)):
+        standing(option, file)
     width = terminal_width()
     ledger = judged(
         target, form=form, chart=chart, scene=scene, order=order, symplectic=symplectic, symmetric=symmetric,

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from symtop_studies.drift.long_runs import members, rounding, side_by_side
+from symtop_studies.drift.long_runs import members, side_by_side
 
 from symtop.methods import loop as loops
 from symtop.methods.registry import integrator
@@ -38,11 +38,3 @@ def test_the_ordinary_ensemble_goes_in_lanes():
     for name in ("midpoint[angles]", "stormer-verlet[angles]", "strang[axis]", "cayley[axis]"):
         row = integrator(name)
         assert row.solvers[row.charts()[0]].in_lanes
-
-
-def test_plain_sums_drift_more_than_compensated_ones():
-    data = rounding(scene("spheroid"), integrator("strang[axis]"), 300_000, PER_NUTATION, 4)
-    assert float(data["gain"]) > 3.0
-    assert data.sizes["member"] == data.sizes["plain_member"] == 4
-    assert float(data["p_psi"]) < 1e-12
-    assert np.abs(data["drift"].values[:, -1]).max() < 1e-11
