@@ -1,6 +1,6 @@
 """Measurements of single mechanisms of failure: resonance, the separatrix, and sampling.
 
-`surviving_displacement` displaces a steady precession and finds how far it may be displaced without running away within
+`surviving_displacements` displaces a steady precession and finds how far that may be without its running away within
 some thousands of steps. A linear analysis calls every step below the limit stable; at a third of a turn a step
 (`linear_stability`) hardly any displacement survives all the same.
 
@@ -14,16 +14,20 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, sections I.5 an
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from symtop.methods.calling import solve
-from symtop.methods.plan import Plan
+from symtop.methods.fixed_step import FixedStep
+from symtop.methods.outcomes import OUTCOMES
+from symtop.methods.plan import Array, Plan
 from symtop.methods.registry import Integrator
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
-from symtop.model.top import Angles
+from symtop.model.top import Angles, flat
 from symtop.model.view import View
 from symtop.run.linear_stability import trace, with_momenta
 
@@ -40,39 +44,55 @@ def _run(method: Integrator, scene: Scene, start: Angles, plan: Plan) -> tuple[s
     return run.outcome, View(chart, scene.top, run.states, run.p_phi, run.p_psi)
 
 
-def survives(method: Integrator, scene: Scene, centre: float, displacement: float, h: float, steps: int) -> bool:
-    """Does a steady precession at theta = `centre` that is displaced by so many radians stay near itself?"""
-    momenta = scene.top.momenta(scene.start)
-    start = with_momenta(scene.top, centre + displacement, momenta)
+def survives(
+    method: Integrator, scene: Scene, centres: ArrayLike, displacements: ArrayLike, h: ArrayLike, steps: int
+) -> NDArray[np.bool_]:
+    """Do steady precessions at theta = `centres` stay near themselves that are displaced by so many radians?
+
+    Arrays over runs, which are made in one call where the method has one, in lanes if it can.
+    """
+    centres, displacements, h = np.broadcast_arrays(*(np.asarray(one, float) for one in (centres, displacements, h)))
+    momenta, chart = scene.top.momenta(scene.start), method.chart_for("axis")
+    starts = [with_momenta(scene.top, theta, momenta) for theta in (centres + displacements).ravel().tolist()]
     marks = np.unique(np.linspace(0, steps, 400).astype(np.int64))
-    outcome, seen = _run(method, scene, start, Plan.steps(h, marks))
-    with np.errstate(over="ignore"):  # a run may have blown up
-        away = np.abs(seen.theta - centre)
-    return outcome == "ok" and bool(np.nanmax(away) <= RUNS_AWAY * displacement)
+    solver = method.solvers[chart]
+    with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
+        if isinstance(solver, FixedStep):
+            numbers = np.array([flat(scene.top, start) for start in starts])
+            done = solver.many(numbers, h.ravel(), np.tile(marks, (len(starts), 1)))
+            theta, well = View(chart, scene.top, done.states).theta, done.outcome == OUTCOMES.index("ok")
+        else:
+            each = zip(starts, h.ravel().tolist(), strict=True)
+            runs = [_run(method, scene, start, Plan.steps(one, marks)) for start, one in each]
+            theta, well = np.stack([seen.theta for _, seen in runs]), np.array([outcome == "ok" for outcome, _ in runs])
+        away = np.abs(theta - centres.reshape(-1, 1)).max(axis=1)
+        stays: NDArray[np.bool_] = well & (away <= RUNS_AWAY * displacements.ravel())
+    return stays.reshape(h.shape)
 
 
-def surviving_displacement(
-    method: Integrator, scene: Scene, h: float, steps: int, least: float = 1e-4, most: float = 0.3, rounds: int = 4
-) -> float:
-    """The largest displacement, rad, up to which all that are tried survive; 0 if not even `least` does.
+def surviving_displacements(
+    method: Integrator, scene: Scene, h: Sequence[float], steps: int, least: float = 1e-4, most: float = 0.3,
+    rounds: int = 4,
+) -> Array:  # fmt: skip
+    """For each step h the largest displacement, rad, up to which all that are tried survive; 0 if not even `least`.
 
     It is measured from the fixed point of the method, which for a splitting is O(h^2) away from the true one. Where the
-    method has none that four steps can find, nothing survives.
+    method has none that four steps can find, nothing survives; where h is NaN there is nothing to measure.
     """
-    centre = trace(method, scene, h).theta
-    if not math.isfinite(centre):
-        return 0.0
-    good = 0.0
-    for value in np.geomspace(least, most, 12):
-        if not survives(method, scene, centre, float(value), h, steps):
-            bad = float(value)
-            break
-        good = float(value)
-    else:
-        return good
-    for _ in range(rounds if good else 0):
-        middle = math.sqrt(good * bad)
-        good, bad = (middle, bad) if survives(method, scene, centre, middle, h, steps) else (good, middle)
+    step, tried = np.asarray(h, float), np.geomspace(least, most, 12)
+    centre = np.array([trace(method, scene, one).theta if math.isfinite(one) else math.nan for one in step.tolist()])
+    there = np.flatnonzero(np.isfinite(centre))
+    good, bad = np.where(np.isfinite(step), 0.0, math.nan), np.full(step.shape, math.nan)
+    if there.size:
+        lost = ~survives(method, scene, centre[there, np.newaxis], tried, step[there, np.newaxis], steps)
+        first = np.where(lost.any(axis=1), lost.argmax(axis=1), tried.size)
+        good[there] = np.where(first > 0, tried[np.maximum(first - 1, 0)], 0.0)
+        bad[there] = np.append(tried, math.nan)[first]
+    sought = np.flatnonzero((good > 0.0) & np.isfinite(bad))
+    for _ in range(rounds if sought.size else 0):
+        middle = np.sqrt(good[sought] * bad[sought])
+        stays = survives(method, scene, centre[sought], middle, step[sought], steps)
+        good[sought], bad[sought] = np.where(stays, middle, good[sought]), np.where(stays, bad[sought], middle)
     return good
 
 

@@ -17,7 +17,7 @@ from symtop.model import scenes
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import linear_limits, sleeping_threshold, with_momenta
 
-from .failures import sampled_energy_error, separatrix_horizon, surviving_displacement
+from .failures import sampled_energy_error, separatrix_horizon, surviving_displacements
 from .outcome_maps import family, outcome_map
 from .solver_tolerance import solver_sweep, textbook_midpoint
 
@@ -104,18 +104,17 @@ def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) 
     phases = np.asarray(settings["phases"], float)
     limit, third = linear_limits(method, scene, np.linspace(0.02, SOUGHT_PHASE, 300) / omega)
 
-    def surviving(h: float) -> float:
-        return surviving_displacement(method, scene, h, settings["steps"]) if math.isfinite(h) else math.nan
-
+    steps = [*(phases / omega).tolist(), third, PAST_RESONANCE * third]
+    *surviving, at_third, past_third = surviving_displacements(method, scene, steps, settings["steps"]).tolist()
     columns: dict[str, Any] = {
         Column.PHASE: ("phase", phases),
-        Column.SURVIVING: ("phase", [surviving(float(x) / omega) for x in phases]),
+        Column.SURVIVING: ("phase", surviving),
         Column.DISPLACED_STEPS: float(settings["steps"]),
         Column.LIMIT_PHASE: limit * omega,
         Column.THIRD_TURN_PHASE: third * omega,
         Column.SOUGHT_PHASE: SOUGHT_PHASE,
-        Column.SURVIVING_AT_THIRD_TURN: surviving(third),
-        Column.SURVIVING_PAST_THIRD_TURN: surviving(PAST_RESONANCE * third),
+        Column.SURVIVING_AT_THIRD_TURN: at_third,
+        Column.SURVIVING_PAST_THIRD_TURN: past_third,
     }
     return xr.Dataset(columns)
 
