@@ -67,7 +67,7 @@ def draw(data: xr.DataTree, name: str) -> Picture:
     axes[0][0].set_ylabel("largest error allowed")
     keys = [Patch(facecolor=colors[name], label=_key(name, rows)) for name, rows in groups.items()]
     keys += [
-        Patch(facecolor="white", edgecolor="#777777", hatch=HATCH, label="hatched: foretold, not run"),
+        Patch(facecolor="white", edgecolor="#777777", hatch=HATCH, label="hatched: predicted, not run"),
         Patch(facecolor=UNREACHED, edgecolor="#BBBBBB", label="reached by no method: not counted"),
         Line2D([], [], **LEVEL, label=f"dot: another costs less than {TIE:g} times as much"),
     ]
@@ -75,7 +75,7 @@ def draw(data: xr.DataTree, name: str) -> Picture:
     figure.legends[0].set_title(
         "Cheapest: the least time of a run, its force evaluations times the measured time of one, among "
         f"{len(words.taking_part(data))} methods.\n{words.foretold_share(data, name):.0%} of the cells that any of "
-        "them reaches are foretold."
+        "them reaches are predicted."
     )
     headline(figure, words.message(data, name))
     tops = "random tops (medians)" if name == POPULATION else f"the scene {name}"
@@ -84,11 +84,11 @@ def draw(data: xr.DataTree, name: str) -> Picture:
         "map" if name == POPULATION else name,
         figure,
         f"The cheapest row, method[chart], or its family, for an allowed error up to a horizon, on {place}; every row "
-        "has the step or tolerance that suits a cell. Phase is the angle between the axes at one time, energy is "
+        "has the step or tolerance that suits a cell. Axis is the angle between the axes at one time, energy is "
         "relative to E0 - min V, shape is the distance of height and vertical velocity from the true orbit, whatever "
-        "the delay. A name is that of the method with the most cells of a region. Hatched (foretold, not run): "
+        "the delay. A name is that of the method with the most cells of a region. Hatched cells were not run: they are "
         f"predicted from the measured growth of the winner's own run. {words.level_sentence(data, name)}",
-        f"Three maps of the cheapest method over horizon and allowed error on {tops}: phase, energy and shape.",
+        f"Three maps of the cheapest method over horizon and allowed error on {tops}: axis, energy and shape.",
         lead="Cheapest by error and run length" if name == POPULATION else "",
     )
 

@@ -15,7 +15,7 @@ from .tables import CHECKS, LADDERS, SCENE, TARGETS, TIE, diagram
 
 CLOSE = 0.2  # of the cost: a foretold cell within it is right
 PANELS = {
-    "axis": "phase: angle between the axes (rad)",
+    "axis": "axis: angle between the axes (rad)",
     "energy": "energy: relative change",
     "shape": "shape: distance to the true orbit",
 }
@@ -168,7 +168,7 @@ def message(data: xr.DataTree, name: str) -> str:
     shares: dict[str, list[str]] = {}
     for quantity, (row, share) in leaders(data, name).items():
         said = f"{share:.0%}{'' if shares else ' of the cells that any method reaches'} for "
-        shares.setdefault(row, []).append(said + quantity.replace("axis", "phase"))
+        shares.setdefault(row, []).append(f"{said}the {quantity}")
     each = "; ".join(f"{row} is the cheapest method in {', '.join(parts)}" for row, parts in shares.items())
     return f"On {'' if name == POPULATION else 'the scene '}{named(name)} {each}"
 
