@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.measure.step_map import generic_start, one_step
+from symtop.measure.step_map import generic_start, one_step, restart_gap
 from symtop.measure.step_series import compared, step_series
 
 SPHEROID = symtop.scene("spheroid")
@@ -33,11 +33,17 @@ def test_the_series_of_every_method_has_its_order():
     for method in symtop.integrators().values():
         if method.fixed_step and method.name != "cayley-tuned":  # it is tuned by its start, and no one map
             for chart in method.charts():
-                found = series(method, chart)
+                found, which = series(method, chart), (method.name, chart)
+                gap = restart_gap(one_step(method, chart, SPHEROID, 0.01), generic_start(SPHEROID))
                 if method.exact_steps:
-                    assert not found.seen, (method.name, chart)
+                    assert not found.seen, which
+                elif method.order is None:  # engines that leave out a term, or round to single precision
+                    assert found.seen, which
+                    assert found.order <= 1, which
+                elif gap > 1e-6:  # one step from a start has not what a run carries from step to step
+                    assert found.order < method.order, which
                 else:
-                    assert found.order == method.order or found.order > method.order > 8, (method.name, chart)
+                    assert found.order == method.order or (method.order > 8 and not found.seen), which
 
 
 @pytest.mark.parametrize("off", [3e-8, 1e-9])
