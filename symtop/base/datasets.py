@@ -24,7 +24,7 @@ import numpy as np
 import xarray as xr
 
 from symtop import __version__
-from symtop.base.fingerprint import version
+from symtop.base.fingerprint import processor, version
 from symtop.base.signals import deferred
 from symtop.base.strangers import words_of
 from symtop.base.validate import SymtopError
@@ -86,14 +86,6 @@ def _git(*words: str) -> str:
         return ""
 
 
-def _processor() -> str:
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
-
-
 @functools.cache
 def provenance() -> dict[str, str]:
     """What made a dataset: versions, revision, machine. Flat strings, as netCDF wants them."""
@@ -105,7 +97,7 @@ def provenance() -> dict[str, str]:
         "python_version": platform.python_version(),
         "dependencies": json.dumps({package: version(package) for package in _DEPENDENCIES}, sort_keys=True),
         "platform": f"{platform.system()} {platform.machine()}",
-        "processor": _processor(),
+        "processor": processor(),
     }
 
 

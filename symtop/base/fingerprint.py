@@ -11,6 +11,7 @@ number is stale. Cases of studies, cached kernels and references, checkpoints an
 `symtop.base.walk` finds the labels of a value.
 """
 
+import contextlib
 import functools
 import hashlib
 import importlib.metadata
@@ -76,6 +77,16 @@ def version(package: str) -> str:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:
         return "absent"
+
+
+@functools.cache
+def processor() -> str:
+    """The name of this machine's processor."""
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
 
 
 def packages(*names: str) -> Reasons:

@@ -6,6 +6,7 @@ A command imports heavy packages inside its function, so that ``symtop --help`` 
 """
 
 import sys
+import time
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -75,8 +76,6 @@ def study(
     symtop study --all --status --why
     symtop study convergence --scheduler tcp://10.0.0.1:8786
     """
-    from symtop.cli import study as command
-
     if why and not status:
         raise SymtopError("--why must be given together with --status")
     if quick and full:
@@ -85,12 +84,32 @@ def study(
         positive("limit", limit)
     chosen = only.split(",") if only is not None else []
     folder = Path(results, *filter(None, ("quick" * quick, "only" * bool(chosen))))
+    plain = not (names or only is not None or status or check or click.get_current_context().meta.get(PLUGINS))
+    if every and plain and not fresh and not scheduler and _nothing_to_do(folder, quick, full, as_json):
+        return
+    from symtop.cli import study as command
+
     shared: Any = {"studies": command.choose(names, every=every, only=chosen), "results": folder, "as_json": as_json}
     shared |= {"quick": quick, "full": full}
     if status:
         sys.exit(command.show_status(why=why, **shared))
-    task = partial(command.check_all, everything=fresh) if check else partial(command.run_all, fresh=fresh, limit=limit)
+    task = partial(command.check_all, everything=fresh) if check else partial(command.run_all, fresh=fresh, limit=limit,
+                                                                              whole=every and plain)  # fmt: skip
     sys.exit(command.conduct(partial(task, **shared), jobs, scheduler))
+
+
+def _nothing_to_do(results: Path, quick: bool, full: bool, as_json: bool) -> bool:
+    """Is every study up to date? Then its findings are told."""
+    from symtop.cli import told
+    from symtop.runner import settled
+
+    began = time.monotonic()
+    found = settled.findings(results, settled.grid_of(quick=quick, full=full))
+    for findings in found or ():
+        findings |= {"computed": 0, "seconds": time.monotonic() - began}
+    if found is not None:
+        told.end([told.study(findings, results, as_json=as_json) for findings in found], results, as_json=as_json)
+    return found is not None
 
 
 @main.command(short_help="Gather the findings of all studies into one page.")

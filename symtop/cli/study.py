@@ -1,7 +1,6 @@
 """The command ``symtop study``: run several studies, show their status, or check them; ends with an exit code."""
 
 import json
-import textwrap
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -11,13 +10,13 @@ import click
 
 from symtop.base.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
 from symtop.base.validate import SymtopError
-from symtop.cli.common import terminal_width, warn
+from symtop.cli import told
+from symtop.cli.common import warn
 from symtop.methods.registry import integrator
-from symtop.runner import check, run, scripts, status, store
+from symtop.runner import check, run, scripts, settled, status, store
 from symtop.runner.pools import Workers
 from symtop.runner.study import Study
 
-MOST_TOLD = 3  # sentences of a study that has run
 MOST_NAMED = 8  # integrators and scenes in a line of the status
 
 
@@ -44,33 +43,27 @@ def conduct(task: Callable[[Workers], int], jobs: int | None, scheduler: str | N
 
 
 def run_all(
-    workers: Workers, studies: list[Study], results: Path, fresh: bool, limit: float | None, as_json: bool, **grid: bool
-) -> int:
+    workers: Workers, studies: list[Study], results: Path, fresh: bool, limit: float | None, as_json: bool,
+    whole: bool = False, **grid: bool,
+) -> int:  # fmt: skip
     """Bring studies up to date, each concluded while the next one is computed; 1 if cases failed."""
     from symtop.report import style
 
-    summaries: list[dict[str, Any]] = []
+    made = settled.made_by(settled.grid_of(**grid)) if whole else ""  # before an edit of the code may change it
     options = {"fresh": fresh, "limit": limit, "save": style.publish, "beside": len(studies) > 1, **grid}
-    for study, findings in _one_behind(workers, studies, results, options):
-        summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
-        summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
-        summaries.append(summary)
-        if not as_json:
-            click.echo("{study}: {computed} of {cases} cases computed, {figures} figures".format(**summary))
-            _tell(study, findings, results)
-        for failure in findings["failures"]:
-            click.echo(f"  {failure}", err=True)
-    if as_json:
-        click.echo(json.dumps(summaries, indent=1))
-    elif summaries:
-        click.echo(f"next: symtop report --results {results}, one page of all findings")
-    return 1 if any(summary["failures"] for summary in summaries) else 0
+    ended = _one_behind(workers, studies, results, options)
+    summaries = [told.study(findings, results, as_json=as_json) for findings in ended]
+    failed = any(summary["failures"] for summary in summaries)
+    if whole and not failed:
+        settled.note(results.resolve(), [study.name for study in studies], made)
+    told.end(summaries, results, as_json=as_json)
+    return 1 if failed else 0
 
 
 def _one_behind(
     workers: Workers, studies: list[Study], results: Path, options: dict[str, Any]
-) -> Iterator[tuple[Study, dict[str, Any]]]:
-    """Studies with their findings, each when the cases of the next one are computed; then what stopped one, if any."""
+) -> Iterator[dict[str, Any]]:
+    """The findings of studies, each when the cases of the next one are computed; then what stopped one, if any."""
     begun: deque[tuple[Study, Callable[[], dict[str, Any]]]] = deque()
     refused: SymtopError | None = None
     try:
@@ -81,10 +74,10 @@ def _one_behind(
                 refused = error
                 break
             if len(begun) > 1:
-                yield begun[0][0], begun[0][1]()
+                yield begun[0][1]()
                 begun.popleft()
         while begun:
-            yield begun[0][0], begun[0][1]()
+            yield begun[0][1]()
             begun.popleft()
     except BaseException:
         workers.close()
@@ -93,25 +86,6 @@ def _one_behind(
         raise
     if refused is not None:
         raise refused
-
-
-def _tell(study: Study, findings: dict[str, Any], results: Path) -> None:
-    """The first sentences of what a study found, and where the rest is."""
-    sentences = findings["verdict"]
-    for sentence in sentences[:MOST_TOLD]:
-        click.echo(_indented(sentence, "  - "))
-    more = f", {len(sentences) - MOST_TOLD} more findings in {study.name}.json" if len(sentences) > MOST_TOLD else ""
-    pictures = f"figures {results / 'figures' / study.name}-*{more}" if findings["pictures"] else more.lstrip(", ")
-    for line in filter(None, (f"dataset {results / study.name}.nc", pictures)):
-        click.echo(_indented(line, "  "))
-
-
-def _indented(line: str, first: str) -> str:
-    """A line in as many as fit the terminal."""
-    return textwrap.fill(
-        line, terminal_width(), initial_indent=first, subsequent_indent="    ", break_on_hyphens=False,
-        break_long_words=False,
-    )  # fmt: skip
 
 
 def show_status(studies: list[Study], results: Path, why: bool, as_json: bool, **grid: bool) -> int:
@@ -124,7 +98,7 @@ def show_status(studies: list[Study], results: Path, why: bool, as_json: bool, *
         click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in status.STATES if counts[state]))
         open_rows = [row for row in rows if row["state"] != status.DONE]
         for line in _grouped(open_rows) if why else _counted(open_rows):
-            click.echo(_indented(line, "  "))
+            click.echo(told.indented(line, "  "))
     return 1 if any(row["state"] == status.FAILED for rows in states.values() for row in rows) else 0
 
 

@@ -1,0 +1,52 @@
+"""What ``symtop study`` says of studies that were run, or of studies with which there was nothing to do."""
+
+import json
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from symtop.cli.common import terminal_width
+
+MOST_TOLD = 3  # sentences of a study that has run
+
+
+def study(findings: dict[str, Any], results: Path, *, as_json: bool) -> dict[str, Any]:
+    """Say what a study found, unless it is said as JSON; returns its summary."""
+    summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
+    summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
+    if not as_json:
+        click.echo("{study}: {computed} of {cases} cases computed, {figures} figures".format(**summary))
+        _sentences(findings, results)
+    for failure in findings["failures"]:
+        click.echo(f"  {failure}", err=True)
+    return summary
+
+
+def end(summaries: Sequence[dict[str, Any]], results: Path, *, as_json: bool) -> None:
+    """Say what to do next, or all summaries as JSON."""
+    if as_json:
+        click.echo(json.dumps(summaries, indent=1))
+    elif summaries:
+        click.echo(f"next: symtop report --results {results}, one page of all findings")
+
+
+def _sentences(findings: dict[str, Any], results: Path) -> None:
+    """The first sentences of what a study found, and where the rest is."""
+    sentences, name = findings["verdict"], findings["study"]
+    for sentence in sentences[:MOST_TOLD]:
+        click.echo(indented(sentence, "  - "))
+    more = f", {len(sentences) - MOST_TOLD} more findings in {name}.json" if len(sentences) > MOST_TOLD else ""
+    pictures = f"figures {results / 'figures' / name}-*{more}" if findings["pictures"] else more.lstrip(", ")
+    for line in filter(None, (f"dataset {results / name}.nc", pictures)):
+        click.echo(indented(line, "  "))
+
+
+def indented(line: str, first: str) -> str:
+    """A line in as many as fit the terminal."""
+    return textwrap.fill(
+        line, terminal_width(), initial_indent=first, subsequent_indent="    ", break_on_hyphens=False,
+        break_long_words=False,
+    )  # fmt: skip

@@ -1,0 +1,63 @@
+"""Is everything in a folder of results what ``symtop study --all`` would make now? A note beside the cases says so.
+
+It holds a hash of what all studies are made of: the code of symtop and of the studies, the versions of packages, what
+installed packages announce, the processor and the grid. And it holds the size and the time of the last change of every
+file of theirs. Asking takes a quarter of a second; each study by itself (`seen`) finds the same, but to import them all
+takes 3 s.
+"""
+
+import importlib.metadata
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from symtop.base.fingerprint import digest, file_reasons, hashed, packages, processor
+from symtop.base.imports import PACKAGE
+
+ENTRY_POINTS = "symtop.integrators"  # as in `symtop.methods.registry`, which takes 0.3 s to import
+STUDIES = ("symtop_studies", "studies")  # folders beside the package, as in `scripts`
+NOTE = Path("cases") / "settled.json"
+
+
+def made_by(grid: str) -> str:
+    """The hash of what makes the results of all studies on a grid: "", "quick" or "full"."""
+    folders = [PACKAGE, *(place for name in STUDIES if (place := PACKAGE.parent / name).is_dir())]
+    code = [path for folder in folders for path in folder.rglob("*.py")]
+    announced = sorted(map(str, importlib.metadata.entry_points(group=ENTRY_POINTS)))
+    facts = {"announced": hashed(*announced), "processor": processor(), "grid": grid}
+    return digest(file_reasons(code) | packages() | packages("matplotlib") | facts)
+
+
+def grid_of(*, quick: bool, full: bool) -> str:
+    """The word for a grid."""
+    return "quick" if quick else "full" if full else ""
+
+
+def _marks(results: Path, names: Sequence[str]) -> dict[str, list[int]]:
+    """Size and time of the last change (ns) of every file of some studies."""
+    files = [path for name in names for path in (results / "cases" / name).glob("[!.]*")]
+    files += [path for name in names for path in (results / "figures").glob(f"{name}-*")]
+    files += [results / f"{name}.{kind}" for name in names for kind in ("nc", "json")]
+    facts = ((path.relative_to(results).as_posix(), path.stat()) for path in files)
+    return {name: [told.st_size, told.st_mtime_ns] for name, told in facts}
+
+
+def note(results: Path, names: Sequence[str], made: str) -> None:
+    """Remember that these are all studies, and up to date."""
+    from symtop.runner import store  # 0.4 s
+
+    store.write_json(results / NOTE, {"made_by": made, "names": list(names), "files": _marks(results, names)})
+
+
+def findings(results: Path, grid: str) -> list[dict[str, Any]] | None:
+    """The findings of all studies, in their order, if nothing of them has changed since they were noted."""
+    try:
+        noted = json.loads((results / NOTE).read_text(encoding="utf-8"))
+        names = [str(name) for name in noted["names"]]
+        if noted["files"] != _marks(results, names) or noted["made_by"] != made_by(grid):
+            return None
+        found = [json.loads((results / f"{name}.json").read_text(encoding="utf-8")) for name in names]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return found if all(isinstance(one, dict) for one in found) else None
