@@ -41,10 +41,10 @@ def test_kernels_are_on_disk_afterwards(monkeypatch, tmp_path):
 
 @pytest.mark.slow
 def test_all_of_them_are_compiled_once(monkeypatch, tmp_path):
-    """From the kernels that other tests have left, less a quarter: all of them take six minutes."""
+    """From the kernels that other tests have left, less an eighth: all of them take six minutes."""
     (cache_root() / "kernels").mkdir(parents=True, exist_ok=True)
     shutil.copytree(cache_root() / "kernels", tmp_path / "kernels")
-    for folder in sorted((tmp_path / "kernels").iterdir())[::4]:
+    for folder in sorted((tmp_path / "kernels").iterdir())[::8]:
         shutil.rmtree(folder)
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
     done = CliRunner().invoke(main, ["doctor", "--warm", "--results", str(tmp_path / "r")])

@@ -15,8 +15,8 @@ TRAP = "raise SystemExit('a study of the working directory was run')\n"
 @pytest.mark.slow
 def test_a_wheel_in_an_empty_folder(tmp_path):
     home = tmp_path / "home"
-    (home / "studies" / "convergence").mkdir(parents=True)
-    for name in ("__init__.py", "convergence/__init__.py", "convergence/study.py", "convergence.py"):
+    (home / "studies" / "reduction").mkdir(parents=True)
+    for name in ("__init__.py", "reduction/__init__.py", "reduction/study.py", "reduction.py"):
         (home / "studies" / name).write_text(TRAP)
     environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path / "cache"), "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
     environment.pop("PYTHONPATH", None)
@@ -45,9 +45,9 @@ def test_a_wheel_in_an_empty_folder(tmp_path):
     python, symtop = (tmp_path / "venv" / "bin" / name for name in ("python", "symtop"))
     run(python, "-m", "pip", "install", "--quiet", "--constraint", ROOT / "constraints.txt", wheel)
     assert str(tmp_path / "venv") in run(python, "-c", "import symtop; print(symtop.__file__)")
-    assert "cases computed" in run(symtop, "study", "convergence", "--quick")
+    assert "cases computed" in run(symtop, "study", "reduction", "--quick")
     assert "report.html" in run(symtop, "report")
-    assert "Convergence" in (home / "results" / "quick" / "report.html").read_text(encoding="utf-8")
+    assert "Reduction" in (home / "results" / "quick" / "report.html").read_text(encoding="utf-8")
     assert "midpoint" in run(symtop, "claims", "midpoint")
     assert "@article" in run(symtop, "integrators", "midpoint")
     assert "BAD" not in run(symtop, "doctor")
