@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from symtop.base.fingerprint import digest, file_reasons, hashed, packages, processor
+from symtop.base.fingerprint import digest, file_hash, hashed, packages, processor
 from symtop.base.imports import PACKAGE
 
 ENTRY_POINTS = "symtop.integrators"  # as in `symtop.methods.registry`, which takes 0.3 s to import
@@ -23,10 +23,13 @@ NOTE = Path("cases") / "settled.json"
 def made_by(grid: str) -> str:
     """The hash of what makes the results of all studies on a grid: "", "quick" or "full"."""
     folders = [PACKAGE, *(place for name in STUDIES if (place := PACKAGE.parent / name).is_dir())]
-    code = [path for folder in folders for path in folder.rglob("*.py")]
+    code = {
+        f"file {path.relative_to(PACKAGE.parent).as_posix()}": file_hash(path)
+        for folder in folders for path in folder.rglob("*.py")
+    }  # fmt: skip
     announced = sorted(map(str, importlib.metadata.entry_points(group=ENTRY_POINTS)))
     facts = {"announced": hashed(*announced), "processor": processor(), "grid": grid}
-    return digest(file_reasons(code) | packages() | packages("matplotlib") | facts)
+    return digest(code | packages() | packages("matplotlib") | facts)
 
 
 def grid_of(*, quick: bool, full: bool) -> str:

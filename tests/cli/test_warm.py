@@ -21,13 +21,9 @@ def test_every_compiled_method_is_run_in_each_of_its_charts():
             assert rows <= set(names) if method.implementation != "python" else not rows & set(names)
 
 
-def test_a_run_that_fails_is_named_and_what_is_there_is_not_compiled_again(monkeypatch):
+def test_a_run_that_fails_is_named(monkeypatch):
     monkeypatch.setattr(warm, "tasks", lambda: [("alone", "strang[axis]"), ("alone", "no-such-method[axis]")])
-    warm.warm(jobs=1)
-    before = warm.kernels()
-    count, failed = warm.warm(jobs=1)
-    assert count == 0
-    assert before == warm.kernels() > 0
+    _, failed = warm.warm(jobs=1)
     assert [why.partition(":")[0] for why in failed] == ["no-such-method[axis]"]
 
 
@@ -37,6 +33,7 @@ def test_kernels_are_on_disk_afterwards(monkeypatch, tmp_path):
     monkeypatch.setattr(warm, "tasks", lambda: [("alone", "strang[axis]")])
     count, _ = warm.warm(jobs=1)
     assert count == warm.kernels() >= 1
+    assert warm.warm(jobs=1)[0] == 0
 
 
 @pytest.mark.slow

@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 
 import pytest
 from click.testing import CliRunner
@@ -119,6 +121,19 @@ def test_other_code_another_package_and_another_grid_are_not_the_same(monkeypatc
         file.write_text(f"x = {number}\n")
         hashes.append(settled.made_by(""))
     assert len({made, *hashes}) == 4
+
+
+def test_it_is_the_same_in_a_process_that_has_loaded_no_study_and_sees_every_file(tmp_path, monkeypatch):
+    scripts.load("reduction")
+    words = [sys.executable, "-c", "from symtop.runner import settled; print(settled.made_by(''))"]
+    assert subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip() == settled.made_by("")
+    for place in ("symtop", "studies/one", "studies/two"):
+        (tmp_path / place).mkdir(parents=True)
+    monkeypatch.setattr(settled, "PACKAGE", tmp_path / "symtop")
+    (tmp_path / "studies" / "one" / "study.py").write_text("x = 1\n")
+    alone = settled.made_by("")
+    (tmp_path / "studies" / "two" / "study.py").write_text("x = 2\n")  # the same name in another folder
+    assert settled.made_by("") != alone
 
 
 def test_a_failure_and_a_part_of_the_studies_are_not_noted(every, looked):

@@ -209,4 +209,4 @@ def test_every_target_has_a_row_of_the_picture(data, place):
     said = [text.get_text() for text in key.get_texts() if not text.get_text().startswith("dot")]
     swatches = dict(zip(said, key.get_patches(), strict=True))
     hatched = {patch.get_hatch() for axis in axes for patch in axis.patches if patch.get_hatch()}
-    assert hatched <= {swatches["hatched: foretold, not run"].get_hatch()}
+    assert hatched <= {swatches["hatched: predicted, not run"].get_hatch()}
