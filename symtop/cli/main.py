@@ -104,12 +104,12 @@ def _nothing_to_do(results: Path, quick: bool, full: bool, as_json: bool) -> boo
     from symtop.runner import settled
 
     began = time.monotonic()
-    found = settled.findings(results, settled.grid_of(quick=quick, full=full))
-    for findings in found or ():
-        findings |= {"computed": 0, "seconds": time.monotonic() - began}
-    if found is not None:
-        told.end([told.study(findings, results, as_json=as_json) for findings in found], results, as_json=as_json)
-    return found is not None
+    known = settled.findings(results, settled.grid_of(quick=quick, full=full))
+    if known is None:
+        return False
+    took = {"computed": 0, "seconds": time.monotonic() - began}
+    told.end([told.study(one | took, results, as_json=as_json) for one in known], results, as_json=as_json)
+    return True
 
 
 @main.command(short_help="Gather the findings of all studies into one page.")

@@ -5,15 +5,14 @@ their content, and each figure by its size and the time of its last change. Aski
 the page two.
 """
 
-import importlib.metadata
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from symtop.base.fingerprint import digest, file_reasons, hashed, packages
 from symtop.base.imports import PACKAGE
+from symtop.runner.settled import announced
 
-ENTRY_POINTS = "symtop.integrators"  # as in `symtop.methods.registry`, which takes 0.3 s to import
 PAGE, WORDS = "report.html", "report.md"
 MARK = re.compile(r'<meta name="made-of" content="(\w+)">')
 HEAD = 4000  # characters from the beginning of a page, in which the mark stands
@@ -22,9 +21,8 @@ HEAD = 4000  # characters from the beginning of a page, in which the mark stands
 def made_of(results: Path, *, embed: bool, plugins: Sequence[str] = ()) -> str:
     """The hash of what the page of a folder is made of, with some plug-ins in use."""
     code = [path for path in PACKAGE.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
-    announced = sorted(map(str, importlib.metadata.entry_points(group=ENTRY_POINTS)))
     reasons = file_reasons(code) | packages("jinja2") | {"embed": str(embed)}
-    reasons |= {"announced": hashed(*announced), "plug-ins": hashed(*plugins)}
+    reasons |= {"announced": announced(), "plug-ins": hashed(*plugins)}
     for path in results.glob("*.json"):  # read anew: `file_reasons` keeps what it has read
         reasons[f"findings {path.name}"] = hashed(path.read_text(encoding="utf-8", errors="replace"))
     for path in results.glob("*.nc"):

@@ -20,6 +20,11 @@ STUDIES = ("symtop_studies", "studies")  # folders beside the package, as in `sc
 NOTE = Path("cases") / "settled.json"
 
 
+def announced() -> str:
+    """The hash of what installed packages announce to symtop."""
+    return hashed(*sorted(map(str, importlib.metadata.entry_points(group=ENTRY_POINTS))))
+
+
 def made_by(grid: str) -> str:
     """The hash of what makes the results of all studies on a grid: "", "quick" or "full"."""
     folders = [PACKAGE, *(place for name in STUDIES if (place := PACKAGE.parent / name).is_dir())]
@@ -27,8 +32,7 @@ def made_by(grid: str) -> str:
         f"file {path.relative_to(PACKAGE.parent).as_posix()}": file_hash(path)
         for folder in folders for path in folder.rglob("*.py")
     }  # fmt: skip
-    announced = sorted(map(str, importlib.metadata.entry_points(group=ENTRY_POINTS)))
-    facts = {"announced": hashed(*announced), "processor": processor(), "grid": grid}
+    facts = {"announced": announced(), "processor": processor(), "grid": grid}
     return digest(code | packages() | packages("matplotlib") | facts)
 
 
@@ -60,7 +64,7 @@ def findings(results: Path, grid: str) -> list[dict[str, Any]] | None:
         names = [str(name) for name in noted["names"]]
         if noted["files"] != _marks(results, names) or noted["made_by"] != made_by(grid):
             return None
-        found = [json.loads((results / f"{name}.json").read_text(encoding="utf-8")) for name in names]
+        known = [json.loads((results / f"{name}.json").read_text(encoding="utf-8")) for name in names]
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return found if all(isinstance(one, dict) for one in found) else None
+    return known if all(isinstance(one, dict) for one in known) else None

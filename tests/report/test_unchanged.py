@@ -9,8 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from symtop.cli.main import main
-from symtop.methods import registry
-from symtop.report import page, unchanged
+from symtop.report import page
 from symtop.report.unchanged import MARK, is_current, made_of
 
 STORED = Path(__file__).resolve().parents[2] / "results"  # what is tracked: the benchmark and its picture
@@ -53,10 +52,6 @@ def lose_the_words(folder):
 
 def spoil_the_page(folder):
     (folder / "report.html").write_bytes(b"\xff\xfe nothing")
-
-
-def test_what_packages_announce_is_looked_up_under_the_name_of_the_registry():
-    assert unchanged.ENTRY_POINTS == registry.ENTRY_POINTS
 
 
 def test_a_page_that_nothing_has_changed_is_left_alone(folder):

@@ -2,8 +2,11 @@
 
 import json
 import os
+import time
+from dataclasses import replace
 
 import pytest
+import xarray as xr
 from click.testing import CliRunner
 
 from symtop.base.validate import SymtopError
@@ -97,14 +100,17 @@ def test_what_stops_one_study_does_not_stop_those_before_it(script, tmp_path, ba
     assert not leftovers(tmp_path / "r")
 
 
-def test_timed_cases_wait_for_what_runs_beside(tmp_path):
+@pytest.mark.parametrize("timed", [True, False])
+def test_timed_cases_wait_for_what_runs_beside(script, tmp_path, timed):
     """Or their times would be those of a machine that draws."""
     with Workers(2) as workers:
-        promised = workers.beside(os.system, f"sleep 0.5; touch {tmp_path / 'done'}")
-        assert not promised.done()  # the control
-        workers.quieten()
-        assert (tmp_path / "done").is_file()
-        assert promised.done()
+        promised = workers.beside(time.sleep, 1.0)
+        waited = []
+        study = replace(
+            runner.load(script("first")), timed=timed, measure=lambda _: waited.append(promised.done()) or xr.Dataset()
+        )
+        runner.begin(study, tmp_path / "r", workers, quiet=True)
+    assert waited == [timed, timed]
 
 
 def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
