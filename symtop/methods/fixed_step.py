@@ -11,15 +11,13 @@ from symtop.base.threads import heed
 from symtop.methods import loop as loops
 from symtop.methods.blocks import Blocks
 from symtop.methods.loop import Loop, March
-from symtop.methods.many import GROUP, Many, Whole, groups, members_of, refused
+from symtop.methods.many import GROUP, Many, Whole, groups, in_turn, members_of, refused
 from symtop.methods.outcomes import LEFT_CHART, OUTCOMES
 from symtop.methods.plan import Plan, Run
 from symtop.methods.preparation import Later, Pack, Preparation, Scaled, Shown, as_fields, as_it_is, as_it_steps
 from symtop.methods.registry import Array, Solver
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop, flat
-
-LONGEST = 2  # stretches of the longest member that `many` steps with others; at its end an interrupt is heard
 
 Prepare = Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]
 Present = Callable[[Any, Array, Array], Array]
@@ -32,9 +30,22 @@ class _Whole(NamedTuple):
     fit: Callable[..., Any] | None  # the same of a rule that hangs on the start
     size: int  # of a sample
     alone: tuple[Any, ...]  # what a run of one takes, for a plain tuple comes apart quicker than a NamedTuple
-    many: Callable[[], Callable[..., None]]  # the loop over members around `run`
     blocks: Callable[[], Blocks] | None  # many members in lanes
     table: Any  # the rule as the method has it
+
+    def run(self, members: Whole, numbers: Array, h: Array, marks: Whole, done: Many) -> Whole:
+        """Run members in lanes or by one call each; returns those that take a call of Python."""
+        most = min(GROUP, loops.BLOCK)
+        if self.blocks is not None:
+            members = self.blocks().run(members, numbers, self.table, h, marks, done, most)
+        if self.fit is not None:
+            return members
+        short = marks[members, -1] <= loops.BLOCK
+        for chosen in groups(members[short], marks[:, -1], most):
+            heed()
+            in_turn(self.alone[0], chosen, numbers, self.rule, h, marks, done)
+        longer: Whole = members[~short]
+        return longer
 
 
 @dataclass(frozen=True)
@@ -94,34 +105,28 @@ class FixedStep:
         """The runs of n members: `numbers` (n, 9) as `flat` has them, steps `h` (n,), `marks` (n, samples).
 
         Each has the bits of a run alone, in lanes too (`blocks`). A member that fails fails alone, and so does one
-        whose start the kernel cannot step. Threads may call it at the same time; after every `GROUP` steps it heeds an
-        interrupt of theirs.
+        whose start the kernel cannot step. Threads may call it at the same time; after every `GROUP` steps, or a
+        stretch of a longer member, it heeds an interrupt of theirs.
         """
         numbers, h = np.ascontiguousarray(numbers), np.ascontiguousarray(h)
         marks = np.ascontiguousarray(marks)
         whole, check = self._whole, getattr(self.prepare, "check", None)
         out = refused(check, numbers)
-        alone = ~out & (self.in_python | (marks[:, -1] > LONGEST * loops.BLOCK))
-        tops = zip(np.flatnonzero(alone).tolist(), members_of(numbers[alone]), strict=True)
-        runs, most = dict[int, Run](), min(GROUP, loops.BLOCK)
-        for i, top in tops:
+        left, done = np.flatnonzero(~out), None
+        if whole is not None:
+            done = Many.begun(len(numbers), marks.shape[1], whole.size)
+            left = whole.run(left, numbers, h, marks, done)
+        for i, top in zip(left.tolist(), members_of(numbers[left]), strict=True):
             heed()
-            runs[i] = self(*top, Plan.steps(float(h[i]), marks[i]))
-        seen = (run.states.shape[1] for run in runs.values())
-        size = next(seen, charts.DIMENSIONS["angles"]) if whole is None else whole.size  # only angles refuse a start
-        done = Many.begun(len(numbers), marks.shape[1], size)
-        done.outcome[out] = LEFT_CHART
-        for i, run in runs.items():
+            run = self(*top, Plan.steps(float(h[i]), marks[i]))
+            if done is None:
+                done = Many.begun(len(numbers), *run.states.shape)
             done.states[i], done.momenta[i, :, 0], done.momenta[i, :, 1] = run.states, run.p_phi, run.p_psi
             done.steps[i], done.outcome[i] = run.steps, OUTCOMES.index(run.outcome)
             done.work[i] = (run.force_evaluations - run.steps * self.each_step) // self.evaluations
-        if whole is not None:
-            rest = np.flatnonzero(~(out | alone))
-            if whole.blocks is not None:
-                rest = whole.blocks().run(rest, numbers, whole.table, h, marks, done, most)
-            for chosen in groups(rest, marks[:, -1], most):
-                heed()
-                whole.many()(chosen, numbers, whole.rule, h, marks, *done)
+        if done is None:  # nobody ran, and only angles refuse a start
+            done = Many.begun(len(numbers), marks.shape[1], charts.DIMENSIONS["angles"])
+        done.outcome[out] = LEFT_CHART
         return done
 
     @property
@@ -161,10 +166,9 @@ class FixedStep:
         parts = kind, prepare.numbers, scale, sample
         lanes = None if fit is not None else loop.lanes(rule)
         blocks = None if lanes is None else partial(loop.blocks, lanes, as_fields(rule)[0], *parts[1:])
-        many = partial(loop.many, *parts)
         costs = self.evaluations, self.each_step, int(self.implicit)
         alone = loop.whole(*parts), numbers, fit, prepare.check, size, *costs
-        return _Whole(numbers, fit, size, alone, many, blocks, rule)
+        return _Whole(numbers, fit, size, alone, blocks, rule)
 
 
 def _fitting(rule: Scaled, pack: Pack) -> Callable[[tuple[float, ...], float], Any]:

@@ -36,7 +36,6 @@ from numpy.typing import NDArray
 from symtop.base.compiled import compile_kernel, register_jitable, set_item
 from symtop.methods.blocks import Blocks
 from symtop.methods.lanes import Lanes, marching as marching_lanes, preparing
-from symtop.methods.many import over_members
 from symtop.methods.outcomes import OK
 from symtop.methods.preparation import Body, Start, as_it_steps, conserved
 
@@ -112,16 +111,14 @@ class Loop:
     start). `begun` and `advance` do the same in stretches, and the bits do not depend on where a stretch ends.
     ``whole(kind, prepare, scale, sample)`` is a run in one compiled call, from the plain numbers of
     `symtop.methods.preparation` to filled arrays: ``run(numbers, rule, h, marks, states, momenta)``, with momenta
-    (2, samples), returns steps, work and outcome. `many` takes the same parts and is the loop over members around that
-    run (`many.over_members`). `lanes` is what the family has for a rule to run many members in lanes, if it has it, and
-    ``blocks(lanes, ...)`` the kernels of that, from the same parts again.
+    (2, samples), returns steps, work and outcome. `lanes` is what the family has for a rule to run many members in
+    lanes, if it has it, and ``blocks(lanes, ...)`` the kernels of that, from the same parts.
     """
 
     begin: Callable[..., Any]
     prepare: Callable[..., Any]
     march: Callable[..., Any]
     whole: Callable[..., Callable[..., tuple[int, int, int]]]
-    many: Callable[..., Callable[..., None]]
     lanes: Callable[[Any], Lanes | None]
     blocks: Callable[..., Blocks]
     plain: Callable[[], "Loop"]  # the same kernel with sums that are not compensated
@@ -194,7 +191,7 @@ def driver(  # noqa: C901  (one loop, read in one piece)
         return march
 
     @functools.cache
-    def running(
+    def whole(
         kind: Callable[..., Any], numbers: Callable[..., Any], scale: Callable[..., Any], sample: Callable[..., Any]
     ) -> Callable[..., tuple[int, int, int]]:
         march = register_jitable(marching(sample))
@@ -216,17 +213,7 @@ def driver(  # noqa: C901  (one loop, read in one piece)
             momenta[:, max(j, int(marks[0] == 0)) :] = np.nan
             return k, work, outcome
 
-        running_once: Callable[..., tuple[int, int, int]] = register_jitable(run)
-        return running_once
-
-    @functools.cache
-    def whole(*parts: Callable[..., Any]) -> Callable[..., tuple[int, int, int]]:
-        compiled: Callable[..., tuple[int, int, int]] = compile_kernel(running(*parts))
-        return compiled
-
-    @functools.cache
-    def many(*parts: Callable[..., Any]) -> Callable[..., None]:
-        compiled: Callable[..., None] = compile_kernel(over_members(running(*parts)))
+        compiled: Callable[..., tuple[int, int, int]] = compile_kernel(run)
         return compiled
 
     @functools.cache
@@ -239,4 +226,4 @@ def driver(  # noqa: C901  (one loop, read in one piece)
         return driver(begin, increment, observe, enter, present, accumulate_plainly)
 
     alone = compile_kernel(prepare), compile_kernel(marching(as_it_steps))
-    return Loop(begin, *alone, whole, many, lanes, blocks, plain)
+    return Loop(begin, *alone, whole, lanes, blocks, plain)

@@ -1,12 +1,12 @@
-"""Many runs of one fixed-step method: what they return, and the compiled loop over them.
+"""Many runs of one fixed-step method: what they return, and the runs of those that have no lane.
 
 Member i is a top and a start as nine plain numbers (`symtop.model.top.flat`), a step and the marks of its samples. It
-gets the bits of a run alone: the loop over members goes around the compiled run of one (`loop.Loop.whole`), and nothing
-of a member reaches the next. Inside, numba lets go of Python's lock, so that threads run at the same time.
+gets the bits of a run alone, for it is one: a call of the compiled run of one (`loop.Loop.whole`). Inside, numba lets
+go of Python's lock, so that threads run at the same time.
 """
 
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,16 +41,19 @@ class Many(NamedTuple):
         return cls(states, momenta, *(np.zeros(n, dtype=np.int64) for _ in range(3)))
 
 
-def over_members(run: Callable[..., tuple[int, int, int]]) -> Callable[..., None]:
-    """The loop over the chosen members around ``run(numbers, rule, h, marks, states, momenta)``; it is to compile."""
+def in_turn(
+    run: Callable[..., tuple[int, int, int]], chosen: Whole, numbers: Array, rule: Any, h: Array, marks: Whole,
+    done: Many,
+) -> None:  # fmt: skip
+    """The chosen members one after another, by ``run(numbers, rule, h, marks, states, momenta)``.
 
-    def members(chosen, numbers, coefficients, h, marks, states, momenta, steps, work, outcome):  # type: ignore[no-untyped-def]
-        for i in chosen:
-            at = numbers[i]
-            plain = (at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7], at[8])
-            steps[i], work[i], outcome[i] = run(plain, coefficients, h[i], marks[i], states[i], momenta[i].T)
-
-    return members
+    A member takes 2 us and its steps. A kernel around the loop over members would save most of that, and takes as long
+    to compile as a million members.
+    """
+    momenta = np.empty((2, marks.shape[1]))
+    for i, plain, step in zip(chosen.tolist(), map(tuple, numbers[chosen].tolist()), h[chosen].tolist(), strict=True):
+        done.steps[i], done.work[i], done.outcome[i] = run(plain, rule, step, marks[i], done.states[i], momenta)
+        done.momenta[i] = momenta.T
 
 
 def members_of(numbers: Array) -> Iterator[tuple[SymmetricTop, Angles]]:

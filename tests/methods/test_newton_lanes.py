@@ -7,7 +7,7 @@ from symtop.measure.timing import timings
 from symtop.methods import loop as loops
 from symtop.methods.discrete_lagrangian import discrete_lagrangian
 from symtop.methods.lanes import W
-from symtop.methods.many import Many
+from symtop.methods.many import Many, in_turn
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.unreduced import built_in as unreduced
 from symtop.model.scenes import scene
@@ -96,6 +96,6 @@ def test_lanes_are_faster_than_members_one_after_another(name, times):
     done = Many.begun(128, 2, whole.size)
     together, alone = timings(
         [lambda: whole.blocks().run(np.arange(128), numbers, whole.table, h, marks, done, loops.BLOCK),
-         lambda: whole.many()(np.arange(128), numbers, whole.rule, h, marks, *done)], batches=25, batch=0.005,
+         lambda: in_turn(whole.alone[0], np.arange(128), numbers, whole.rule, h, marks, done)], batches=25, batch=0.005,
     )  # fmt: skip
     assert alone.best > times * together.best
