@@ -2,7 +2,8 @@
 
 A cell is chosen on the one scene if it was foretold, its winner is beyond a tie, and its runs are within a number of
 force evaluations; from each panel in turn that whose horizon is furthest beyond the last one that was measured. The
-winner and the next row run at the two settings on both sides of the target, to the horizon of the cell.
+winner and the next row run at the two settings on both sides of the target, to the horizon of the cell. Of cells that
+the same runs decide, one is chosen.
 """
 
 from typing import Any
@@ -14,7 +15,7 @@ from symtop.methods.registry import integrator
 
 from ..population.costs import cost_to_reach
 from . import tables
-from .runs import QUANTITIES, horizons, measured, tops_of
+from .runs import QUANTITIES, Asked, horizons, measured, tops_of
 
 COUNT = 10
 
@@ -38,10 +39,16 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
             eligible[quantity].append((horizon / parts[0][2], settings))
     queues = [sorted(each, key=lambda one: -one[0]) for each in eligible.values()]
     taken: list[dict[str, Any]] = []
+    runs: list[Any] = []
     while any(queues) and len(taken) < COUNT:
         for queue in queues:
-            if queue and len(taken) < COUNT:
-                taken.append(queue.pop(0)[1])
+            while queue and len(taken) < COUNT:
+                one = queue.pop(0)[1]
+                decided_by = one["integrators"], one["settings"]
+                if decided_by not in runs:
+                    runs.append(decided_by)
+                    taken.append(one)
+                    break
     return taken
 
 
@@ -66,7 +73,7 @@ def check(asked: Any) -> xr.Dataset:
     place = QUANTITIES.index(asked["quantity"])
     shown, taken = np.full((2, 2), np.nan), np.full(2, np.nan)
     for rank, (name, pair) in enumerate(zip(asked["integrators"], asked["settings"], strict=True)):
-        runs = [measured(integrator(name), tops, setting, ends, np.inf) for setting in pair]
+        runs = measured(integrator(name), tops, [Asked(setting, ends, np.inf) for setting in pair])
         shown[rank] = [errors[place].max() for errors, _ in runs]
         work = np.array([each for _, each in runs])
         with_errors = shown[rank][:, np.newaxis]

@@ -13,10 +13,12 @@ the same by a search for the nearest time). Steps are cut to 24 bits, so that st
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from symtop.base.numbers import EPSILON, GOLDEN
 from symtop.methods.plan import Plan
@@ -93,18 +95,56 @@ def setting_of(row: Integrator, level: int) -> float:
     return tolerance if tolerance >= row.least_tolerance else math.nan
 
 
-def run(row: Integrator, tops: Tops, setting: float, ends: Array, budget: float) -> tuple[Shown, Array]:
-    """Runs of all tops to the last of the ends, and the times (n, samples) of what they show."""
+class Asked(NamedTuple):
+    """Runs of all tops with one setting: steps a nutation or a tolerance, and the ends of the stretches to look at."""
+
+    setting: float
+    ends: Array
+    budget: float  # force evaluations
+
+
+def run(row: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
+    """The runs of all tops with each setting, and the times (n, samples) of what they show.
+
+    Those of a fixed step go side by side, the settings too, in one call.
+    """
     if row.fixed_step:
-        h, marks = steps_of(tops, setting), np.maximum(np.rint(places(ends).ravel() * setting), 1).astype(np.int64)
-        marks = np.maximum.accumulate(marks)
-        unique, back = np.unique(marks, return_inverse=True)
-        done = stepped(row, tops.numbers, h, np.tile(unique, (len(h), 1)))
-        shown = Shown(done.states[:, back], done.momenta[:, back], done.work, done.outcome == 0)
-        return shown, marks * h[:, np.newaxis]
-    times = places(ends).ravel() * tops.period[:, np.newaxis]
-    done = in_turn(row, tops.numbers, [Plan.until(one, setting, budget) for one in times])
-    return Shown(done.states, done.momenta, done.work, done.outcome == 0), times
+        return together(row, tops, wanted)
+    made = []
+    for setting, ends, budget in wanted:
+        times = places(ends).ravel() * tops.period[:, np.newaxis]
+        done = in_turn(row, tops.numbers, [Plan.until(one, setting, budget) for one in times])
+        made.append((Shown(done.states, done.momenta, done.work, done.outcome == 0), times))
+    return made
+
+
+def together(row: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
+    """The runs of a fixed step. A call wants as many samples of all; those that nobody asked for are dropped."""
+    marks = []
+    for setting, ends, _ in wanted:
+        whole = np.maximum(np.rint(places(ends).ravel() * setting), 1).astype(np.int64)
+        marks.append(np.maximum.accumulate(whole))
+    each, n = [np.unique(one) for one in marks], len(tops.period)
+    most = max((one.size for one in each), default=0)
+    if any(one[-1] < most for one in each):  # a run with fewer steps than another has samples
+        return [made for asked in wanted for made in together(row, tops, [asked])]
+    if not wanted:
+        return []
+    shown = np.stack([filled(one, most) for one in each])
+    h = np.stack([steps_of(tops, asked.setting) for asked in wanted])
+    done = stepped(row, np.tile(tops.numbers, (len(wanted), 1)), h.ravel(), np.repeat(shown, n, axis=0))
+    made = []
+    for k, (one, seen) in enumerate(zip(marks, shown, strict=True)):
+        rows, columns = slice(k * n, (k + 1) * n), np.searchsorted(seen, one)
+        parts = Shown(done.states[rows, columns], done.momenta[rows, columns], done.work[rows], done.outcome[rows] == 0)
+        made.append((parts, one * h[k][:, np.newaxis]))
+    return made
+
+
+def filled(marks: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Marks, and the first steps that are none, `count` in all; the last of them stays the last."""
+    free = np.setdiff1d(np.arange(1, count + 1), marks)[: count - marks.size]
+    return np.union1d(marks, free)
 
 
 def errors(chart: str, tops: Tops, shown: Shown, times: Array) -> dict[str, Array]:
@@ -141,15 +181,18 @@ def shape(tops: Tops, u: Array, rate: Array) -> Array:
     return np.asarray(np.abs(off) / np.hypot(slope, 2.0 * omega * rate))
 
 
-def measured(row: Integrator, tops: Tops, setting: float, ends: Array, budget: float) -> tuple[Array, Array]:
-    """Largest errors (quantities, horizons, n) of the stretches, inf after a failure, and evaluations a nutation."""
-    (chart,) = row.charts()
-    shown, times = run(row, tops, setting, ends, budget)
-    each = errors(chart, tops, shown, times)
-    largest = np.stack([each[name].reshape(len(times), len(ends), SAMPLES).max(axis=2).T for name in QUANTITIES])
-    if row.fixed_step and setting < LEAST_STEPS:
-        largest[1:] = np.inf
-    return largest, np.where(shown.ended, shown.evaluations / ends[-1], np.nan)
+def measured(row: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Array, Array]]:
+    """For each setting, the largest errors (quantities, horizons, n) of the stretches, inf after a failure, and
+    evaluations a nutation.
+    """
+    (chart,), made = row.charts(), []
+    for (setting, ends, _), (shown, times) in zip(wanted, run(row, tops, wanted), strict=True):
+        each = errors(chart, tops, shown, times)
+        largest = np.stack([each[name].reshape(len(times), len(ends), SAMPLES).max(axis=2).T for name in QUANTITIES])
+        if row.fixed_step and setting < LEAST_STEPS:
+            largest[1:] = np.inf
+        made.append((largest, np.where(shown.ended, shown.evaluations / ends[-1], np.nan)))
+    return made
 
 
 def ladder(row: Integrator, tops: Tops, levels: int, steps: float, budget: float) -> xr.Dataset:
@@ -161,18 +204,14 @@ def ladder(row: Integrator, tops: Tops, levels: int, steps: float, budget: float
     the w of `laws`.
     """
     far, n = horizons(), len(tops.period)
-    blank = np.full((len(QUANTITIES), levels, far.size, n), np.nan)
-    seen, work, reach, values = (
-        blank.copy(),
-        np.full((levels, n), np.nan),
-        np.full(levels, np.nan),
-        np.full(levels, np.nan),
-    )
+    seen, work = np.full((len(QUANTITIES), levels, far.size, n), np.nan), np.full((levels, n), np.nan)
+    reach, values = np.full(levels, np.nan), np.full(levels, np.nan)
+    wanted: dict[int, Asked] = {}
     for level in range(levels):
         setting = setting_of(row, level)
         if math.isnan(setting):
             break
-        tried, first = measured(row, tops, setting, far[:1], math.inf if row.fixed_step else budget)
+        ((tried, first),) = measured(row, tops, [Asked(setting, far[:1], math.inf if row.fixed_step else budget)])
         taken = float(np.nanmedian(first)) if np.isfinite(first).any() else math.nan
         if math.isnan(taken):
             values[level], reach[level], seen[:, level, 0] = setting, far[0], np.inf
@@ -180,11 +219,12 @@ def ladder(row: Integrator, tops: Tops, levels: int, steps: float, budget: float
         longest = min(budget / taken, steps / setting if row.fixed_step else math.inf, 1.0001e6)
         if longest < far[laws.FEWEST]:
             break
-        ends = far[far <= longest]
-        values[level], reach[level] = setting, ends[-1]
-        seen[:, level, : ends.size], work[level] = measured(row, tops, setting, ends, 10.0 * budget)
+        wanted[level] = Asked(setting, far[far <= longest], 10.0 * budget)
         if np.median(tried[:, 0], axis=1).max() < DONE:
             break
+    for (level, asked), shown in zip(wanted.items(), measured(row, tops, list(wanted.values())), strict=True):
+        values[level], reach[level] = asked.setting, asked.ends[-1]
+        seen[:, level, : asked.ends.size], work[level] = shown
     grain = EPSILON * np.maximum((np.abs(tops.energy) + np.abs(tops.numbers[:, 2])) / tops.energy_scale, 1.0)
     return foretold(seen, work, far, grain, drifts=drifts_of(row)).assign(
         setting_value=("setting", values), reach=("setting", reach), chart=((), row.charts()[0]),

@@ -65,7 +65,7 @@ def test_a_law_foretells_a_measured_horizon_that_was_left_out_of_the_fit(name):
     setting = {"strang[axis]": 140.0, "midpoint[angles]": 140.0, "rk4[axis]": 140.0, "series[axis]": 11.3}.get(
         name, 13.11
     )
-    seen, _ = runs.measured(row, tops, setting, ends, np.inf)
+    ((seen, _),) = runs.measured(row, tops, [runs.Asked(setting, ends, np.inf)])
     for place, quantity in enumerate(runs.QUANTITIES):
         full = padded(seen[place, :, 0])
         known = np.where(SHORT, full, np.nan)
@@ -77,7 +77,8 @@ def test_a_law_foretells_a_measured_horizon_that_was_left_out_of_the_fit(name):
 
 def test_a_wrong_law_would_not_foretell_it():
     tops = runs.tops_of("spheroid", 1, 0)
-    seen, _ = runs.measured(integrator("rk4[axis]"), tops, 140.0, FAR[FAR <= 1.0001e4], np.inf)
+    asked = runs.Asked(140.0, FAR[FAR <= 1.0001e4], np.inf)
+    ((seen, _),) = runs.measured(integrator("rk4[axis]"), tops, [asked])
     energy = seen[1, :, 0]
     assert energy[-1] > 5.0 * energy[8]  # what a bounded law says at 10^3 is off by that at 10^4
 
@@ -95,6 +96,26 @@ def test_the_shape_is_the_distance_from_the_true_orbit_whatever_the_delay():
     late = closed_form(on)(run["time"].values + 0.3)  # the truth, early: no error of shape, but one of phase
     u, rate = np.cos(late.theta), -np.sin(late.theta) * late.theta_dot
     assert runs.shape(tops, u[np.newaxis], rate[np.newaxis]).max() < 1e-13
+
+
+@pytest.mark.parametrize("name", ["strang[axis]", "gauss-4[axis]", "rk45-compiled[axis]"])
+def test_settings_side_by_side_show_what_each_shows_by_itself(name):
+    """To the last bit: settings of unlike lengths, one of them with fewer steps than another has samples."""
+    row, tops = integrator(name), runs.tops_of(runs.POPULATION, 4, 1)
+    settings = (4.37, 17.48, 34.96) if row.fixed_step else (1e-4, 1e-6)
+    wanted = [runs.Asked(one, FAR[: 9 - 2 * k], 1e6) for k, one in enumerate(settings)]
+    for given in (wanted, [*wanted, runs.Asked(settings[0], FAR[:1], 1e6)]):
+        alone = [made for one in given for made in runs.measured(row, tops, [one])]
+        for mine, theirs in zip(runs.measured(row, tops, given), alone, strict=True):
+            for part, other in zip(mine, theirs, strict=True):
+                np.testing.assert_array_equal(part, other)
+    assert runs.measured(row, tops, []) == []
+
+
+def test_marks_that_nobody_asked_for_stand_before_the_last():
+    marks = np.array([1, 4, 9, 30])
+    np.testing.assert_array_equal(runs.filled(marks, 7), [1, 2, 3, 4, 5, 9, 30])
+    np.testing.assert_array_equal(runs.filled(marks, 4), marks)
 
 
 def test_step_times_number_is_exact():
@@ -159,6 +180,7 @@ def test_what_is_within_reach_is_measured_and_the_rest_foretold(data):
 def test_checked_cells_are_foretold_and_their_runs_are_told(data):
     asked = checks.chosen(data, 4e6)
     assert len(asked) == checks.COUNT == len(words.spots(data))
+    assert len({str((one["integrators"], one["settings"])) for one in asked}) == checks.COUNT  # ten tests, not one
     for one in asked:
         panel = diagram(data, "spheroid", one["quantity"])
         assert panel.foretold[panel.place(one["target"], one["horizon"])]
