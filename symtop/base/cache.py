@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TextIO
 
 DAY = 86_400.0  # seconds
 UNUSED = 30  # days
@@ -19,10 +20,15 @@ UNUSED = 30  # days
 COMPILING = "compiling what runs for the first time; the next time it is found on disk"
 
 
+def is_terminal(stream: TextIO | None) -> bool:
+    """Is somebody watching this stream of the process, which is None where it was closed?"""
+    return stream is not None and stream.isatty()
+
+
 def _tell() -> None:
     """Say once, to somebody who is watching, that kernels are being compiled, which takes one second to twenty."""
     on_cold.remove(_tell)
-    if "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty()):
+    if "ipykernel" in sys.modules or is_terminal(sys.stderr):
         print(f"symtop: {COMPILING}", file=sys.stderr, flush=True)  # noqa: T201  (no warning: nothing is wrong)
 
 

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from symtop.base.cache import is_terminal
+
 BEAT = 1.0  # seconds from one look of the clock to the next
 CLOCK = Path(__file__).with_name("clock.py")  # run as a script
 
@@ -39,7 +41,7 @@ def ticking(words: str) -> Iterator[None]:
 
     A process of its own draws them: a compiler that holds Python's lock, as heyoka's does for seconds, stops threads.
     """
-    if sys.stderr is None or not sys.stderr.isatty():
+    if not is_terminal(sys.stderr):
         yield
         return
     command = [sys.executable, "-I", "-S", str(CLOCK), words, str(BEAT)]

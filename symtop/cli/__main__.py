@@ -22,7 +22,7 @@ def run() -> None:
             raise
         atexit._run_exitfuncs()
         code = end.code or 0
-        for stream in (sys.stdout, sys.stderr):
+        for stream in filter(None, (sys.stdout, sys.stderr)):  # None, where it was closed
             try:
                 stream.flush()
             except OSError:  # nobody reads it, or the disk is full

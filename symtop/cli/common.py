@@ -102,12 +102,12 @@ def tell_of_compiling() -> None:
         cache.on_cold.clear()
         warn(cache.COMPILING)
 
-    cache.on_cold[:] = [tell] if sys.stderr.isatty() else []
+    cache.on_cold[:] = [tell] if cache.is_terminal(sys.stderr) else []
 
 
 def warn(sentence: str) -> None:
     """Print a warning to the standard error."""
-    clear = "\r\x1b[K" if sys.stderr.isatty() else ""  # of a clock that stands in the line
+    clear = "\r\x1b[K" if cache.is_terminal(sys.stderr) else ""  # of a clock that stands in the line
     click.echo(clear + fitted(f"symtop: {sentence}", sys.stderr), err=True)
 
 
@@ -116,9 +116,9 @@ def say(sentence: str) -> None:
     click.echo(fitted(sentence, sys.stdout))
 
 
-def fitted(text: str, stream: TextIO) -> str:
+def fitted(text: str, stream: TextIO | None) -> str:
     """The text in lines that fit the terminal, if a terminal is what the stream goes to."""
-    if not stream.isatty():
+    if not cache.is_terminal(stream):
         return text
     width = terminal_width()
     return "\n".join(

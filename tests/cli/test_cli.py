@@ -241,6 +241,17 @@ def test_what_cannot_be_printed_is_told_in_a_sentence():
     assert done.stderr == "symtop: cannot write what there is to say: No space left on device\n"
 
 
+@pytest.mark.skipif(not Path("/bin/sh").exists(), reason="a shell of Unix")
+@pytest.mark.parametrize("closed", ["1>&-", "2>&-", "0<&- 1>&- 2>&-"])
+def test_a_stream_that_was_closed_changes_no_exit_code(closed):
+    """Python has None in its place; a refusal (the control) is one all the same."""
+    for words, code in (("scenes", 0), ("run spheroid strang --step-size 0.1 --horizon 1", 0), ("run nowhere", 2)):
+        command = ["/bin/sh", "-c", f"{sys.executable} -m symtop.cli {words} {closed}"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        assert done.returncode == code, (words, done.stderr)
+        assert "Traceback" not in done.stderr
+
+
 def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_does():
     done = ending(before="threading.Thread(target=work).start()")
     assert done.stdout.splitlines() == ["the answer", "the thread is done", "what was registered", "taken apart"]
