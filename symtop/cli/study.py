@@ -51,7 +51,7 @@ def run_all(
 
     made = settled.made_by(settled.grid_of(**grid)) if whole else ""  # before an edit of the code may change it
     options = {"fresh": fresh, "limit": limit, "save": style.publish, "beside": len(studies) > 1, **grid}
-    ended = _one_behind(workers, studies, results, options)
+    ended = _in_order(workers, studies, results, options)
     summaries = [told.study(findings, results, as_json=as_json) for findings in ended]
     failed = any(summary["failures"] for summary in summaries)
     if whole and not failed:
@@ -60,11 +60,11 @@ def run_all(
     return 1 if failed else 0
 
 
-def _one_behind(
+def _in_order(
     workers: Workers, studies: list[Study], results: Path, options: dict[str, Any]
 ) -> Iterator[dict[str, Any]]:
-    """The findings of studies, each when the cases of the next one are computed; then what stopped one, if any."""
-    begun: deque[tuple[Study, Callable[[], dict[str, Any]]]] = deque()
+    """The findings of studies in their order, while later ones are computed; then what stopped one, if any."""
+    begun: deque[tuple[Study, run.Begun]] = deque()
     refused: SymtopError | None = None
     try:
         for study in studies:
@@ -73,9 +73,10 @@ def _one_behind(
             except SymtopError as error:
                 refused = error
                 break
-            if len(begun) > 1:
+            while len(begun) > 1 and begun[0][1].ready():
                 yield begun[0][1]()
                 begun.popleft()
+        workers.finish()
         while begun:
             yield begun[0][1]()
             begun.popleft()

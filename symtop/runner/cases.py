@@ -9,6 +9,7 @@ from typing import Any, Self
 import xarray as xr
 from tqdm import tqdm
 
+from symtop.base.cache import is_terminal
 from symtop.base.progress import beating
 from symtop.base.validate import SymtopError
 from symtop.runner import plugins, store
@@ -21,7 +22,7 @@ from symtop.runner.work import Result, Task
 
 def progress_bar(words: str, *, quiet: bool, **options: Any) -> Any:
     """A progress bar, or without a total the words alone, where somebody is watching."""
-    unseen = quiet or sys.stderr is None or not sys.stderr.isatty()
+    unseen = quiet or not is_terminal(sys.stderr)
     options = options or {"total": 1, "bar_format": "{desc}"}
     return tqdm(desc=words, disable=unseen, leave=False, **options)
 
@@ -72,12 +73,18 @@ class Round:
         self.done |= {path: (self.paths[path], data) for path, data in loaded.items()}
 
     def compute(self, missing: dict[Path, Case], workers: Workers, limit: float, *, fresh: bool, quiet: bool) -> None:
-        """Have cases computed, with a progress bar where somebody is watching."""
+        """Have cases computed, with a progress bar where somebody is watching.
+
+        A file is read in 20 ms. If a second round hangs on them, they are read while others are computed; if not, by
+        whoever concludes the study.
+        """
         script = str(file_of(self.study.name))
         tasks = [Task(script, case, str(path), tuple(plugins.loaded()), limit, fresh) for path, case in missing.items()]
         with beating(progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case")) as bar:
 
-            def on_result(_: Task, result: Result) -> None:
+            def on_result(task: Task, result: Result) -> None:
+                if self.study.follow_up is not None:
+                    self.look([Path(task.path)])
                 if result.state == "failed":
                     self.failures.append(result.message)
                     bar.set_postfix_str(f"{len(self.failures)} failed", refresh=False)
@@ -85,7 +92,6 @@ class Round:
                 bar.update()
 
             execute(self.study, tasks, workers, on_result)
-        self.look(missing)
 
     def combined(self) -> Combined:
         """One dataset of all that was measured, or a tree of one for each group of cases."""

@@ -18,7 +18,8 @@ from symtop.runner.pools import Workers
 from symtop.runner.study import Combined, Study
 
 SAMPLE = 5  # cases of each study
-CLOCKED = ("seconds", "reliable", "spread", "first_call")  # in the names of variables of measured times
+# in the names of variables of measured times, or of such a time over a count
+CLOCKED = ("seconds", "reliable", "spread", "first_call", "alone", "together")
 
 
 class Checked(NamedTuple):
@@ -93,6 +94,7 @@ def check(
         again = Round(study, Path(elsewhere).resolve())
         missing = again.add([case for case, _ in chosen.values()], fresh=True)
         again.compute(missing, workers, study.limit, fresh=False, quiet=True)
+        again.look(missing)
     differing = again.failures
     for path, (case, data) in again.done.items():
         label = f"{case.integrator} on {case.scene}"

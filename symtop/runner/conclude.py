@@ -1,7 +1,8 @@
 """What the cases of a study show: its dataset, its pictures and its findings, in this process or beside the next study.
 
 Combining and drawing take up to half a minute on one core. A study may be `Asked` to be concluded in a process of its
-own, from the files of its cases, while the workers compute the next one; timed cases wait until it is done.
+own, from the files of its cases, while the workers compute untimed cases of the next ones. Timed cases wait until it is
+done if it has begun, and if it has not, it waits for them.
 """
 
 from collections.abc import Callable

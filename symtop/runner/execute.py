@@ -34,6 +34,8 @@ def execute(study: Study, tasks: Iterable[Task], workers: Workers, on_result: On
         if group:
             if timed:
                 workers.quieten()
+            else:
+                workers.fill()
             _run_until_done(study, group, workers, size_for(group, workers, timed=timed), on_result, timed=timed)
 
 

@@ -7,8 +7,9 @@ cluster's workers need this version of symtop, the scripts of the studies, and t
 import contextlib
 import multiprocessing
 import os
+import threading
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from typing import Any
 
 from symtop.base import cluster
@@ -16,6 +17,41 @@ from symtop.base.threads import cores
 from symtop.runner import work
 
 HERE, CLUSTER = 0, -1  # in place of a number of processes
+
+
+class Beside:
+    """A call in a process of its own, which begins when it may, or when its result is asked for."""
+
+    def __init__(self, begin: Callable[[], "Future[Any]"]) -> None:
+        self._begin = begin
+        self._future: Future[Any] | None = None
+
+    def start(self) -> "Future[Any]":
+        """Begin, if it has not begun."""
+        if self._future is None:
+            try:
+                self._future = self._begin()
+            except BrokenExecutor as error:  # its process was ended before
+                self._future = Future()
+                self._future.set_exception(error)
+        return self._future
+
+    def settle(self) -> None:
+        """Wait until it is done, if it has begun."""
+        if self._future is not None:
+            wait([self._future])
+
+    def begun(self) -> bool:
+        """Has it begun?"""
+        return self._future is not None
+
+    def done(self) -> bool:
+        """Is there nothing to wait for?"""
+        return self._future is not None and self._future.done()
+
+    def result(self) -> Any:
+        """What the call returned; raises what it raised."""
+        return self.start().result()
 
 
 class InProcess(Executor):
@@ -39,7 +75,9 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         self.scheduler = scheduler
         self._client: Any = None
         self._beside: ProcessPoolExecutor | None = None
-        self._promised: list[Future[Any]] = []
+        self._promised: list[Beside] = []
+        self._filling = False
+        self._lock = threading.RLock()
         self._pools: dict[int, Executor] = {HERE: InProcess()}
         if scheduler:
             self._client = cluster.connect(scheduler)
@@ -60,17 +98,44 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         """The size of the largest pool of processes that is open, or 0."""
         return max(self._pools, default=HERE)
 
-    def beside(self, function: Callable[..., Any], *args: Any) -> "Future[Any]":
-        """Call a function in one more process, which works beside the others."""
-        if self._beside is None:
-            self._beside = self._spawned(1)
-        self._promised = [future for future in self._promised if not future.done()]
-        self._promised.append(self._beside.submit(function, *args))
+    def beside(self, function: Callable[..., Any], *args: Any) -> Beside:
+        """Call a function in one more process, which works beside untimed cases."""
+
+        def begin() -> "Future[Any]":
+            if self._beside is None:
+                self._beside = self._spawned(self.jobs)
+            return self._beside.submit(function, *args)
+
+        self._promised = [one for one in self._promised if not one.done()]
+        self._promised.append(Beside(begin))
         return self._promised[-1]
 
+    def fill(self) -> None:
+        """Let promised calls begin, one after another: cases are computed that are not timed."""
+        self._filling = True
+        self._next()
+
+    def _next(self, _: object = None) -> None:
+        """Begin the first call that has not begun, if none is working; the next one begins when it is done."""
+        with self._lock:
+            if not self._filling or any(one.begun() and not one.done() for one in self._promised):
+                return
+            for one in self._promised:
+                if not one.begun():
+                    one.start().add_done_callback(self._next)
+                    return
+
     def quieten(self) -> None:
-        """Wait for what works beside the others."""
-        wait(self._promised)
+        """Wait for the call that works beside the others; what has not begun does not begin."""
+        with self._lock:
+            self._filling = False
+        for one in self._promised:
+            one.settle()
+
+    def finish(self) -> None:
+        """Begin all that is promised at once: no more cases are computed."""
+        for one in self._promised:
+            one.start()
 
     def width(self, size: int) -> int:
         """How many cases to hand over at a time: enough that nobody waits, few enough to stop soon."""
@@ -93,6 +158,7 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         """
         for size in list(self._pools):
             self.drop(size)
+        self._filling = False
         if self._beside is not None:
             _kill(self._beside)
         self._beside, self._promised = None, []

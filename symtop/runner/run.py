@@ -10,6 +10,7 @@ import contextlib
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import BrokenExecutor, CancelledError
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -61,10 +62,11 @@ def run(study: Study, results: Path, *, quick: bool = False, full: bool = False,
 
 def begin(study: Study, results: Path, workers: Workers, *, quick: bool = False, full: bool = False,
           fresh: bool = False, quiet: bool = False, limit: float | None = None, save: Save | None = None,
-          beside: bool = False) -> Callable[[], Findings]:  # fmt: skip
-    """Compute the cases of a study that are missing; returns a function that waits for its findings (see `run`).
+          beside: bool = False) -> "Begun":  # fmt: skip
+    """Compute the cases of a study that are missing; what is returned waits for its findings (see `run`).
 
-    They are made in that function, or `beside` what is computed until it is called, in a process of their own.
+    They are made when it is called, or `beside` the untimed cases that are computed until then, in a process of their
+    own.
     """
     began = time.monotonic()
     results = results.resolve()
@@ -92,9 +94,21 @@ def begin(study: Study, results: Path, workers: Workers, *, quick: bool = False,
     return _concluding(cases, workers, stamp, save, began, quick=quick, quiet=quiet, beside=beside)
 
 
-def _known(before: Findings, began: float) -> Callable[[], Findings]:
+@dataclass(frozen=True)
+class Begun:
+    """A study whose cases are computed: called, it waits for the findings; are they `ready`?"""
+
+    findings: Callable[[], Findings]
+    ready: Callable[[], bool] = lambda: True
+
+    def __call__(self) -> Findings:
+        """The findings, waited for."""
+        return self.findings()
+
+
+def _known(before: Findings, began: float) -> Begun:
     answer = {**before, "computed": 0, "seconds": time.monotonic() - began}
-    return lambda: answer
+    return Begun(lambda: answer)
 
 
 def _concluding(
@@ -107,8 +121,8 @@ def _concluding(
     quick: bool,
     quiet: bool,
     beside: bool,
-) -> Callable[[], Findings]:
-    """The function that waits for the findings of a study whose cases are computed."""
+) -> Begun:
+    """What waits for the findings of a study whose cases are computed."""
     study, results = cases.study, cases.results
     script = str(file_of(study.name))
     told = None
@@ -130,7 +144,7 @@ def _concluding(
                 made = conclude(cases, stamp, save, quick=quick)
         return {**made, "computed": cases.computed, "seconds": computing + time.monotonic() - start}
 
-    return findings
+    return Begun(findings, lambda: told is None or told.done())
 
 
 def _is_local(cases: Round) -> bool:

@@ -3,6 +3,7 @@
 import json
 import os
 import time
+from concurrent.futures import BrokenExecutor
 from dataclasses import replace
 
 import pytest
@@ -85,8 +86,40 @@ def test_a_process_that_is_killed_is_done_without(script, tmp_path):
     code, told = studied(tmp_path / "r", script("killed"), script("second"))
     assert code == 0, told
     assert said_by(tmp_path / "r", "killed") == os.getpid()
-    assert said_by(tmp_path / "r", "second") == os.getpid()  # it had waited for the same process
+    assert "second: 2 of 2 cases computed" in told  # by whichever process was left
     assert not leftovers(tmp_path / "r")
+
+
+def test_what_begins_after_its_process_was_killed_says_so():
+    """`findings` then concludes in this process; a call that was not killed (the control) answers."""
+    with Workers(2) as workers:
+        assert workers.beside(abs, -1.0).result() == 1.0
+        killed, later = workers.beside(os.abort), workers.beside(abs, -1.0)
+        with pytest.raises(BrokenExecutor):
+            killed.result()
+        with pytest.raises(BrokenExecutor):
+            later.result()
+
+
+def test_files_of_cases_are_not_read_where_they_are_handed_out(script, tmp_path, monkeypatch):
+    """Only who concludes reads them, unless a second round hangs on them (the control)."""
+    read, load = [], store.load_case
+
+    def counted(path):
+        data = load(path)
+        if data is not None:
+            read.append(path)
+        return data
+
+    monkeypatch.setattr(store, "load_case", counted)
+    first, second = runner.load(script("first")), runner.load(script("second"))
+    with Workers(2) as workers:
+        answer = runner.begin(first, tmp_path / "r", workers, quiet=True, beside=True)
+        assert read == []
+        assert answer()["cases"] == 2
+        assert read == []
+        runner.begin(replace(second, follow_up=lambda _: []), tmp_path / "r", workers, quiet=True)
+        assert len(read) == 2
 
 
 @pytest.mark.parametrize("bad", ["refused", "silent"])
@@ -96,21 +129,63 @@ def test_what_stops_one_study_does_not_stop_those_before_it(script, tmp_path, ba
     assert "first: 2 of 2 cases computed" in told
     assert (tmp_path / "r" / "first.json").is_file()
     assert f"study {bad} has" in told
-    assert not (tmp_path / "r" / "second.json").is_file()
+    assert "second:" not in told
+    assert bad == "silent" or not (tmp_path / "r" / "second.json").is_file()  # or both were concluded at once
     assert not leftovers(tmp_path / "r")
 
 
 @pytest.mark.parametrize("timed", [True, False])
-def test_timed_cases_wait_for_what_runs_beside(script, tmp_path, timed):
-    """Or their times would be those of a machine that draws."""
+@pytest.mark.parametrize("begun", [True, False])
+def test_timed_cases_run_alone(script, tmp_path, timed, begun):
+    """They wait for what runs beside them, and what has not begun waits for them; untimed ones begin it."""
+    seen = []
     with Workers(2) as workers:
         promised = workers.beside(time.sleep, 1.0)
-        waited = []
-        study = replace(
-            runner.load(script("first")), timed=timed, measure=lambda _: waited.append(promised.done()) or xr.Dataset()
-        )
+        if begun:
+            promised.start()
+
+        def measure(_):
+            seen.append((promised._future is not None, promised.done()))
+            return xr.Dataset()
+
+        study = replace(runner.load(script("first")), timed=timed, measure=measure)
         runner.begin(study, tmp_path / "r", workers, quiet=True)
-    assert waited == [timed, timed]
+        expected = (begun, begun) if timed else (True, False)
+        assert seen == [expected, expected]
+        assert promised.result() is None  # asked for, it begins
+
+
+def test_what_runs_beside_runs_one_after_another_until_nothing_is_computed():
+    """So that timed cases wait for one of them at most; at the end all run at once."""
+    with Workers(2) as workers:
+        promised = [workers.beside(time.sleep, 0.4) for _ in range(5)]
+        workers.fill()
+        assert [one.begun() for one in promised] == [True, False, False, False, False]
+        workers.quieten()
+        time.sleep(0.3)
+        assert promised[0].done()
+        assert not promised[1].begun()
+        workers.fill()
+        while not promised[2].begun():
+            time.sleep(0.01)
+        assert promised[1].done()
+        assert not promised[3].begun()
+        workers.finish()
+        assert all(one.begun() for one in promised)
+        assert [one.result() for one in promised] == [None] * 5
+
+
+def test_a_conclusion_waits_for_the_timed_study_that_follows(script, tmp_path):
+    """Both are told in their order all the same."""
+    first, second = runner.load(script("first")), runner.load(script("second"))
+    with Workers(2) as workers:
+        answer = runner.begin(first, tmp_path / "r", workers, quiet=True, beside=True)
+        later = runner.begin(replace(second, timed=True), tmp_path / "r", workers, quiet=True)
+        assert not answer.ready()
+        assert later.ready()
+        assert not (tmp_path / "r" / "first.json").is_file()
+        assert answer()["cases"] == 2
+        assert answer.ready()
 
 
 def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
