@@ -1,9 +1,9 @@
 """Seconds of a force evaluation of every row, alone and among many tops at once, measured in interleaved rounds.
 
 The study counts force evaluations, because a count is the same on every machine. What an evaluation costs is measured
-here for each row: in the run of one top, bare, and in one call for `TOGETHER` tops, where kernels that have lanes work
-on several at once. The ordinary tops of a stratum without poles stand for all: the arithmetic of a step does not hang
-on the top, but for the iterations of implicit methods, which are counted.
+here for each row: in the run of one top, bare, and in one call for `TOGETHER` tops where kernels have lanes and work on
+several at once, or for `IN_TURN` where they have not. The ordinary tops of a stratum without poles stand for all: the
+arithmetic of a step does not hang on the top, but for the iterations of implicit methods, which are counted.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ from symtop.run.population import NUMBERS, population
 
 from .tops import FIRST
 
-TOGETHER = 256  # tops of a call
+TOGETHER, IN_TURN = 256, 16  # tops of a call: side by side in lanes, or one after another
 NUTATIONS, FINE = 20, 5  # of a timed run; FIRST 2^FINE steps a nutation
 TOLERANCE = 1e-8
 KIND = "slow"
@@ -49,11 +49,12 @@ def calls(row: Integrator) -> dict[str, tuple[Callable[[], object], float]]:
     if solver is None:
         run = solve(row, chart, top, start, plan)
         return {"alone": (lambda: solve(row, chart, top, start, plan), float(run.force_evaluations))}
-    run, everyone = solver(top, start, plan), np.tile(marks, (TOGETHER, 1))
-    many = solver.many(numbers, h, everyone)
+    run, count = solver(top, start, plan), TOGETHER if solver.in_lanes else IN_TURN
+    given = numbers[:count], h[:count], np.tile(marks, (count, 1))
+    many = solver.many(*given)
     return {
         "alone": (lambda: solver(top, start, plan), float(run.force_evaluations)),
-        "together": (lambda: solver.many(numbers, h, everyone), float(solver.counts(many.steps, many.work)[0].sum())),
+        "together": (lambda: solver.many(*given), float(solver.counts(many.steps, many.work)[0].sum())),
     }
 
 

@@ -42,7 +42,7 @@ def cases(quick: bool) -> list[Case]:
         ]
         for method in several[:6] if quick else several:
             settings = ladder(method, start, tables.CHART_PERIODS * period, 8, 1e5)[1 :: 3 if quick else 2]
-            plan = {"settings": settings, "horizon": tables.CHART_PERIODS * period, "batches": 2 if quick else 3}
+            plan = {"settings": settings, "horizon": tables.CHART_PERIODS * period, "batches": 3 if quick else 5}
             grid.append(Case(name, method.name, {"part": "charts", **plan}))
         plan = {"horizon": 8.0 * period, "step_sizes": [period / 30.7, period / 307.0], "batches": 3 if quick else 5}
         grid += [Case(name, reduced, {"part": "twins", **plan}) for reduced in tables.unreduced_forms()]

@@ -25,6 +25,7 @@ from symtop.run.simulation import simulate
 
 from .commutation import gap, reduced_first
 
+BATCH = 0.005  # seconds, of runs in several charts
 TIMED_STEPS = 20_000  # of a timed run: a call costs as much as a hundred of them
 COMPARED_STEPS = 10_000  # of a reduced kernel and its unreduced form
 COMMUTES = 1e-13  # rad: two paths of a few thousand steps with compensated sums are that close if they are one method
@@ -60,7 +61,7 @@ def chart_table(
     """
     columns, charts = [Column.AXIS, Column.THETA, Column.ENERGY, Column.AXIS_BOUND, Column.STEPS], method.charts()
     runs = [bare_run(scene, method, chart, setting, horizon) for chart in charts for setting in settings]
-    taken = np.array([(timing.best, timing.spread) for timing in timings(runs, batches)])
+    taken = np.array([(timing.best, timing.spread) for timing in timings(runs, batches, BATCH)])
     tables = []
     for chart, (seconds, spread) in zip(charts, taken.reshape(len(charts), -1, 2).swapaxes(1, 2), strict=True):
         errors = error_table(scene, method.row(chart), settings, horizon, observe="axis")[columns].astype(float)

@@ -46,12 +46,14 @@ def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool)
     if factor > 1.0:
         steps, values = (np.geomspace(row[0], row[-1], round(factor * row.size)) for row in (steps, values))
     settings, rows = steps.size, values.size
+    ordinary = settings, rows
     if method.implementation == "python":
         settings, rows = (13, 12) if solves_slowly(method) else (25, 24)
     elif method.adaptive and method.order is None:  # the order of a series grows with the accuracy
         settings, rows = (25, values.size) if method.speed == 1.0 else (13, 20)
-    if quick and settings < steps.size:
+    if quick and (settings, rows) != ordinary:
         settings, rows = min(settings, QUICK[0]), min(rows, QUICK[1])
+        values = values[np.linspace(0, values.size - 1, rows).round().astype(int)]  # the first and the last among them
     parameters = values[:: -(-values.size // rows)].tolist()
     if method.fixed_step:
         return steps.tolist(), parameters

@@ -8,9 +8,7 @@ from symtop_studies.drift import study
 from symtop_studies.drift.long_runs import members, side_by_side
 from symtop_studies.drift.tables import ROUNDINGS
 
-from symtop.methods import loop as loops
 from symtop.methods.blocks import LEAST
-from symtop.methods.fixed_step import LONGEST
 from symtop.methods.registry import integrator
 from symtop.model.scenes import scene
 from symtop.run.long_run import QUANTITIES, long_run
@@ -36,11 +34,10 @@ def test_each_has_the_bits_of_a_long_run(name, compensated):
 
 
 def test_the_ordinary_ensemble_goes_in_lanes():
-    """Longer members would run one after another, 8 times slower."""
+    """Fewer members, or another sum, would run one after another, 8 times slower."""
     ensembles = [case for case in study.cases(False) if case.group == ROUNDINGS]
     assert len(ensembles) == 4
     for case in ensembles:
         row = integrator(case.integrator)
-        assert case.settings["steps"] <= LONGEST * loops.BLOCK
         assert case.settings["count"] >= LEAST
         assert row.solvers[row.charts()[0]].in_lanes
