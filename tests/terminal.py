@@ -18,6 +18,7 @@ import sys
 import tempfile
 import termios
 import time
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,6 +33,12 @@ class Recording(NamedTuple):
     code: int
     seconds: float
     silence: float  # seconds
+    drawings: list[tuple[float, str]]  # seconds since the start, and what was printed then
+
+    def longest_wait(self, pattern: str) -> float:
+        """Seconds between two drawings of what matches, so that the start of the process does not count."""
+        times = [when for when, text in self.drawings if re.search(pattern, text)]
+        return max(after - before for before, after in pairwise(times))
 
     @property
     def widest(self) -> int:
@@ -51,7 +58,7 @@ def recorded(words: list[str], limit: float = 300.0, **environment: str) -> Reco
         env={**os.environ, **shape, **environment},
     )  # fmt: skip
     os.close(theirs)
-    said, silence = b"", 0.0
+    said, silence, drawings = b"", 0.0, []
     while time.monotonic() - began < limit:
         if not select.select([ours], [], [], 0.05)[0]:
             if process.poll() is not None:
@@ -63,11 +70,12 @@ def recorded(words: list[str], limit: float = 300.0, **environment: str) -> Reco
             break
         now = time.monotonic()
         silence, last, said = max(silence, now - last), now, said + part
+        drawings.append((now - began, part.decode(errors="replace")))
     os.close(ours)
     process.kill() if time.monotonic() - began >= limit else None
     code = process.wait()
     ended = time.monotonic()
-    return Recording(said.decode(errors="replace"), code, ended - began, max(silence, ended - last))
+    return Recording(said.decode(errors="replace"), code, ended - began, max(silence, ended - last), drawings)
 
 
 def commands() -> list[list[str]]:

@@ -228,7 +228,7 @@ import ctypes
 import symtop
 rk4 = symtop.integrator("rk4").solvers["axis"]
 def holds_the_lock(*asked):
-    ctypes.PyDLL(None).usleep(2_500_000)  # as a compiler in C++ does, which no thread of Python can interrupt
+    ctypes.PyDLL(None).usleep(4_000_000)  # as a compiler in C++ does, which no thread of Python can interrupt
     return rk4(*asked)
 symtop.register(
     symtop.Integrator(
@@ -245,8 +245,7 @@ def test_the_clock_goes_on_while_somebody_holds_the_lock_of_python(tmp_path):
     words = ["run", "spheroid", "holds-the-lock", "--step-size", "0.01", "--no-guard"]
     recording = recorded([*words, "--plugin", str(tmp_path / "locked.py")])
     assert recording.code == 0, recording.text
-    assert "running: 00:02" in recording.text
-    assert recording.silence < 2.0
+    assert recording.longest_wait("running: ") < 2.5, recording.drawings  # the lock is held for four
     assert recording.text.rindex("running: ") < recording.text.index("holds-the-lock[axis] on spheroid: reached")
 
 
