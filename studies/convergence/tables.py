@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.base.numbers import EPSILON
+from symtop.base.remembered import of_one_dataset
 from symtop.measure.conservation import residuals
 from symtop.measure.order import LARGEST_ERROR, Fit, order_verdict, power_law
 from symtop.measure.order_table import observable, order_fit
@@ -58,6 +59,7 @@ def by_order(data: xr.Dataset) -> dict[int, list[str]]:
     return dict(sorted(groups.items()))
 
 
+@of_one_dataset
 def fits(data: xr.Dataset, quantity: str, *, at_end: bool = False) -> Pairs:
     """The order of every row of fixed step on every scene, from the largest errors or those at the end."""
     column, part = f"{quantity}_end" if at_end else quantity, stepping(data)

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import settings
-from symtop.measure.timing import NOISY, Timing, timings
+from symtop.measure.timing import NOISY, Timing, first_call, timings
 from symtop.methods.registry import SMALLEST_FIRST
 from symtop.model.scenes import Scene
 
@@ -102,11 +102,13 @@ def timed(
         for call in calls
         if (function := caller(scene, cell, call, met.setting, met.horizon)) is not None
     }
-    taken = dict(zip(functions, timings(list(functions.values()), rounds, batch), strict=True))
+    for function in functions.values():
+        first_call(function)
+    taken = dict(zip(functions, timings(list(functions.values()), rounds, batch, warm=True), strict=True))
     short = [key for key, timing in taken.items() if timing.best < SHORT]
     noisy = [key for key, timing in taken.items() if timing.best >= SHORT and timing.spread > NOISY]
     for again, times_more in ((short, FURTHER), (noisy, 1)):
-        more = timings([functions[key] for key in again], times_more * rounds, batch, seed=times_more)
+        more = timings([functions[key] for key in again], times_more * rounds, batch, seed=times_more, warm=True)
         for key, timing in zip(again, more, strict=True):
             taken[key] = Timing(taken[key].samples + timing.samples, taken[key].first_call)
     return taken
@@ -176,15 +178,17 @@ def _by_name() -> dict[str, Cell]:
 
 def times(data: xr.Dataset) -> list[Timed]:
     """Every time of one scene, horizon and target (a dataset over integrator and call)."""
-    rows, known = [], _by_name()
-    for name in map(str, data["integrator"].values):
-        row, cell = data.sel(integrator=name), known[name]
-        error, forces = float(row[Column.AXIS]), float(row[Column.FORCES])
-        for call in CALLS:
-            one = row.sel(call=call)
-            if np.isfinite(seconds := float(one[Column.SECONDS])):
-                rows.append(Timed(*cell.key, call, name, seconds, float(one[Column.SPREAD]), error, forces))
-    return rows
+    names, known = [str(name) for name in data["integrator"].values], _by_name()
+    errors, forces = (data[name].values.tolist() for name in (Column.AXIS, Column.FORCES))
+    taken = data[[Column.SECONDS, Column.SPREAD]].transpose("integrator", "call")
+    taken = taken.sel(call=list(CALLS))  # once: to select a number of a Dataset takes a millisecond
+    seconds, spreads = (taken[name].values.tolist() for name in (Column.SECONDS, Column.SPREAD))
+    return [
+        Timed(*known[name].key, call, name, seconds[i][k], spreads[i][k], errors[i], forces[i])
+        for i, name in enumerate(names)
+        for k, call in enumerate(CALLS)
+        if np.isfinite(seconds[i][k])
+    ]
 
 
 def goals_of(data: xr.Dataset) -> Iterator[tuple[str, float, float, xr.Dataset]]:

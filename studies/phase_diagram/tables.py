@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from symtop.base.remembered import of_one_dataset
 from symtop.model.charts import Array
 
 from ..population.costs import cost_to_reach
@@ -86,6 +87,7 @@ def work_to_reach(one: xr.Dataset, quantity: str, targets: tuple[float, ...] = T
     return costs, missed + 1
 
 
+@of_one_dataset
 def diagram(data: xr.DataTree, scene: str, quantity: str) -> Diagram:
     """The panel of a quantity on a population or a scene."""
     names = rows_of(data, scene, quantity)

@@ -5,15 +5,17 @@ the rows whose energy errors are compared at equal run time, every run over the 
 a time, and no time is computed from others.
 
 All of them take part in a few rounds of short batches: in each round every run once, in random order. What serves the
-comparison of energies alone, over decades of time, has one round less. The contenders
-for a target, those within `WITHIN` of the fastest compiled or plain Python one, then take part in further rounds of
-longer batches. Then each time is compared with what the row's other times foretell (`timing.forecasts`); one that
-misses that by a quarter (`MISSED`), has no forecast, or whose smallest sample no other comes near (`AGAIN`), is taken
-again. A time that still misses is kept with its forecast beside it, and a lead must then hold for both.
+comparison of energies alone, over decades of time, has one round less, and a run of more than half of `PATIENCE` has
+two. The contenders for a target, those within `WITHIN` of the fastest compiled or plain Python one, then take part in
+further rounds of longer batches. Then each time is compared with what the row's other times foretell
+(`timing.forecasts`); one that misses that by a quarter (`MISSED`), has no forecast, or whose smallest sample no other
+comes near (`AGAIN`), is taken again. A time that still misses is kept with its forecast beside it, and a lead must
+then hold for both.
 
 `seconds` is the smallest sample. Everything runs on one thread; compilation and first use are in `first_call`.
 """
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
@@ -27,6 +29,7 @@ from symtop.model.scenes import Scene
 
 WITHIN = 1.6  # of the fastest
 AGAIN_ROUNDS = 4
+PATIENCE = 0.02  # seconds of samples of one run, in the first rounds, that are enough if there are two
 MANY = 1002  # samples that show what one of a closed form costs
 
 
@@ -112,13 +115,16 @@ def timing_rounds(
         method = methods[run.name]
         return bare_run(scene, method, method.chart_for("axis"), run.setting, horizons[run.far])
 
-    def measured(chosen: Sequence[TimedRun], effort: Effort, seed: int) -> dict[TimedRun, Timing]:
-        return dict(zip(chosen, timings([call(run) for run in chosen], *effort, seed, warm=True), strict=True))
+    def measured(
+        chosen: Sequence[TimedRun], effort: Effort, seed: int, patience: float = math.inf
+    ) -> dict[TimedRun, Timing]:
+        taken = timings([call(run) for run in chosen], *effort, seed, warm=True, patience=patience)
+        return dict(zip(chosen, taken, strict=True))
 
     least = {run.name: run for run in sorted(runs, key=lambda run: -run.evaluations)}
     firsts = {name: first_call(call(least[name])) for name in methods}
     energies = [run for run in runs if not run.targets]
-    once = measured([run for run in runs if run.targets], first, 0)
+    once = measured([run for run in runs if run.targets], first, 0, PATIENCE)
     once |= measured(energies, first._replace(rounds=first.rounds - 1), 0)
     kind = {name: method.implementation if method.control else "closed form" for name, method in methods.items()}
     twice = measured(contenders(runs, {run: timing.best for run, timing in once.items()}, kind), further, 1)

@@ -88,12 +88,14 @@ def timings(
     seed: int = 0,
     *,
     warm: bool = False,
+    patience: float = math.inf,
 ) -> list[Timing]:
     """Time several functions against each other.
 
     Those that are `warm`, called before, have no first call (NaN), and a call that turns out to be longer than a batch
-    is the first sample of its function: a long run costs no more calls than it has samples. The closed form is compiled
-    before anything is timed, whoever calls it.
+    is the first sample of its function: a long run costs no more calls than it has samples. A function whose samples
+    have taken `patience` seconds together has no more of them, but two at least: a long one meets both fast and slow
+    moments of the machine. The closed form is compiled before anything is timed, whoever calls it.
     """
     closed_form.compile_now()
     firsts, calls = [], []
@@ -106,8 +108,10 @@ def timings(
     draw = random.Random(seed)  # noqa: S311
     for number in range(batches):
         for index in draw.sample(range(len(functions)), len(functions)):
-            if len(samples[index]) <= number:
-                samples[index].append(_batch(functions[index], calls[index]) / calls[index])
+            taken = samples[index]
+            tired = len(taken) > 1 and calls[index] * sum(taken) >= patience
+            if len(taken) <= number and not tired:
+                taken.append(_batch(functions[index], calls[index]) / calls[index])
     return [Timing(tuple(taken), first) for taken, first in zip(samples, firsts, strict=True)]
 
 

@@ -219,10 +219,12 @@ def save(figure: Any, target: Path) -> None:
 
 
 def publish(figure: Any, target: Path) -> None:
-    """Write a figure as a PNG and, for print, as a PDF beside it; a film has no PDF."""
+    """Write a figure as a PNG and, for print, as a PDF beside it, laid out once; a film has no PDF."""
+    _write(figure, target)
     if target.suffix == ".png":
+        figure.set_layout_engine("none")
         _write(figure, target.with_suffix(".pdf"))
-    save(figure, target)
+    plt.close(figure)
 
 
 def _write(figure: Any, target: Path) -> None:

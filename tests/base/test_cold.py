@@ -1,14 +1,18 @@
 """Python says once that it compiles, to a terminal or a notebook and to nobody else."""
 
+import gc
 import os
 import pty
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+from numba.core.errors import TypingError
 
 ROOT = Path(__file__).resolve().parents[2]
+UNIQUE = time.time()  # a constant that no kernel on disk was compiled with
 SCRIPT = """
 import sys
 {before}
@@ -52,3 +56,27 @@ def test_compiling_is_said_once_to_whoever_watches(tmp_path, watched, lines):
 def test_nothing_is_said_of_kernels_that_are_on_disk(tmp_path):
     _heard(tmp_path)
     assert _heard(tmp_path, before="sys.modules['ipykernel'] = sys") == ""
+
+
+def test_garbage_is_collected_after_a_kernel_is_compiled_and_not_before():
+    from symtop.base import compiled
+
+    def kernel(x):
+        return x + UNIQUE
+
+    def refused(x):
+        return x.no_such_thing
+
+    began = []
+    heard = lambda phase, _: began.append(phase)
+    gc.callbacks.append(heard)
+    try:
+        assert compiled.compile_kernel(kernel)(1.0) == 1.0 + UNIQUE
+        collected = began.count("start")
+    finally:
+        gc.callbacks.remove(heard)
+    assert collected <= 2  # one that begins when it is over; without the pause there are dozens
+    assert gc.isenabled()
+    with pytest.raises(TypingError):
+        compiled.compile_kernel(refused)(1.0)
+    assert gc.isenabled()

@@ -74,6 +74,7 @@ def test_one_method_alone_takes_part_in_a_study(axis_only, tmp_path):
     assert f"next: symtop report --results {tmp_path / 'quick' / 'only'}" in lines[-1]
     assert (tmp_path / "quick" / "only" / "convergence.nc").is_file()
     assert not (tmp_path / "quick" / "convergence.nc").exists()
+    assert {file.suffix for file in (tmp_path / "quick" / "only" / "figures").iterdir()} == {".png"}  # no PDF to print
     state = call(*words, "--status")
     assert state.output.strip() == f"convergence: {lines[0].split()[1]} done"
     assert call("study", "convergence", "--only", "no-such").exit_code == 2

@@ -1,6 +1,7 @@
 """The measures themselves, on data whose answer is known: orders, trends, scales, verdicts, counts, ladders."""
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -173,6 +174,15 @@ def test_combining_refuses_cases_with_different_coordinates():
     assert np.isnan(joined["error"].sel(integrator="a", horizon=1000.0))
     with pytest.raises(symtop.SymtopError, match="coordinate horizon of spheroid--b differs"):
         store.combine([case("a", [8.0, 100.0]), case("b", [8.0, 1000.0])])
+
+
+def test_a_function_that_has_taken_long_is_asked_no_more_but_twice_at_least():
+    def nap(seconds):
+        return lambda: time.sleep(seconds)
+
+    for patience, counts in ((math.inf, [4, 4, 4]), (0.05, [4, 3, 2])):
+        taken = timings([nap(1e-3), nap(0.02), nap(0.06)], 4, 5e-3, warm=True, patience=patience)
+        assert [len(timing.samples) for timing in taken] == counts
 
 
 def test_timings_know_when_they_are_noisy():

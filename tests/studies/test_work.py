@@ -19,7 +19,14 @@ from symtop_studies.work_precision import (
     timing_rounds as rounds_module,
     trust,
 )
-from symtop_studies.work_precision.timing_rounds import Effort, TimedRun, contenders, timed_runs, timing_rounds
+from symtop_studies.work_precision.timing_rounds import (
+    PATIENCE,
+    Effort,
+    TimedRun,
+    contenders,
+    timed_runs,
+    timing_rounds,
+)  # fmt: skip
 
 import symtop
 from symtop.base import datasets
@@ -47,10 +54,12 @@ def test_a_time_that_misses_its_forecast_by_a_quarter_is_taken_again(monkeypatch
     scene = symtop.scene("goldstein")
     runs = [timed("rk4[axis]", place=k, targets=[k] if k < 4 else ()) for k in range(5)]
     runs += [timed("strang[axis]", place=k, targets=[k] if k < 4 else ()) for k in range(5)]
-    stages = []
+    stages, patient = [], []
 
-    def pretended(calls, rounds, batch, seed=0, *, warm=True):
+    def pretended(calls, rounds, batch, seed=0, *, warm=True, patience=math.inf):
+        assert warm
         stages.append((sorted(calls), rounds, batch))
+        patient.append(patience)
         slow = {("strang[axis]", 3, 0): 2.8}
         unit = {"rk4[axis]": 1.0, "strang[axis]": 9.0}
         return [
@@ -67,6 +76,7 @@ def test_a_time_that_misses_its_forecast_by_a_quarter_is_taken_again(monkeypatch
     assert stages[0] == (sorted((run.name, run.place) for run in runs if run.targets), 3, 0.005)
     assert stages[1] == (sorted((run.name, run.place) for run in runs if not run.targets), 2, 0.005)
     assert stages[2][0] == []  # nobody is near the fastest
+    assert patient == [PATIENCE, math.inf, math.inf, math.inf]
     again, rounds, batch = stages[3]
     assert ("strang[axis]", 3) in again
     assert {name for name, _ in again} == {"strang[axis]"}  # its neighbours are foretold from it
