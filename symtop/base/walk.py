@@ -16,6 +16,7 @@ import dis
 import functools
 import hashlib
 import importlib.util
+import inspect
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -179,7 +180,8 @@ class Walk:
             if part is function.__code__ and constants[:1] == [function.__doc__]:
                 del constants[0]
             self._note(part.co_code.hex(), part.co_exceptiontable.hex(), *map(_constant, constants))
-            self._note(repr((part.co_names, part.co_freevars, part.co_argcount, part.co_kwonlyargcount, part.co_flags)))
+            counts = part.co_argcount, part.co_kwonlyargcount, _flags(part)
+            self._note(repr((part.co_names, part.co_freevars, *counts)))
             self.strings |= {value for value in constants if isinstance(value, str)}
             self.files |= set(files_of(_imports(part, function.__globals__.get("__package__") or "")))
         self._add_all(held(function))
@@ -196,6 +198,11 @@ def codes(code: CodeType) -> Iterator[CodeType]:
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from codes(constant)
+
+
+def _flags(code: CodeType) -> int:
+    """The flags of a code object; every function has `CO_OPTIMIZED`, but numba clears it where a profiler watches."""
+    return code.co_flags | (inspect.CO_OPTIMIZED if code.co_flags & inspect.CO_NEWLOCALS else 0)
 
 
 def _constant(value: Any) -> str:

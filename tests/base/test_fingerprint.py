@@ -1,8 +1,10 @@
 """What a number was made of: labels, reasons, text and whole files; kernels and checkpoints by their code."""
 
+import cProfile
 import dataclasses
 import importlib.metadata
 import importlib.util
+import inspect
 import os
 import shutil
 import subprocess
@@ -10,6 +12,7 @@ import sys
 import time
 from pathlib import Path
 
+import numba
 import pytest
 
 import symtop
@@ -256,6 +259,24 @@ def test_what_numba_compiles_in_place_of_a_function_counts():
     walk.add(fused.fused)
     reached = {part.__name__ for part in walk.functions}
     assert {"fused", "_fused", "_fma"} <= reached
+
+
+def test_a_kernel_is_the_same_to_a_profiler():
+    def made(constant):
+        def kernel(x):
+            return x + constant
+
+        return kernel
+
+    plain = digest(compiled.code_of(made(1.0)).values())
+    watching = cProfile.Profile()
+    watching.enable()
+    try:
+        numba.njit(made(2.0))(1.0)
+    finally:
+        watching.disable()
+    assert not made(1.0).__code__.co_flags & inspect.CO_OPTIMIZED  # numba has cleared it, for all that share the code
+    assert digest(compiled.code_of(made(1.0)).values()) == plain
 
 
 def test_the_walk_of_a_kernel_takes_less_than_a_millisecond():
