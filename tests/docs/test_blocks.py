@@ -151,3 +151,16 @@ def test_a_command_that_is_not_run_is_one(block: Block):
         else:
             assert rest[0] in OTHERS[program]
     assert not any("--no-such" in parameter.opts for parameter in main.commands["run"].params)
+
+
+def absent(text):
+    """Files of the project that a page names, `folder/file.py`, and that are not there."""
+    named = re.findall(r"`([a-z_]+(?:/[a-z_]+)*/[a-z_]+\.py)`", text)
+    return [file for file in named if not any((root / file).is_file() for root in (ROOT, ROOT / "symtop"))]
+
+
+def test_the_files_that_pages_name_are_there():
+    assert absent("`methods/loop.py`, `methods/fused.py` and `studies/drift/study.py`") == ["methods/fused.py"]
+    texts = {page.name: page.read_text(encoding="utf-8") for page in {*pages(), ROOT / "docs" / "design.md"}}
+    assert len(re.findall(r"`\w+/\w+\.py`", texts["design.md"])) > 5
+    assert [(page, absent(text)) for page, text in texts.items() if absent(text)] == []
