@@ -16,6 +16,7 @@ import gc
 import hashlib
 import pickle
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FunctionType
@@ -50,6 +51,8 @@ _stands_for: dict[int, list[object]] = {}  # id of a function: what numba compil
 _registered: set[Callable[..., Any]] = set()
 _known = [0]  # entries of numba's registry that `_stands_for` knows
 _pruned: list[Path] = []
+_collecting = threading.Lock()
+_compiling: list[bool] = []  # for each thread that does: did it find the collection of garbage on?
 
 overload(sincos, jit_options=INLINED, strict=False)(lambda *_: polynomials)
 
@@ -186,6 +189,22 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             super().save_overload(signature, data)
 
 
+@contextlib.contextmanager
+def _not_collecting() -> Iterator[None]:
+    """While any thread is in here, Python looks for no cyclic garbage."""
+    with _collecting:
+        _compiling.append(gc.isenabled())
+        gc.disable()
+    try:
+        yield
+    finally:
+        with _collecting:
+            first, *others = _compiling  # what the first thread found, whoever leaves
+            _compiling[:] = [first, *others[1:]] if others else []
+            if first and not others:
+                gc.enable()
+
+
 def _without_collecting(compiling: Callable[..., Any]) -> Callable[..., Any]:
     """The same while Python looks for no cyclic garbage: numba's trees are none before the end, and grow to millions.
 
@@ -194,13 +213,8 @@ def _without_collecting(compiling: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(compiling)
     def compile_now(signature: Any) -> Any:
-        enabled = gc.isenabled()
-        gc.disable()
-        try:
+        with _not_collecting():
             return compiling(signature)
-        finally:
-            if enabled:
-                gc.enable()
 
     return compile_now
 

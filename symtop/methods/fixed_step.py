@@ -108,8 +108,9 @@ class FixedStep:
         whose start the kernel cannot step. Threads may call it at the same time; after every `GROUP` steps, or a
         stretch of a longer member, it heeds an interrupt of theirs.
         """
-        numbers, h = np.ascontiguousarray(numbers), np.ascontiguousarray(h)
-        marks = np.ascontiguousarray(marks)
+        # writable too: a kernel is compiled again for an array that is not, as a broadcast one
+        numbers, h = np.require(numbers, requirements=("C", "W")), np.require(h, requirements=("C", "W"))
+        marks = np.require(marks, requirements=("C", "W"))
         whole, check = self._whole, getattr(self.prepare, "check", None)
         out = refused(check, numbers)
         left, done = np.flatnonzero(~out), None

@@ -72,6 +72,14 @@ class Round:
         loaded = {path: data for path in paths if (data := store.load_case(path)) is not None}
         self.done |= {path: (self.paths[path], data) for path, data in loaded.items()}
 
+    def look_again(self) -> None:
+        """Read what was not read; what was computed and is gone has failed, for the study would be drawn without it."""
+        self.look(self.paths.keys() - self.done.keys())
+        for path in self.paths.keys() - self.done.keys():
+            if not store.failure_path(path).is_file():
+                case = self.paths[path]
+                self.failures.append(f"{case.integrator} on {case.scene} failed: its file {path.name} is gone")
+
     def compute(self, missing: dict[Path, Case], workers: Workers, limit: float, *, fresh: bool, quiet: bool) -> None:
         """Have cases computed, with a progress bar where somebody is watching.
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from symtop.base import datasets
 from symtop.base.validate import label
-from symtop.runner import plugins, scripts, seen, store
+from symtop.runner import depends, plugins, scripts, seen, store
 from symtop.runner.cases import Round
 from symtop.runner.study import Case, Combined, Picture, Study
 
@@ -30,6 +30,7 @@ class Asked(NamedTuple):
     failures: list[str]
     plugins: tuple[str, ...]
     stamp: str
+    code: str
     save: Save | None
     quick: bool
 
@@ -39,8 +40,14 @@ def conclude_stored(asked: Asked) -> dict[str, Any]:
     for file in asked.plugins:
         plugins.load(file)
     cases = Round(scripts.load(asked.script), asked.results, paths=asked.paths, failures=asked.failures)
-    cases.look(asked.paths)
-    return conclude(cases, asked.stamp, asked.save, quick=asked.quick)
+    cases.look_again()
+    edited = code_of(cases.study, asked.save) != asked.code  # since the cases were computed: drawn again the next time
+    return conclude(cases, "" if edited else asked.stamp, asked.save, quick=asked.quick)
+
+
+def code_of(study: Study, save: Save | None) -> str:
+    """Hash of the code that combines, draws and judges."""
+    return depends.script_digest(scripts.file_of(study.name), store, save)
 
 
 def conclude(cases: Round, stamp: str, save: Save | None, *, quick: bool) -> dict[str, Any]:
@@ -57,7 +64,7 @@ def conclude(cases: Round, stamp: str, save: Save | None, *, quick: bool) -> dic
         findings = findings_of(study, combined, results, save, failures=cases.failures, cases=len(cases.paths))
         findings |= {"quick": quick, "stamp": stamp if not cases.failures else ""}
         store.write_json(results / f"{study.name}.json", findings)
-        if not cases.failures:
+        if not cases.failures and stamp:
             seen.note(results, study, stamp, cases.paths)
     return findings
 

@@ -7,51 +7,16 @@ cluster's workers need this version of symtop, the scripts of the studies, and t
 import contextlib
 import multiprocessing
 import os
-import threading
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from typing import Any
 
 from symtop.base import cluster
 from symtop.base.threads import cores
 from symtop.runner import work
+from symtop.runner.sideline import Beside, Sideline
 
 HERE, CLUSTER = 0, -1  # in place of a number of processes
-
-
-class Beside:
-    """A call in a process of its own, which begins when it may, or when its result is asked for."""
-
-    def __init__(self, begin: Callable[[], "Future[Any]"]) -> None:
-        self._begin = begin
-        self._future: Future[Any] | None = None
-
-    def start(self) -> "Future[Any]":
-        """Begin, if it has not begun."""
-        if self._future is None:
-            try:
-                self._future = self._begin()
-            except BrokenExecutor as error:  # its process was ended before
-                self._future = Future()
-                self._future.set_exception(error)
-        return self._future
-
-    def settle(self) -> None:
-        """Wait until it is done, if it has begun."""
-        if self._future is not None:
-            wait([self._future])
-
-    def begun(self) -> bool:
-        """Has it begun?"""
-        return self._future is not None
-
-    def done(self) -> bool:
-        """Is there nothing to wait for?"""
-        return self._future is not None and self._future.done()
-
-    def result(self) -> Any:
-        """What the call returned; raises what it raised."""
-        return self.start().result()
 
 
 class InProcess(Executor):
@@ -74,10 +39,7 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         self.jobs = jobs or cores()
         self.scheduler = scheduler
         self._client: Any = None
-        self._beside: ProcessPoolExecutor | None = None
-        self._promised: list[Beside] = []
-        self._filling = False
-        self._lock = threading.RLock()
+        self._sideline = Sideline(self._spawned, self.jobs)
         self._pools: dict[int, Executor] = {HERE: InProcess()}
         if scheduler:
             self._client = cluster.connect(scheduler)
@@ -100,42 +62,19 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
 
     def beside(self, function: Callable[..., Any], *args: Any) -> Beside:
         """Call a function in one more process, which works beside untimed cases."""
-
-        def begin() -> "Future[Any]":
-            if self._beside is None:
-                self._beside = self._spawned(self.jobs)
-            return self._beside.submit(function, *args)
-
-        self._promised = [one for one in self._promised if not one.done()]
-        self._promised.append(Beside(begin))
-        return self._promised[-1]
+        return self._sideline.promise(function, *args)
 
     def fill(self) -> None:
         """Let promised calls begin, one after another: cases are computed that are not timed."""
-        self._filling = True
-        self._next()
-
-    def _next(self, _: object = None) -> None:
-        """Begin the first call that has not begun, if none is working; the next one begins when it is done."""
-        with self._lock:
-            if not self._filling or any(one.begun() and not one.done() for one in self._promised):
-                return
-            for one in self._promised:
-                if not one.begun():
-                    one.start().add_done_callback(self._next)
-                    return
+        self._sideline.go_on()
 
     def quieten(self) -> None:
         """Wait for the call that works beside the others; what has not begun does not begin."""
-        with self._lock:
-            self._filling = False
-        for one in self._promised:
-            one.settle()
+        self._sideline.pause()
 
     def finish(self) -> None:
         """Begin all that is promised at once: no more cases are computed."""
-        for one in self._promised:
-            one.start()
+        self._sideline.finish()
 
     def width(self, size: int) -> int:
         """How many cases to hand over at a time: enough that nobody waits, few enough to stop soon."""
@@ -158,10 +97,8 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         """
         for size in list(self._pools):
             self.drop(size)
-        self._filling = False
-        if self._beside is not None:
-            _kill(self._beside)
-        self._beside, self._promised = None, []
+        for pool in self._sideline.close():
+            _kill(pool)
         self._leave()
 
     def _leave(self) -> None:

@@ -8,7 +8,7 @@ written to a file is the caller's choice (`Save`): this room knows no style.
 
 import contextlib
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +17,9 @@ from typing import Any
 from symtop.base import fingerprint
 from symtop.base.progress import beating
 from symtop.base.validate import positive
-from symtop.runner import depends, plugins, scripts, seen, store
+from symtop.runner import plugins, scripts, seen, store
 from symtop.runner.cases import Round, progress_bar
-from symtop.runner.conclude import Asked, Save, conclude, conclude_stored
+from symtop.runner.conclude import Asked, Save, code_of, conclude, conclude_stored
 from symtop.runner.pools import Workers
 from symtop.runner.scripts import file_of, folder, load, names
 from symtop.runner.study import Study
@@ -27,11 +27,6 @@ from symtop.runner.study import Study
 __all__ = ["begin", "folder", "load", "names", "run"]
 
 Findings = dict[str, Any]
-
-
-def _stamp(study: Study, digests: Iterable[str], save: Save | None) -> str:
-    """Hash of what the findings depend on: the cases, the script and the code that combines, draws and judges."""
-    return fingerprint.hashed(*digests, depends.script_digest(file_of(study.name), store, save))
 
 
 def _drawn(study: Study, results: Path, stamp: str) -> dict[str, Any] | None:
@@ -74,7 +69,8 @@ def begin(study: Study, results: Path, workers: Workers, *, quick: bool = False,
     store.prepare(results, study)
     cases = Round(study, results)
     first = cases.named(study.grid(quick=quick, full=full))
-    stamp = _stamp(study, sorted(path.name for path in first), save)
+    code = code_of(study, save)
+    stamp = fingerprint.hashed(*sorted(path.name for path in first), code)  # of what the findings depend on
     before = _drawn(study, results, stamp)
     if before is not None and not fresh and seen.untouched(results, study, stamp, first):
         return _known(before, began)
@@ -91,7 +87,7 @@ def begin(study: Study, results: Path, workers: Workers, *, quick: bool = False,
         workers.close()  # before what its processes have left is removed
         store.tidy(results, study)
         raise
-    return _concluding(cases, workers, stamp, save, began, quick=quick, quiet=quiet, beside=beside)
+    return _concluding(cases, workers, (stamp, code), save, began, quick=quick, quiet=quiet, beside=beside)
 
 
 @dataclass(frozen=True)
@@ -114,7 +110,7 @@ def _known(before: Findings, began: float) -> Begun:
 def _concluding(
     cases: Round,
     workers: Workers,
-    stamp: str,
+    made_of: tuple[str, str],  # the stamp, and the code in it
     save: Save | None,
     began: float,
     *,
@@ -127,7 +123,7 @@ def _concluding(
     script = str(file_of(study.name))
     told = None
     if beside and workers.jobs > 1 and not _is_local(cases) and study is scripts.load(script):
-        asked = Asked(script, results, cases.paths, cases.failures, tuple(plugins.loaded()), stamp, save, quick)
+        asked = Asked(script, results, cases.paths, cases.failures, tuple(plugins.loaded()), *made_of, save, quick)
         cases.done.clear()  # its process reads the files
         told = workers.beside(conclude_stored, asked)
     computing = time.monotonic() - began
@@ -140,8 +136,8 @@ def _concluding(
             except (BrokenExecutor, CancelledError):  # its process was ended
                 made = None
             if made is None:
-                cases.look(cases.paths.keys() - cases.done.keys())
-                made = conclude(cases, stamp, save, quick=quick)
+                cases.look_again()
+                made = conclude(cases, made_of[0], save, quick=quick)
         return {**made, "computed": cases.computed, "seconds": computing + time.monotonic() - start}
 
     return Begun(findings, lambda: told is None or told.done())

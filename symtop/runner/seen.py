@@ -11,6 +11,8 @@ from pathlib import Path
 from symtop.runner import store
 from symtop.runner.study import Study
 
+MISSING = [0, 0]  # size and time of a file that is not there
+
 
 def _record(results: Path, study: Study) -> Path:
     return results / "cases" / study.name / "seen.json"
@@ -24,7 +26,7 @@ def _marks(paths: Iterable[Path]) -> dict[str, list[int]]:
             told = path.stat()
             marks[path.name] = [told.st_size, told.st_mtime_ns]
         except OSError:
-            marks[path.name] = [0, 0]
+            marks[path.name] = MISSING
     return marks
 
 
@@ -54,4 +56,5 @@ def untouched(results: Path, study: Study, stamp: str, paths: Iterable[Path]) ->
     cases = known.keys() - {dataset}
     if not {path.name for path in paths} <= cases or not dataset_untouched(results, study, stamp):
         return False
-    return _marks(folder / name for name in cases) == {name: known[name] for name in cases}
+    marks = _marks(folder / name for name in cases)
+    return MISSING not in marks.values() and marks == {name: known[name] for name in cases}

@@ -2,7 +2,9 @@
 
 import xarray as xr
 
+from symtop.base.fingerprint import digest
 from symtop.base.remembered import of_one_dataset
+from symtop.base.walk import Walk
 
 
 def test_an_answer_is_computed_once_for_each_object_and_question():
@@ -19,3 +21,24 @@ def test_an_answer_is_computed_once_for_each_object_and_question():
     assert total(twin, "a") == 3.0  # equal, but another object
     assert total(first, "a") == 3.0
     assert len(asked) == 5
+
+
+def test_what_is_remembered_is_no_part_of_a_fingerprint():
+    seen = {}
+
+    @of_one_dataset
+    def size(data):
+        return seen.setdefault("size", len(data))
+
+    def made_of():
+        walk = Walk("measure")
+        walk.add(size)
+        return digest(walk.values())
+
+    before = made_of()
+    seen["other"] = 1  # the control: this a function closes over
+    assert made_of() != before
+    del seen["other"]
+    assert size({"a": 1}) == 1
+    del seen["size"]
+    assert made_of() == before

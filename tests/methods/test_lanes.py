@@ -110,6 +110,21 @@ def test_blocks_that_are_not_full(count):
     assert_runs_alone(SOLVERS["strang[axis]"], *given, SOLVERS["strang[axis]"].many(*given))
 
 
+@pytest.mark.parametrize("name", ["strang[axis]", "lie-variational[axis]"])  # in lanes, and one after another
+def test_arrays_that_cannot_be_written_to_compile_nothing_again(name):
+    """numba gives such an array another type, and the last member of a ladder came as a broadcast one."""
+    solver, given = SOLVERS[name], members(1)
+    whole = solver._whole
+    solver.many(*given)
+    run = whole.alone[0]
+    kernels = run if whole.blocks is None else whole.blocks().march
+    before = len(kernels.signatures), len(run.signatures)
+    for one in given:
+        one.setflags(write=False)
+    solver.many(*given)
+    assert (len(kernels.signatures), len(run.signatures)) == before
+
+
 def test_a_member_does_not_see_its_neighbours():
     """Bits of the members that were not touched; the one that was differs (the negative control)."""
     numbers, h, marks = members(200)

@@ -5,6 +5,7 @@ import os
 import time
 from concurrent.futures import BrokenExecutor
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import xarray as xr
@@ -101,6 +102,40 @@ def test_what_begins_after_its_process_was_killed_says_so():
             later.result()
 
 
+def test_a_process_that_dies_stops_nobody_who_waits():
+    """The next call is not handed over from a callback: from Python 3.12 on that waited for itself."""
+    with Workers(2) as workers:
+        promised = [workers.beside(os.abort), workers.beside(abs, -1.0)]
+        workers.fill()
+        for one in promised:
+            with pytest.raises(BrokenExecutor):
+                one.result()
+        workers.quieten()
+
+
+def test_a_case_whose_file_is_gone_has_failed(script, tmp_path):
+    """The study is not taken for whole without it, and the next run computes it again."""
+    study, results = runner.load(script("first")), tmp_path / "r"
+    with Workers(2) as workers:
+        answer = runner.begin(study, results, workers, quiet=True, beside=True)
+        gone, other = sorted((results / "cases" / "first").glob("*.nc"))
+        gone.unlink()
+        (failure,) = answer()["failures"]
+        assert gone.name in failure
+        assert other.name not in failure
+        again = runner.begin(study, results, workers, quiet=True)()
+        assert (again["failures"], again["computed"]) == ([], 1)
+
+
+def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tmp_path):
+    files = [script("first"), script("second")]  # the second one, the control, is left as it is
+    with Workers(2) as workers:
+        answers = [runner.begin(runner.load(file), tmp_path / "r", workers, quiet=True, beside=True) for file in files]
+        with Path(files[0]).open("a") as text:
+            text.write("CAPTION = 'edited'\n")
+        assert [answer()["stamp"] == "" for answer in answers] == [True, False]
+
+
 def test_files_of_cases_are_not_read_where_they_are_handed_out(script, tmp_path, monkeypatch):
     """Only who concludes reads them, unless a second round hangs on them (the control)."""
     read, load = [], store.load_case
@@ -155,6 +190,11 @@ def test_timed_cases_run_alone(script, tmp_path, timed, begun):
         assert promised.result() is None  # asked for, it begins
 
 
+def processes(workers):
+    """How many processes each pool beside has."""
+    return [len(pool._processes) for pool in workers._sideline._pools]
+
+
 def test_what_runs_beside_runs_one_after_another_until_nothing_is_computed():
     """So that timed cases wait for one of them at most; at the end all run at once."""
     with Workers(2) as workers:
@@ -170,9 +210,11 @@ def test_what_runs_beside_runs_one_after_another_until_nothing_is_computed():
             time.sleep(0.01)
         assert promised[1].done()
         assert not promised[3].begun()
+        assert processes(workers) == [1]
         workers.finish()
         assert all(one.begun() for one in promised)
         assert [one.result() for one in promised] == [None] * 5
+        assert processes(workers) == [1, 1]
 
 
 def test_a_conclusion_waits_for_the_timed_study_that_follows(script, tmp_path):

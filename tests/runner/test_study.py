@@ -26,6 +26,7 @@ from symtop.methods.fixed_step import inside
 from symtop.methods.registry import Integrator, is_built_in
 from symtop.report import style
 from symtop.runner import check, depends, run as runner, store
+from symtop.runner.conclude import code_of
 from symtop.runner.study import Case
 from tests.commands import PROBE, ended, symtop as symtop_command
 
@@ -158,9 +159,9 @@ def test_editing_a_kernel_makes_the_cases_that_use_it_stale_and_no_others(edited
 )
 def test_findings_are_made_again_when_what_judges_them_is_edited(edited, again, monkeypatch):
     study = runner.load("work_precision")
-    before = runner._stamp(study, ["case"], style.save)
+    before = code_of(study, style.save)
     pretend_edited(monkeypatch, PACKAGE / edited)
-    after = runner._stamp(study, ["case"], style.save)
+    after = code_of(study, style.save)
     monkeypatch.undo()
     depends.hashes.cache_clear()
     assert (after != before) is again
@@ -260,7 +261,7 @@ def test_a_users_package_is_drawn_again_when_what_stands_beside_its_script_is_ed
     case = study.cases(True)[0]
 
     def made():
-        return depends.digest(study, case), runner._stamp(study, ["case"], style.save)
+        return depends.digest(study, case), code_of(study, style.save)
 
     before = made()
     for name, measured_again in (("words.py", False), ("tables.py", True)):
