@@ -24,7 +24,8 @@ def connect(address: str) -> Any:
         import distributed
     except ImportError:
         raise SymtopError("scheduler needs the package distributed: pip install 'symtop[distributed]'") from None
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what it logs of a lost scheduler is told here
+    for name in ("client", "batched"):  # what they log of a lost scheduler is told here
+        logging.getLogger(f"distributed.{name}").setLevel(logging.CRITICAL)
     client, failure = None, ""
     try:
         with ThreadPoolExecutor(1) as apart:  # the caller's thread may run a loop of its own, as in a notebook
