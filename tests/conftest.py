@@ -37,8 +37,9 @@ scripts.install()  # tests import `symtop_studies`
 
 
 LONGEST = (  # files whose tests take longest, begun first: one that begins last keeps a process busy alone
-    "test_faults", "test_wheel", "test_advise", "test_plugin_in_studies", "test_study", "test_archive", "test_report",
-    "test_reference", "test_command_lines", "test_cold", "test_figures", "test_blind", "test_long_runs", "test_typing",
+    "test_faults", "test_without_heyoka", "test_wheel", "test_advise", "test_plugin_in_studies", "test_study",
+    "test_archive", "test_report", "test_reference", "test_command_lines", "test_cold", "test_figures", "test_blind",
+    "test_long_runs", "test_typing",
 )  # fmt: skip
 STORED = Path(__file__).resolve().parent.parent / "results" / "quick"
 
