@@ -275,7 +275,8 @@ def test_a_kernel_is_the_same_to_a_profiler():
         numba.njit(made(2.0))(1.0)
     finally:
         watching.disable()
-    assert not made(1.0).__code__.co_flags & inspect.CO_OPTIMIZED  # numba has cleared it, for all that share the code
+    cleared = not made(1.0).__code__.co_flags & inspect.CO_OPTIMIZED  # by numba, for all that share the code
+    assert cleared is (sys.version_info < (3, 12))
     assert digest(compiled.code_of(made(1.0)).values()) == plain
 
 
