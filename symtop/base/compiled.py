@@ -199,9 +199,9 @@ def _not_collecting() -> Iterator[None]:
         yield
     finally:
         with _collecting:
-            first, *others = _compiling  # what the first thread found, whoever leaves
-            _compiling[:] = [first, *others[1:]] if others else []
-            if first and not others:
+            first = _compiling[0]  # what the first thread found, whoever leaves
+            _compiling.pop()
+            if first and not _compiling:
                 gc.enable()
 
 
