@@ -21,7 +21,7 @@ LEFT_OUT = {
     "close to a pole, where the angles chart fails": ("bruls-cardona-arnold", "grazing"),
     "unstable or nearly so: errors grow with the motion": ("sleeping", "sleeping-unstable", "separatrix"),
 }
-NOT_QUICK = {"left to the ordinary grid": ("loop", "hairer-lubich-wanner")}
+NOT_QUICK = {"left to the ordinary grid": ("goldstein", "loop", "hairer-lubich-wanner")}
 WHOLE = "spheroid"  # runs to its horizon; the other scenes run for `NUTATIONS` at most
 NUTATIONS = 8.0
 MOST_STEPS = 1e6  # of a run

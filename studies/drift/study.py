@@ -1,6 +1,8 @@
 """What happens to energy, momenta and phase over a million steps, and over 10^8?"""
 
 import math
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 
 import xarray as xr
 
@@ -25,6 +27,7 @@ LEFT_OUT = {  # a million steps of every method take minutes on each scene
     "close to a pole, where the angles chart fails": ("bruls-cardona-arnold", "grazing"),
     "unstable or nearly so: errors grow with the motion": ("sleeping", "sleeping-unstable", "separatrix"),
 }
+NOT_QUICK = {"left to the ordinary grid": ("goldstein",)}
 STEPS_A_NUTATION = 118.02  # not commensurate with the nutation
 TOLERANCE = 1e-8  # of every adaptive method without a default of its own
 SHORTENED = {  # share of the horizon: over all of it they take between 15 s (lsoda) and 8 minutes (radau) on each scene
@@ -39,7 +42,9 @@ def cases(quick: bool) -> list[Case]:
     Histories are run in every chart, on every scene: a million compiled steps take 0.03 to 1 s. Losses of phase, which
     take up to a minute, leave out an attitude chart beside an axis chart.
     """
-    return grid(20_000, 2, 100_000, 200_000, 0.1) if quick else grid(1_000_000, 24, 10_000_000, 100_000_000, 1.0)
+    if quick:
+        return grid(20_000, 2, 100_000, 200_000, 0.1, LEFT_OUT | NOT_QUICK)
+    return grid(1_000_000, 24, 10_000_000, 100_000_000, 1.0)
 
 
 def full() -> list[Case]:
@@ -47,7 +52,10 @@ def full() -> list[Case]:
     return grid(1_000_000, 24, 100_000_000, 1_000_000_000, 1.0)
 
 
-def grid(steps: int, members: int, walk: int, longest: int, share: float) -> list[Case]:
+def grid(
+    steps: int, members: int, walk: int, longest: int, share: float,
+    left_out: Mapping[str, Iterable[str]] = MappingProxyType(LEFT_OUT),
+) -> list[Case]:  # fmt: skip
     """Histories of `steps`, windows of `longest`, ensembles of `walk` steps, and losses over `share` of their time."""
     long_run = {"steps": longest, "per_nutation": PER_NUTATION}
     ensemble = {"steps": walk, "per_nutation": PER_NUTATION, "count": members}
@@ -55,7 +63,7 @@ def grid(steps: int, members: int, walk: int, longest: int, share: float) -> lis
     rows = grid_rows("nutation")
     return [
         *(Case(name, row.name, history_settings(scene(name), row, steps), group=HISTORIES)
-          for name in grid_scenes(LEFT_OUT, lambda one: math.isfinite(one.nutation_period))
+          for name in grid_scenes(left_out, lambda one: math.isfinite(one.nutation_period))
           for row in grid_rows("nutation", attitude=True)),
         *(Case(LONG, row.name, settings, group=group) for row in rows if row.modified_energy
           for group, settings in ((WINDOWS, long_run), (ROUNDINGS, ensemble))),

@@ -23,11 +23,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.base.compiled import register_jitable
-from symtop.methods import unreduced
 from symtop.methods.euler_lagrange import accelerations, with_rates
 from symtop.methods.loop import March, Marks, driver
 from symtop.methods.quadrature import RULES, quadrature
 from symtop.methods.scipy_ivp import integrated
+from symtop.methods.unreduced import begin, observe, unreduced_step, with_momenta
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
@@ -66,10 +66,10 @@ def _momenta(par: Any, sums: Any, v: float, u: float, h: float) -> Any:
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations."""
-    return unreduced.unreduced_step(_inertia, _momenta, par, rule, state, carry, h)
+    return unreduced_step(_inertia, _momenta, par, rule, state, carry, h)
 
 
-march = driver(unreduced.begin, increment, unreduced.observe)
+march = driver(begin, increment, observe)
 
 
 def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Marks) -> March:
@@ -77,7 +77,7 @@ def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Mar
 
     `rule` is a name of `quadrature.RULES`. SymtopError for a start at a pole.
     """
-    free, state = unreduced.with_momenta(scene.top, scene.start)
+    free, state = with_momenta(scene.top, scene.start)
     return march(DampedTop(*free, *friction), quadrature(*RULES[rule][:2])[0], state, h, marks)
 
 

@@ -6,12 +6,13 @@ winner and the next row run at the two settings on both sides of the target, to 
 the same runs decide, one is chosen.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from symtop.methods.registry import integrator
+from symtop.model.charts import Array
 
 from ..population.costs import cost_to_reach
 from . import tables
@@ -26,15 +27,17 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
     for quantity in QUANTITIES:
         panel = tables.diagram(data, tables.SCENE, quantity)
         eligible[quantity] = []
+        rows = [_Row.of(data, name, quantity) for name in panel.names]
         for at in zip(
             *np.nonzero(panel.foretold & (panel.ratio >= tables.TIE) & np.isfinite(panel.ratio)), strict=True
         ):
-            pair = [panel.names[panel.winner[at]], panel.names[panel.second[at]]]
-            parts = [_settings(data, name, quantity, at) for name in pair]
+            pair = [int(panel.winner[at]), int(panel.second[at])]
+            parts = [rows[place].settings(at) for place in pair]
             horizon = float(panel.horizons[at[1]])
             if max(work for _, work, _ in parts) * horizon > limit:
                 continue
-            settings = {"integrators": pair, "quantity": quantity, "target": tables.TARGETS[at[0]], "horizon": horizon,
+            names = [panel.names[place] for place in pair]
+            settings = {"integrators": names, "quantity": quantity, "target": tables.TARGETS[at[0]], "horizon": horizon,
                         "settings": [values for values, _, _ in parts]}  # fmt: skip
             eligible[quantity].append((horizon / parts[0][2], settings))
     queues = [sorted(each, key=lambda one: -one[0]) for each in eligible.values()]
@@ -52,14 +55,23 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
     return taken
 
 
-def _settings(data: xr.DataTree, name: str, quantity: str, at: tuple[int, int]) -> tuple[list[float], float, float]:
-    """The coarser and the finer setting of a row in a cell, the evaluations a nutation of the finer, its reach."""
-    one = tables.cell(data, tables.SCENE, name)
-    _, level = tables.work_to_reach(one, quantity)
-    fine = min(int(level[at][0]), one.sizes["setting"] - 1)
-    pair = [max(fine - 1, 0), fine]
-    values, reach = one["setting_value"].values[pair], one["reach"].values[pair].min()
-    return values.tolist(), float(np.nanmax(one["work"].values[fine])), float(reach)
+class _Row(NamedTuple):
+    """What was measured of a row, and the finer of the two settings that each cell comes from."""
+
+    one: xr.Dataset
+    level: Array
+
+    @classmethod
+    def of(cls, data: xr.DataTree, name: str, quantity: str) -> "_Row":
+        one = tables.cell(data, tables.SCENE, name)
+        return cls(one, tables.work_to_reach(one, quantity)[1])
+
+    def settings(self, at: tuple[int, int]) -> tuple[list[float], float, float]:
+        """The coarser and the finer setting in a cell, the evaluations a nutation of the finer, the row's reach."""
+        fine = min(int(self.level[at][0]), self.one.sizes["setting"] - 1)
+        pair = [max(fine - 1, 0), fine]
+        values, reach = self.one["setting_value"].values[pair], self.one["reach"].values[pair].min()
+        return values.tolist(), float(np.nanmax(self.one["work"].values[fine])), float(reach)
 
 
 def check(asked: Any) -> xr.Dataset:

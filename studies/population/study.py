@@ -21,7 +21,7 @@ SEED = 1
 HORIZONS = {"short": 10.0, "long": 1000.0}  # nutations, by the group of cases
 MEMBERS = {"short": 10_000, "long": 50}  # at 25 ms and 2 s of one core a top, all rows together
 BUDGET = 1000.0  # force evaluations a nutation, of one run
-QUICK = {"horizons": {"short": 10.0, "long": 100.0}, "members": {"short": 300, "long": 60}, "budget": 600.0}
+QUICK = {"horizons": {"short": 10.0, "long": 100.0}, "members": {"short": 300, "long": 30}, "budget": 600.0}
 GUARDED = {"short": 100, "long": 50}  # tops that the guard is asked about, which takes it 60 us and more a run
 TOPS, PRICES = "tops", "prices"  # groups: what is known of the tops, and what an evaluation costs
 

@@ -29,7 +29,7 @@ LEFT_OUT = {  # timing all methods on a scene takes ten seconds
     "unstable or nearly so: errors grow with the motion": ("sleeping", "sleeping-unstable", "separatrix"),
 }
 NOT_QUICK = {"left to the ordinary grid": (
-    "cusp", "loop", "wave", "fast", "hairer-lubich-wanner", "bruls-cardona-arnold",
+    "goldstein", "cusp", "loop", "wave", "fast", "hairer-lubich-wanner", "bruls-cardona-arnold",
 )}  # fmt: skip
 PERIODS = ([10.0, 1000.0], [10.0, 100.0])  # in full, and quick
 BUDGET = {"compiled": 1e6, "python": 2.5e4}  # force evaluations of one run

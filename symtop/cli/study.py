@@ -50,7 +50,7 @@ def run_all(
     from symtop.report import style
 
     made = settled.made_by(settled.grid_of(**grid)) if whole else ""  # before an edit of the code may change it
-    save = style.save if grid.get("quick") else style.publish  # quick figures are to look at, not to print
+    save = style.sketch if grid.get("quick") else style.publish  # quick figures are to look at, not to print
     options = {"fresh": fresh, "limit": limit, "save": save, "beside": len(studies) > 1, **grid}
     ended = _in_order(workers, studies, results, options)
     summaries = [told.study(findings, results, as_json=as_json) for findings in ended]

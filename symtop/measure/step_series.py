@@ -13,6 +13,7 @@ What a run carries from step to step is not seen in one step from a start; `step
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, III.1 (the elementary differentials of a step).
 """
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -181,6 +182,7 @@ def _monomials(coefficients: Any, *, backward: bool) -> Array:
     return powers
 
 
+@functools.cache  # 9 ms, of a few degrees; a claim needs six of them
 def _to_powers(degree: int, *, backward: bool) -> Array:
     """The matrix from Chebyshev coefficients to powers of h/H."""
     columns = []
@@ -189,7 +191,9 @@ def _to_powers(degree: int, *, backward: bool) -> Array:
         if not backward:  # x = 2 s - 1
             powers = np.polynomial.Polynomial(powers)(np.polynomial.Polynomial([-1.0, 2.0])).coef
         columns.append(np.pad(powers, (0, degree + 1 - len(powers))))
-    return np.stack(columns, axis=1)
+    matrix = np.stack(columns, axis=1)
+    matrix.flags.writeable = False
+    return matrix
 
 
 def _amplification(degree: int, *, backward: bool) -> Array:

@@ -18,7 +18,7 @@ from symtop.base import datasets
 
 WIDTH = 6.5  # inches, of a figure: the text block of a page
 LEAST_TEXT = 7.0  # points, of any text at that width
-DPI = 200
+DPI, SKETCHED = 200, 100
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
@@ -218,6 +218,12 @@ def save(figure: Any, target: Path) -> None:
     plt.close(figure)
 
 
+def sketch(figure: Any, target: Path) -> None:
+    """Write a figure to be looked at, not kept: half as many dots an inch, in half the time of `save`."""
+    _write(figure, target, dpi=SKETCHED)
+    plt.close(figure)
+
+
 def publish(figure: Any, target: Path) -> None:
     """Write a figure as a PNG and, for print, as a PDF beside it, laid out once; a film has no PDF."""
     _write(figure, target)
@@ -227,11 +233,11 @@ def publish(figure: Any, target: Path) -> None:
     plt.close(figure)
 
 
-def _write(figure: Any, target: Path) -> None:
+def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
     datasets.sweep(target)
     with datasets.replacing(target, target.suffix) as partial:
-        figure.savefig(partial, metadata={UNDATED.get(target.suffix, "Software"): None})
-        if target.suffix == ".png":
+        figure.savefig(partial, metadata={UNDATED.get(target.suffix, "Software"): None}, dpi=dpi)
+        if target.suffix == ".png" and dpi == DPI:
             compact(partial)
 
 
