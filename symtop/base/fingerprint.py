@@ -62,7 +62,12 @@ def file_hash(path: Path) -> str:
 def file_label(path: Path) -> str:
     """The name of a file: with its package if that is known, by itself otherwise."""
     root = root_of(path)
-    return f"{root}/{path.relative_to(roots[root]).as_posix()}" if root else path.name
+    return _within(root, roots[root], path) if root else path.name
+
+
+@functools.cache  # 60 us in Python 3.12, asked for twice for each function of a kernel
+def _within(root: str, folder: Path, path: Path) -> str:
+    return f"{root}/{path.relative_to(folder).as_posix()}"
 
 
 def file_reasons(files: Iterable[Path]) -> Reasons:
