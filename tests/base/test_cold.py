@@ -1,7 +1,9 @@
 """Python says once that it compiles, to a terminal or a notebook and to nobody else."""
 
 import gc
+import importlib
 import os
+import pkgutil
 import pty
 import subprocess
 import sys
@@ -9,7 +11,13 @@ import time
 from pathlib import Path
 
 import pytest
+from numba.core.dispatcher import Dispatcher
 from numba.core.errors import TypingError
+
+import studies
+import symtop
+from symtop.base.compiled import compile_kernel
+from symtop.methods.loop import Loop
 
 ROOT = Path(__file__).resolve().parents[2]
 UNIQUE = time.time()  # a constant that no kernel on disk was compiled with
@@ -56,6 +64,28 @@ def test_compiling_is_said_once_to_whoever_watches(tmp_path, watched, lines):
 def test_nothing_is_said_of_kernels_that_are_on_disk(tmp_path):
     _heard(tmp_path)
     assert _heard(tmp_path, before="sys.modules['ipykernel'] = sys") == ""
+
+
+def _kernels():
+    """Kernels of all modules of the package and of its studies, by name."""
+    for package in (symtop, studies):
+        for one in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            if one.name.endswith("__main__"):
+                continue
+            for name, value in vars(importlib.import_module(one.name)).items():
+                parts = [value.prepare, value.march] if isinstance(value, Loop) else [value]
+                yield from ((f"{one.name}.{name}", part) for part in parts if isinstance(part, Dispatcher))
+
+
+def test_every_kernel_is_kept_on_disk():
+    kernels = list(_kernels())
+    assert {"symtop.methods.collective_gauss.march", "studies.oscillators.damped_top.march"} <= {
+        name for name, _ in kernels
+    }
+    assert {name for name, kernel in kernels if not hasattr(kernel._cache, "_cache_path")} == set()
+    unkept = {"__name__": "prompt"}
+    exec("def typed(x): return x", unkept)  # the control: a function without a file
+    assert not hasattr(compile_kernel(unkept["typed"])._cache, "_cache_path")
 
 
 def test_garbage_is_collected_after_a_kernel_is_compiled_and_not_before():
