@@ -30,23 +30,27 @@ HISTORY = (1000.0, 100.0)  # nutations of the run that shows the energy over tim
 
 def cases(quick: bool) -> list[Case]:
     """Every method in every chart: steps from ten a nutation to so short that rounding rules, tolerances likewise."""
-    grid = []
-    for name in grid_scenes(LEFT_OUT | (NOT_QUICK if quick else {})):
-        on = scene(name)
-        horizon = min(on.horizon, math.inf if name == WHOLE else NUTATIONS * on.nutation_period)
-        for row in rows():
-            if row.exact_steps:
-                continue  # no step is more accurate than another
-            if row.fixed_step:
-                settings = step_ladder(row, on, horizon, *((8, 1e5) if quick else (17, MOST_STEPS)))
-            elif row.adaptive:
-                settings = tolerance_ladder(row, 6 if quick else 13)
-            else:
-                continue  # a formula has nothing to set
-            chosen = {"horizon": horizon, "settings": settings, "dense": not quick}
-            if name == WHOLE and row.method in tables.NAMED:
-                chosen["history"] = HISTORY[quick]
-            grid.append(Case(name, row.name, chosen))
+    names = grid_scenes(LEFT_OUT | (NOT_QUICK if quick else {}))
+    return [case for name in names for case in on_scene(name, quick)]
+
+
+def on_scene(name: str, quick: bool) -> list[Case]:
+    """The cases of one scene."""
+    on, grid = scene(name), []
+    horizon = min(on.horizon, math.inf if name == WHOLE else NUTATIONS * on.nutation_period)
+    for row in rows():
+        if row.exact_steps:
+            continue  # no step is more accurate than another
+        if row.fixed_step:
+            settings = step_ladder(row, on, horizon, *((8, 1e5) if quick else (17, MOST_STEPS)))
+        elif row.adaptive:
+            settings = tolerance_ladder(row, 6 if quick else 13)
+        else:
+            continue  # a formula has nothing to set
+        chosen = {"horizon": horizon, "settings": settings, "dense": not quick}
+        if name == WHOLE and row.method in tables.NAMED:
+            chosen["history"] = HISTORY[quick]
+        grid.append(Case(name, row.name, chosen))
     return grid
 
 
