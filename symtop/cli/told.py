@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from symtop.cli.common import terminal_width
+from symtop.report.sentences import counted
 
 MOST_TOLD = 3  # sentences of a study that has run
 
@@ -18,7 +19,8 @@ def study(findings: dict[str, Any], results: Path, *, as_json: bool) -> dict[str
     summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
     summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
     if not as_json:
-        click.echo("{study}: {computed} of {cases} cases computed, {figures} figures".format(**summary))
+        drawn = counted(summary["figures"], "figure")
+        click.echo("{study}: {computed} of {cases} cases computed, {drawn}".format(drawn=drawn, **summary))
         _sentences(findings, results)
     for failure in findings["failures"]:
         click.echo(f"  {failure}", err=True)
@@ -38,7 +40,8 @@ def _sentences(findings: dict[str, Any], results: Path) -> None:
     sentences, name = findings["verdict"], findings["study"]
     for sentence in sentences[:MOST_TOLD]:
         click.echo(indented(sentence, "  - "))
-    more = f", {len(sentences) - MOST_TOLD} more findings in {name}.json" if len(sentences) > MOST_TOLD else ""
+    left = len(sentences) - MOST_TOLD
+    more = f", {counted(left, 'more finding')} in {name}.json" if left > 0 else ""
     pictures = f"figures {results / 'figures' / name}-*{more}" if findings["pictures"] else more.lstrip(", ")
     for line in filter(None, (f"dataset {results / name}.nc", pictures)):
         click.echo(indented(line, "  "))
