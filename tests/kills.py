@@ -47,10 +47,10 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
     count = lost = most = rounds = 0
     done: dict[Path, tuple[int, int]] = {}  # finished cases: the identity of their file and when it was written
     while count < kills:
-        before, start = set(results.rglob(".*.lock")), time.time()
+        before, start = _begun(results), time.time()
         process = symtop(*command, results, PROBE_PAUSE=0.2)
         if draw.random() < 0.9:  # the others come while it is still starting
-            while process.poll() is None and not set(results.rglob(".*.lock")) - before:
+            while process.poll() is None and not _begun(results) - before:
                 time.sleep(0.02)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(draw.uniform(0.0, longest))
@@ -64,7 +64,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
         files = {path: path.stat() for path in results.rglob("cases/*/*.nc")}
         now = {path: (about.st_ino, about.st_mtime_ns) for path, about in files.items()}
         assert done.items() <= now.items()  # not one was written a second time
-        begun = sum(lock.stat().st_mtime >= start for lock in results.rglob(".*.lock"))
+        begun = sum(lock.stat().st_mtime >= start for lock in _begun(results))
         assert begun <= 2  # what a kill costs: one case a worker
         lost, most, done = lost + begun, max(most, begun), now
         if process.returncode == 0:
@@ -76,6 +76,11 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
     assert_same(results, calm)
     assert not leftovers(results)
     return Survived(count, lost, most, rounds + 1)
+
+
+def _begun(results: Path) -> set[Path]:
+    """The locks of cases; a study that is being concluded, beside the cases of the next, has one in another folder."""
+    return set(results.rglob("cases/*/.*.lock"))
 
 
 def assert_same(results: Path, calm: Path) -> None:

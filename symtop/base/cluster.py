@@ -72,7 +72,7 @@ class Watched(Executor):
     """
 
     def __init__(self, client: Any) -> None:
-        self._client = client
+        self._client, self._address = client, client.scheduler.address  # a client that closes has no scheduler
         self._waiting: dict[Future[Any], Any] = {}  # and the client's, which cancels what nobody holds
         self._lock, self._ended, self._gone = threading.Lock(), threading.Event(), ""
         self._done: SimpleQueue[tuple[Future[Any], Any] | None] = SimpleQueue()
@@ -121,7 +121,7 @@ class Watched(Executor):
             future.set_exception(error)
 
     def _told(self, what: str) -> str:
-        return f"the cluster at {self._client.scheduler.address} {what}; what was computed is kept"
+        return f"the cluster at {self._address} {what}; what was computed is kept"
 
     def _watch(self) -> None:
         last, what = time.monotonic(), ""
