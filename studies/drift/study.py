@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from types import MappingProxyType
 
 import xarray as xr
 
@@ -54,7 +53,7 @@ def full() -> list[Case]:
 
 def grid(
     steps: int, members: int, walk: int, longest: int, share: float,
-    left_out: Mapping[str, Iterable[str]] = MappingProxyType(LEFT_OUT),
+    left_out: Mapping[str, Iterable[str]] = LEFT_OUT,
 ) -> list[Case]:  # fmt: skip
     """Histories of `steps`, windows of `longest`, ensembles of `walk` steps, and losses over `share` of their time."""
     long_run = {"steps": longest, "per_nutation": PER_NUTATION}

@@ -98,8 +98,11 @@ def cases(quick: bool) -> list[Case]:
             ladder = [0.2, 0.1, 0.05, 0.025] if method.fixed_step else [1e-4, 1e-6, 1e-8, 1e-10]
             grid.append(Case("separatrix", method.name, {"ladder": ladder[: 1 if quick else 4]}))
         if method.fixed_step:
-            mechanisms = fixed.keys() - ({"sleeping"} if method.name in left else set())
-            grid.extend(Case(name, method.name, settings) for name, settings in fixed.items() if name in mechanisms)
+            grid.extend(
+                Case(name, method.name, settings)
+                for name, settings in fixed.items()
+                if name != "sleeping" or method.name not in left
+            )
     return grid
 
 

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from symtop_studies.stability import study
 from symtop_studies.stability.failures import (
     sampled_energy_error,
     separatrix_horizon,
@@ -35,6 +36,7 @@ from symtop.run.linear_stability import (
     trace,
     with_momenta,
 )
+from symtop.runner.grid import grid_rows
 
 STEADY = scenes.scene("steady-fast")  # I1, I3, mgl, theta, w3 = 2, 1, 2, 60 degrees, 20
 OMEGA = STEADY.top.nutation_frequency(STEADY.top.momenta(STEADY.start))
@@ -200,6 +202,14 @@ def test_the_closed_forms_are_what_they_are():
 def test_methods_without_a_shift_keep_the_threshold(name):
     for h in (0.1, 1.0):
         assert sleeping_threshold(integrator(name), h) == pytest.approx(2.0, abs=1e-6)
+
+
+def test_every_row_of_fixed_step_is_scanned_for_sleep_but_those_that_are_left_out():
+    left = {name for names in study.NOT_SLEEPING.values() for name in names}
+    fixed = {row.name for row in grid_rows("axis") if row.fixed_step}
+    assert left < fixed  # a name that no row has would leave nothing out
+    for quick in (True, False):
+        assert {case.integrator for case in study.cases(quick) if case.scene == "sleeping"} == fixed - left
 
 
 def test_long_runs_fall_on_one_side_of_the_threshold_only():
