@@ -45,8 +45,9 @@ class Phase(NamedTuple):
 def fates(histories: xr.Dataset, constant: str) -> dict[str, list[Fate]]:
     """The rows by what became of a constant on the scene where it fared worst, a key of `MEANING`."""
     groups: dict[str, list[Fate]] = {word: [] for word in MEANING}
-    for row in map(str, histories["integrator"].values):
-        cell = histories.sel(integrator=row)
+    asked = histories[["outcome", *(f"{constant}_{part}" for part in ("largest", "exponent", "exponent_interval"))]]
+    for k, row in enumerate(map(str, histories["integrator"].values)):
+        cell = asked.isel(integrator=k)
         largest, rate = (float(cell[f"{constant}_{part}"].max()) for part in ("largest", "exponent"))
         groups[worst_behaviour(cell, constant)].append(Fate(largest, row, rate))
     return {word: sorted(group) for word, group in groups.items() if group}

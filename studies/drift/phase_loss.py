@@ -53,7 +53,9 @@ def steps_for(scene: Scene, method: Integrator, target: float) -> float:
     return MOST if isinstance(step, str) else period / step
 
 
-def phase_loss(scene: Scene, method: Integrator, short: float = SHORT, target: float = TARGET) -> xr.Dataset:
+def phase_loss(
+    scene: Scene, method: Integrator, short: float = SHORT, target: float = TARGET, most: float = MOST_STEPS
+) -> xr.Dataset:
     """When the phase error of a fixed-step method reaches `LOST`: predicted from `short` nutations, and measured.
 
     ``steps`` and force ``evaluations`` a nutation; in nutations, ``predicted``, the length ``short`` of the run that
@@ -72,7 +74,7 @@ def phase_loss(scene: Scene, method: Integrator, short: float = SHORT, target: f
         steps *= 1.3  # the frequency error itself drifts, and a few nutations do not show it
     if not math.isfinite(predicted):
         return xr.Dataset({"steps": steps, "predicted": predicted, "short": short})
-    length = min(1.1 * predicted, MOST_STEPS / steps)
+    length = min(1.1 * predicted, most / steps)
     long = phase_run(scene, method, steps, length)
     fit = growth(long["time"], long["phase"], 1.0)
     evaluations = long.attrs["force_evaluations"] / length

@@ -47,11 +47,10 @@ def _tolerances(histories: xr.Dataset) -> tuple[dict[str, float], dict[str, floa
     """The tolerances of rows that ran at their own default, and those that were given, by row."""
     own: dict[str, float] = {}
     given: dict[str, float] = {}
-    for name in map(str, histories["integrator"].values):
-        cell = histories.sel(integrator=name)
-        value = float(cell["tolerance"].max())
+    columns = (histories[name].max("scene").values for name in ("tolerance", "own_tolerance"))
+    for name, value, default in zip(map(str, histories["integrator"].values), *columns, strict=True):
         if math.isfinite(value):
-            (own if float(cell["own_tolerance"].max()) > 0.0 else given)[name] = value
+            (own if default > 0.0 else given)[name] = float(value)
     return own, given
 
 
@@ -78,15 +77,16 @@ class Pair(NamedTuple):
 def pairs(histories: xr.Dataset) -> Iterator[Pair]:
     """Every two charts of a method for every constant; runs that ended early are left out."""
     rows: dict[str, list[str]] = {}
-    for name in map(str, histories["integrator"].values):
-        if (histories["outcome"].sel(integrator=name) == "ok").all():
+    every = list(map(str, histories["integrator"].values))
+    for name, ended in zip(every, (histories["outcome"] == "ok").all("scene").values, strict=True):
+        if ended:
             rows.setdefault(split_name(name)[0], []).append(name)
-    largest = {one: histories[f"{one}_largest"].max("scene", skipna=False) for one in CONSTANTS}
     for constant, names in itertools.product(CONSTANTS, rows.values()):
+        values = histories[f"{constant}_largest"].max("scene", skipna=False).values
+        largest = dict(zip(every, map(float, values), strict=True))
         for two in itertools.combinations(names, 2):
-            better, worse = sorted(two, key=lambda name: float(largest[constant].sel(integrator=name)))
-            sizes = (float(largest[constant].sel(integrator=name)) for name in (worse, better))
-            yield Pair(constant, worse, better, *sizes)
+            better, worse = sorted(two, key=largest.__getitem__)
+            yield Pair(constant, worse, better, largest[worse], largest[better])
 
 
 def _apart(histories: xr.Dataset) -> list[Pair]:

@@ -14,7 +14,7 @@ from symtop.runner.study import Case, Study
 from . import figures, words
 from .histories import run_history
 from .long_runs import rounding, windows
-from .phase_loss import SHORT, TARGET, phase_loss
+from .phase_loss import MOST_STEPS, SHORT, TARGET, phase_loss
 from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS
 
 LONG = "spheroid"  # the scene of the long runs and of the losses of phase
@@ -42,7 +42,7 @@ def cases(quick: bool) -> list[Case]:
     take up to a minute, leave out an attitude chart beside an axis chart.
     """
     if quick:
-        return grid(20_000, 2, 100_000, 200_000, 0.1, LEFT_OUT | NOT_QUICK)
+        return grid(20_000, 2, 100_000, 200_000, 0.05, LEFT_OUT | NOT_QUICK)
     return grid(1_000_000, 24, 10_000_000, 100_000_000, 1.0)
 
 
@@ -58,7 +58,7 @@ def grid(
     """Histories of `steps`, windows of `longest`, ensembles of `walk` steps, and losses over `share` of their time."""
     long_run = {"steps": longest, "per_nutation": PER_NUTATION}
     ensemble = {"steps": walk, "per_nutation": PER_NUTATION, "count": members}
-    loss = {"short": share * SHORT, "target": share * TARGET}
+    loss = {"short": share * SHORT, "target": share * TARGET, "most": share * MOST_STEPS}
     rows = grid_rows("nutation")
     return [
         *(Case(name, row.name, history_settings(scene(name), row, steps), group=HISTORIES)

@@ -30,8 +30,9 @@ GOALS = (
     (10.0, 1e-9, LANGUAGES, CALLS),
     (1000.0, 1e-6, (COMPILED,), (KERNEL,)),  # long enough that a call's own time does not count
 )
-ROUNDS = 2  # of all; short calls take part in more
-BATCH = (0.0015, 0.001)  # seconds, in full and quick
+ROUNDS = 2  # of all
+FURTHER = (10, 3)  # times as many of short calls, in full and quick
+BATCH = (0.0015, 0.001)  # seconds
 
 
 def cases(quick: bool) -> list[Case]:
@@ -42,6 +43,7 @@ def cases(quick: bool) -> list[Case]:
         "goals": [list(goal) for goal in (GOALS[:1] if quick else GOALS)],
         "rounds": ROUNDS,
         "batch": BATCH[quick],
+        "further": FURTHER[quick],
     }
     return [Case(name, "together", settings) for name in names]
 
@@ -50,7 +52,7 @@ def measure(case: Case) -> xr.Dataset:
     """The factorial of one scene."""
     plan = case.settings
     goals = [Goal(float(span), float(target), tuple(rows), tuple(calls)) for span, target, rows, calls in plan["goals"]]
-    return factorial(scene(case.scene), plan["schemes"], goals, plan["rounds"], plan["batch"])
+    return factorial(scene(case.scene), plan["schemes"], goals, plan["rounds"], plan["batch"], plan["further"])
 
 
 STUDY = Study(

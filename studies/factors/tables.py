@@ -36,7 +36,6 @@ LEAST = 0.7  # of the target: the search ends with an error from here to the tar
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
 FINER = 1e-3  # of the target: the tolerance that a second search begins with
 SHORT = 0.01  # seconds of a call
-FURTHER = 10
 TIE = 0.1  # times that differ by less are level
 FACTORS = ("method", "chart", "language", "call")
 
@@ -89,11 +88,11 @@ def settle(scene: Scene, grid: Sequence[Cell], goal: Goal) -> dict[Cell, setting
 
 
 def timed(
-    scene: Scene, chosen: dict[Cell, settings.Met], calls: Sequence[str], rounds: int, batch: float
+    scene: Scene, chosen: dict[Cell, settings.Met], calls: Sequence[str], rounds: int, batch: float, further: int
 ) -> dict[tuple[Cell, str], Timing]:
     """Times of every cell in every call, in interleaved rounds.
 
-    Short calls take part in `FURTHER` times as many rounds again, because a busy moment of the machine can spoil all
+    Short calls take part in `further` times as many rounds again, because a busy moment of the machine can spoil all
     their samples; of the long ones those that are noisy take part in as many rounds again.
     """
     functions = {
@@ -107,14 +106,16 @@ def timed(
     taken = dict(zip(functions, timings(list(functions.values()), rounds, batch, warm=True), strict=True))
     short = [key for key, timing in taken.items() if timing.best < SHORT]
     noisy = [key for key, timing in taken.items() if timing.best >= SHORT and timing.spread > NOISY]
-    for again, times_more in ((short, FURTHER), (noisy, 1)):
+    for again, times_more in ((short, further), (noisy, 1)):
         more = timings([functions[key] for key in again], times_more * rounds, batch, seed=times_more, warm=True)
         for key, timing in zip(again, more, strict=True):
             taken[key] = Timing(taken[key].samples + timing.samples, taken[key].first_call)
     return taken
 
 
-def factorial(scene: Scene, schemes: Sequence[str] | None, goals: Sequence[Goal], rounds: int, batch: float) -> Any:
+def factorial(
+    scene: Scene, schemes: Sequence[str] | None, goals: Sequence[Goal], rounds: int, batch: float, further: int
+) -> Any:
     """The factorial of one scene: settings, errors and times of all cells for all goals."""
     grid = cells(schemes)
     horizons, targets = sorted({goal.nutations for goal in goals}), sorted({goal.target for goal in goals})[::-1]
@@ -122,7 +123,7 @@ def factorial(scene: Scene, schemes: Sequence[str] | None, goals: Sequence[Goal]
     names = Column.SETTING, Column.AXIS, Column.AXIS_BOUND, Column.FORCES
     numbers = {name: np.full(shape, math.nan) for name in names}
     reasons = np.full(shape, "", dtype=object)
-    samples = np.full((*shape, len(CALLS), (1 + FURTHER) * rounds), math.nan)
+    samples = np.full((*shape, len(CALLS), (1 + further) * rounds), math.nan)
     for goal in goals:
         part = [cell for cell in grid if cell.language in goal.languages]
         settled = settle(scene, part, goal)
@@ -134,7 +135,7 @@ def factorial(scene: Scene, schemes: Sequence[str] | None, goals: Sequence[Goal]
                 continue
             for name, value in zip(names, (met.setting, met.error, met.bound, met.evaluations), strict=True):
                 numbers[name][(grid.index(cell), *at)] = value
-        for (cell, call), timing in timed(scene, good, goal.calls, rounds, batch).items():
+        for (cell, call), timing in timed(scene, good, goal.calls, rounds, batch, further).items():
             place = (grid.index(cell), *at, CALLS.index(call))
             samples[place][: len(timing.samples)] = timing.samples
     dims = ("integrator", "horizon", "target")

@@ -3,7 +3,6 @@
 Scenes are oscillators: a plain harmonic one, two that are no top, and the two of spheroid. Times are in periods T.
 """
 
-import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -47,7 +46,7 @@ def oscillator_of(name: str) -> Quartic:
 def quartic_table(name: str, method: str, per_period: Sequence[float], periods: float) -> xr.Dataset:
     """Errors of a map at every step, its discrete orbits, and of `exact-discrete` the constants and the true curves."""
     oscillator = oscillator_of(name)
-    T, paths = oscillator.period, _true_paths(oscillator, tuple(per_period), periods)
+    T, paths = oscillator.period, _true_paths(oscillator, per_period, periods)
     largest = max(np.abs(path).max() for path in paths) ** 2
     errors = [
         np.abs(discrete_path(oscillator, method, T / steps, len(path) - 1) - path).max() / np.sqrt(largest)
@@ -61,8 +60,7 @@ def quartic_table(name: str, method: str, per_period: Sequence[float], periods: 
     return xr.Dataset(columns)
 
 
-@functools.lru_cache(maxsize=len(QUARTICS))  # 0.4 s in 24 digits, for each of the maps
-def _true_paths(oscillator: Quartic, per_period: tuple[float, ...], periods: float) -> list[Array]:
+def _true_paths(oscillator: Quartic, per_period: Sequence[float], periods: float) -> list[Array]:
     """Positions at the points of every step."""
     times = [oscillator.period / steps * np.arange(int(periods * steps) + 1) for steps in per_period]
     true, order = np.empty(sum(map(len, times)), complex), np.argsort(np.concatenate(times), kind="stable")

@@ -6,6 +6,7 @@ several at once, or for `IN_TURN` where they have not. The ordinary tops of a st
 arithmetic of a step does not hang on the top, but for the iterations of implicit methods, which are counted.
 """
 
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -30,6 +31,7 @@ KIND = "slow"
 KINDS = ("alone", "together")
 
 
+@functools.cache
 def _tops() -> tuple[Any, Any]:
     """Numbers (TOGETHER, 9) and nutation periods of the tops that are timed."""
     drawn = population(TOGETHER, seed=0, kind=KIND)

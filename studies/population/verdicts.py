@@ -106,8 +106,8 @@ def price(data: xr.DataTree, names: list[str], unit: str) -> Array:
 
 def costs(data: xr.DataTree, cell: Cell, unit: str) -> Costs:
     """Costs of all rows that show a cell's quantity, on the tops that are asked."""
-    group = data[cell.horizon].to_dataset().isel(scene=0)
-    values = group["cost"].sel(quantity=cell.quantity, target=cell.target).transpose("integrator", "member").values
+    group = data[cell.horizon]["cost"].isel(scene=0)
+    values = group.sel(quantity=cell.quantity, target=cell.target).transpose("integrator", "member").values
     if cell.stratum != ALL:
         values = values[:, stratum_of(data, cell.horizon) == strata(data).index(cell.stratum)]
     rows, tops = ~np.isnan(values).all(axis=1), ~np.isnan(values).all(axis=0)
@@ -174,7 +174,8 @@ class Health(NamedTuple):
 
 def health(data: xr.DataTree, name: str, horizon: str = "short", stratum: str = ALL) -> Health:
     """Runs, wrong runs and silent failures of a row at the settings at which (nearly) all members were judged."""
-    group = data[horizon].to_dataset().isel(scene=0).sel(integrator=name)
+    asked = data[horizon].to_dataset()[["runs", "wrong", "silent", "setting", "control"]]
+    group = asked.isel(scene=0).sel(integrator=name)
     count = float(data["tops"]["known"].values.ravel()[: members(data, horizon)].sum())
     judged = group["runs"].transpose("level", "stratum").values
     there = judged.sum(axis=1) >= WHOLE * count

@@ -129,9 +129,10 @@ def common(shown: Mapping[str, OutcomeMap]) -> dict[str, OutcomeMap]:
 
 def maps(data: xr.Dataset, scene: str) -> dict[str, OutcomeMap]:
     """The maps over a family of scenes by the names of their integrators."""
-    if scene not in data["scene"].values:
+    if scene not in data["scene"].values or Column.OUTCOME not in data:
         return {}
-    read = {str(name): map_of(data.sel(scene=scene, integrator=name)) for name in data["integrator"].values}
+    part = data[[Column.OUTCOME, Column.PARAMETER, Column.SETTING, Column.CONTROL]].sel(scene=scene)
+    read = {str(name): map_of(part.sel(integrator=name)) for name in data["integrator"].values}
     return {name: one for name, one in read.items() if one is not None}
 
 

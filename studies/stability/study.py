@@ -26,7 +26,7 @@ NOT_SLEEPING = {  # rows that do not take part in the mechanism "sleeping"
         "stormer-verlet-reversible[angles]",
     )
 }
-QUICK = (6, 4)  # settings and rows of a map of a slow method
+QUICK = (5, 3)  # settings and rows of a map of a slow method
 FINER = 10.0  # cells of a map whose runs go side by side in lanes, over those of other maps
 
 
@@ -76,10 +76,10 @@ def cases(quick: bool) -> list[Case]:
     steps = np.geomspace(0.005, 2.0, 24 if quick else 200)
     spins = np.geomspace(0.1, 30.0, 16 if quick else 120)
     passes, gaps = np.geomspace(5e-4, 0.1, 12 if quick else 72), np.geomspace(1e-6, 0.3, 12 if quick else 48)
-    phases = np.linspace(0.5, 4.0, 15 if quick else 71).tolist()
+    phases = np.linspace(0.5, 4.0, 8 if quick else 71).tolist()
     limits = np.geomspace(0.1, 30.0, 4 if quick else 14).tolist()
     tolerances = [math.inf, *(10.0 ** -np.arange(0.0 if quick else 1.0, 13.0, 4.0 if quick else 1.0)).tolist()]
-    fixed = {"steady-fast": {"phases": phases, "steps": 1000 if quick else 3000},
+    fixed = {"steady-fast": {"phases": phases, "steps": 500 if quick else 3000},
              "sleeping": {"steps": [0.1, 0.5] if quick else [0.1, 0.25, 0.5, 0.75, 1.0]},
              "goldstein": {"steps": 100, "periods": 3, "step_size": 0.1, "tolerances": tolerances,
                            "solver_steps": 20_000 if quick else 100_000}}  # fmt: skip

@@ -43,8 +43,11 @@ EARLY = 1e-15, 1e-2  # rad, axis errors that predict the time next to a separatr
 
 def _rows(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
     """The integrators that have a value of a variable, by name."""
-    cells = {str(name): part.sel(integrator=name) for name in part["integrator"].values}
-    return {name: cell for name, cell in cells.items() if np.isfinite(cell[variable].values).any()}
+    return {
+        str(name): part.isel(integrator=k)
+        for k, name in enumerate(part["integrator"].values)
+        if np.isfinite(part[variable].isel(integrator=k).values).any()
+    }
 
 
 def _ends(values: Mapping[str, float]) -> str:

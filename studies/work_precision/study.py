@@ -36,7 +36,7 @@ BUDGET = {"compiled": 1e6, "python": 2.5e4}  # force evaluations of one run
 SOFTWARE = 4e4  # the same for arithmetic in software: quadruple precision costs 2 us an evaluation
 EFFORT = (  # rounds and seconds of a batch, of all timed runs and of the contenders; in full, and quick
     {"first": (3, 0.004), "further": (8, 0.01)},
-    {"first": (3, 0.002), "further": (5, 0.003)},
+    {"first": (3, 0.001), "further": (5, 0.002)},
 )
 
 

@@ -136,7 +136,7 @@ def long_run(
         steps = float(PILOT)  # of a formula, which has no steps: nothing adds up
         if method.control is not None:
             cost = max(pilot.run.force_evaluations / PILOT, 1.0)
-            limit = EVALUATIONS[method.implementation] / cost if most is None else most
+            limit = EVALUATIONS[method.implementation] * (0.25 if quick else 1.0) / cost if most is None else most
             steps = max(min(QUICK_STEPS if quick else STEPS, limit) * method.speed, PILOT)
         done = _run(method, scene, chart, steps, step, SAMPLES)
         if done.run.outcome == "ok" or not method.fixed_step:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from symtop.methods.registry import Integrator
 from symtop.methods.rotor import ROTATIONS
@@ -42,8 +43,8 @@ def extended_errors(scene: Scene, method: Integrator) -> xr.Dataset | None:
     truth = reference(scene, [horizon], "longdouble")
     true = truth["axis"].values[0].astype(Wide) + truth["axis_lo"].values[0]
     counts = np.unique(np.rint(NUTATIONS * np.geomspace(*STEPS_A_NUTATION, RUNS)).astype(int))
-    rest = [_end(scene, stages, horizon, int(count)) - true for count in counts]
-    error = np.array([float(np.sqrt((one * one).sum())) for one in rest])
+    rest = _ends(scene, stages, horizon, counts) - true
+    error = np.sqrt((rest * rest).sum(axis=1)).astype(float)
     bound = np.maximum(truth["axis_error_bound"].values[0], BOUND)
     columns = {"step": horizon / counts, "error": error, "bound": np.full(counts.size, bound)}
     return xr.Dataset({f"extended_{name}": ("extended", values) for name, values in columns.items()})
@@ -60,25 +61,32 @@ def _composition(scene: Scene, method: Integrator) -> Stages | None:
     return stages
 
 
-def _end(scene: Scene, stages: Stages, horizon: float, count: int) -> Any:
-    """The axis after `count` steps, in long double."""
-    top, start, step = scene.top, scene.start, Wide(horizon) / count
+def _ends(scene: Scene, stages: Stages, horizon: float, counts: NDArray[np.int64]) -> Any:
+    """The axes (n, 3) after each of the ascending `counts` of steps, in long double; all runs take a step together."""
+    top, start, step = scene.top, scene.start, Wide(horizon) / counts.astype(Wide)
     theta, phi, *rates = (
         Wide(value) for value in (start.theta, start.phi, start.theta_dot, start.phi_dot, start.psi_dot)
     )
-    axis = np.array(charts.axis_parts(np, theta, phi))
-    momentum = np.array(charts.momentum_parts(np, top, theta, phi, *rates))
+    axes = np.tile(np.array(charts.axis_parts(np, theta, phi))[:, np.newaxis], counts.size)
+    momenta = np.tile(np.array(charts.momentum_parts(np, top, theta, phi, *rates))[:, np.newaxis], counts.size)
     drifts, kicks = ([Wide(value) for value in part] for part in (stages.drift, stages.kick))
-    drifts = [step / Wide(top.I1) * value / sum(drifts) for value in drifts]
-    kicks = [step * Wide(top.mgl) * value / sum(kicks) for value in kicks]
-    for _ in range(count):
+    drifts = [value / sum(drifts) / Wide(top.I1) for value in drifts]
+    kicks = [value / sum(kicks) * Wide(top.mgl) for value in kicks]
+    for done in range(counts[-1]):
+        left = slice(int(np.searchsorted(counts, done, side="right")), None)  # runs with more steps than that
+        (x, y, z), momentum, h = axes[:, left], momenta[:, left], step[left]
         for kick, drift in zip(kicks, [*drifts, Wide(0.0)], strict=True):
-            momentum = momentum + kick * np.array([-axis[1], axis[0], Wide(0.0)])
-            length = np.sqrt((momentum * momentum).sum())
-            about, angle = momentum / length, length * drift
-            across = np.cross(about, axis)
-            axis = np.cos(angle) * axis + np.sin(angle) * across + (1 - np.cos(angle)) * (about * axis).sum() * about
-    return axis
+            momentum = momentum + kick * h * np.stack([-y, x, 0.0 * z])
+            length = np.sqrt((momentum * momentum).sum(axis=0))
+            (a, b, c), angle = momentum / length, length * drift * h
+            cos, sin, along = np.cos(angle), np.sin(angle), (1 - np.cos(angle)) * (a * x + b * y + c * z)
+            x, y, z = (
+                cos * x + sin * (b * z - c * y) + along * a,
+                cos * y + sin * (c * x - a * z) + along * b,
+                cos * z + sin * (a * y - b * x) + along * c,
+            )
+        axes[:, left], momenta[:, left] = (x, y, z), momentum
+    return axes.T
 
 
 def extended_order_data(table: xr.Dataset) -> tuple[Any, Any, Any] | None:

@@ -40,18 +40,19 @@ def execute(study: Study, tasks: Iterable[Task], workers: Workers, on_result: On
 
 
 def size_for(tasks: list[Task], workers: Workers, *, timed: bool) -> int:
-    """How many processes: none for few cases and for integrators and scenes that only this process knows.
+    """How many processes: none for integrators and scenes that only this process knows, nor for few cases.
 
-    Many timed cases are handed over one at a time, to workers that have their kernels already if there are any.
+    Few are not worth the start of a process; where workers are open, they take them, for they have kernels already.
+    Timed cases are handed over one at a time.
     """
     local = {name for task in tasks for name in (task.case.scene, task.case.integrator)}
     if any(plugins.is_local(name) for name in local):
         return HERE
     if workers.scheduler and not timed:
         return CLUSTER
-    if len(tasks) < WORTH_A_POOL:
+    if len(tasks) < WORTH_A_POOL and not workers.open_size():
         return HERE
-    return workers.open_size() or 1 if timed else min(workers.jobs, len(tasks))
+    return max(workers.open_size(), 1 if timed else min(workers.jobs, len(tasks)))
 
 
 def _run_until_done(

@@ -39,7 +39,7 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         self.jobs = jobs or cores()
         self.scheduler = scheduler
         self._client: Any = None
-        self._sideline = Sideline(self._spawned, self.jobs)
+        self._sideline = Sideline(lambda: self._spawned(1), lambda: self.pool(self.jobs))
         self._pools: dict[int, Executor] = {HERE: InProcess()}
         if scheduler:
             self._client = cluster.connect(scheduler)
@@ -63,6 +63,10 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
     def beside(self, function: Callable[..., Any], *args: Any) -> Beside:
         """Call a function in one more process, which works beside untimed cases."""
         return self._sideline.promise(function, *args)
+
+    def open_beside(self) -> None:
+        """Start the process of `beside`, which takes two seconds."""
+        self._sideline.open()
 
     def fill(self) -> None:
         """Let promised calls begin, one after another: cases are computed that are not timed."""
@@ -97,8 +101,9 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         """
         for size in list(self._pools):
             self.drop(size)
-        for pool in self._sideline.close():
-            _kill(pool)
+        own = self._sideline.close()
+        if own is not None:
+            _kill(own)
         self._leave()
 
     def _leave(self) -> None:

@@ -80,6 +80,8 @@ def begin(study: Study, results: Path, workers: Workers, *, quick: bool = False,
         seen.note(results, study, stamp, cases.paths)
         return _known(before, began)
     try:
+        if beside and missing and workers.jobs > 1:
+            workers.open_beside()
         cases.compute(missing, workers, seconds, fresh=fresh, quiet=quiet)
         later = cases.follow_up(fresh=fresh) if later is None else later
         cases.compute(later, workers, seconds, fresh=fresh, quiet=quiet)

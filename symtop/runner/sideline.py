@@ -1,14 +1,14 @@
-"""Calls that work beside the cases of studies, in processes of their own.
+"""Calls that work beside the cases of studies, in a process of their own.
 
 A thread sees to it that they are made one after another, and only while it may: a timed phase stops it and waits for
-the one call that works. When no more cases are computed, all that are left begin at once, in as many processes as there
-are jobs. No call is handed over from another's callback, which an executor may run while it holds its own lock.
+the one call that works. When no more cases are computed, all that are left begin at once, where those were computed.
+No call is handed over from another's callback, which an executor may run while it holds its own lock.
 """
 
 import contextlib
 import threading
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, CancelledError, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
 from typing import Any
 
 
@@ -50,18 +50,18 @@ class Beside:
 
 
 class Sideline:
-    """The calls that are promised, in order, and the processes that make them: one, and at the end one for each job."""
+    """The calls that are promised, in order, and the process that makes them; at the end, the `idle` ones."""
 
-    def __init__(self, spawned: Callable[[int], ProcessPoolExecutor], jobs: int) -> None:
-        self._spawned, self._jobs = spawned, jobs
+    def __init__(self, spawned: Callable[[], ProcessPoolExecutor], idle: Callable[[], Executor]) -> None:
+        self._spawned, self._idle = spawned, idle
         self._changed = threading.Condition()
         self._promised: list[Beside] = []
         self._working: Beside | None = None
         self._may = self._ended = False
         self._thread: threading.Thread | None = None
         self._opening = threading.Lock()
-        self._pools: list[ProcessPoolExecutor] = []
-        self._last = 0  # calls handed over since no more cases are computed
+        self._own: ProcessPoolExecutor | None = None
+        self._no_more = False  # cases are computed
 
     def promise(self, function: Callable[..., Any], *args: Any) -> Beside:
         """A call that begins when it may."""
@@ -69,6 +69,11 @@ class Sideline:
         with self._changed:
             self._promised = [*(other for other in self._promised if not other.done()), one]
         return one
+
+    def open(self) -> None:
+        """Start the process, which takes two seconds, before there is a call to make."""
+        if self._own is None:
+            self._pool().submit(int)
 
     def go_on(self) -> None:
         """Let promised calls begin, one after another."""
@@ -98,18 +103,18 @@ class Sideline:
             self._may = False
             left = [one for one in self._promised if not one.begun()]
         with self._opening:
-            self._last = 1
+            self._no_more = True
         for one in left:
             one.start()
 
-    def close(self) -> list[ProcessPoolExecutor]:
-        """Promise nothing any more; returns the pools, which the caller ends."""
+    def close(self) -> ProcessPoolExecutor | None:
+        """Promise nothing any more; returns the pool of the process, if it was opened, which the caller ends."""
         with self._changed:
             self._may, self._ended, self._promised = False, True, []
             self._changed.notify_all()
         with self._opening:
-            pools, self._pools = self._pools, []
-        return pools
+            own, self._own = self._own, None
+        return own
 
     def _next(self) -> Beside | None:
         return next((one for one in self._promised if not one.begun()), None)
@@ -126,12 +131,10 @@ class Sideline:
                 self._working = self._next() if self._may else None
                 self._changed.notify_all()
 
-    def _pool(self) -> ProcessPoolExecutor:
-        """Where the next call is made: in the one process, at the end in this or in one of the others in turn."""
+    def _pool(self) -> Executor:
+        """Where the next call is made: in the one process, and at the end in those that have nothing to compute."""
         with self._opening:
-            place = 0
-            if self._last and self._jobs > 1:
-                place, self._last = int(self._last % self._jobs != 0), self._last + 1
-            for size in (1, self._jobs - 1)[len(self._pools) : place + 1]:
-                self._pools.append(self._spawned(size))
-            return self._pools[place]
+            if self._no_more:
+                return self._idle()
+            self._own = self._own or self._spawned()
+            return self._own

@@ -191,8 +191,8 @@ def test_timed_cases_run_alone(script, tmp_path, timed, begun):
 
 
 def processes(workers):
-    """How many processes each pool beside has."""
-    return [len(pool._processes) for pool in workers._sideline._pools]
+    """How many processes each pool has: the one beside, and those that compute."""
+    return [len(pool._processes) for pool in (workers._sideline._own, workers._pools.get(2)) if pool]
 
 
 def test_what_runs_beside_runs_one_after_another_until_nothing_is_computed():
@@ -214,7 +214,7 @@ def test_what_runs_beside_runs_one_after_another_until_nothing_is_computed():
         workers.finish()
         assert all(one.begun() for one in promised)
         assert [one.result() for one in promised] == [None] * 5
-        assert processes(workers) == [1, 1]
+        assert processes(workers) == [1, 2]
 
 
 def test_a_conclusion_waits_for_the_timed_study_that_follows(script, tmp_path):

@@ -52,7 +52,7 @@ GOAL = Goal(10.0, 1e-6, LANGUAGES, CALLS)
 @pytest.fixture(scope="module")
 def measured():
     """A small factorial as the study's functions see it: two schemes at one goal, short batches."""
-    data = factorial(SCENE, [DORMAND_PRINCE, "Takahashi-Imada"], [GOAL], 2, 0.001)
+    data = factorial(SCENE, [DORMAND_PRINCE, "Takahashi-Imada"], [GOAL], 2, 0.001, 10)
     return combine([(Case("spheroid", "together"), data)])
 
 
@@ -147,7 +147,7 @@ def test_what_is_not_within_the_budget_has_a_reason_and_no_time():
     settled = settle(SCENE, strang, goal)
     assert [cell.language for cell in settled] == [COMPILED, NUMPY]
     assert list(settled.values())[1] == settings.BUDGET
-    data = factorial(SCENE, ["Strang"], [goal._replace(languages=(COMPILED, NUMPY))], 1, 0.001)
+    data = factorial(SCENE, ["Strang"], [goal._replace(languages=(COMPILED, NUMPY))], 1, 0.001, 10)
     slow, fast = (data.sel(integrator=name, call=KERNEL).squeeze() for name in ("strang-numpy[axis]", "strang[axis]"))
     assert (str(slow[Column.REASON].values), bool(np.isnan(slow[Column.SECONDS]))) == (settings.BUDGET, True)
     assert (str(fast[Column.REASON].values), bool(np.isnan(fast[Column.SECONDS]))) == ("", False)
