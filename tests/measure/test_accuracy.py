@@ -5,12 +5,14 @@ import pytest
 
 import symtop
 from symtop.base.numbers import EPSILON
+from symtop.measure import extended
 from symtop.measure.accuracy import SAMPLES, enough_samples, error_table
 from symtop.measure.errors import attitude_error, error_bound, errors_against
 from symtop.measure.extended import extended_errors, extended_order_data
 from symtop.measure.order import LARGEST_ERROR, order
 from symtop.measure.order_table import asymptotic_steps
 from symtop.methods.registry import integrator
+from symtop.model.charts import axis_from_angles, momentum_parts
 from symtop.model.scenes import scene
 from symtop.run.reference import reference
 from symtop.run.witnesses import have_heyoka
@@ -102,6 +104,38 @@ def test_a_composition_in_long_double_has_its_order_where_double_runs_out():
     kept = error > 1e-13  # what double can judge
     double = order(*(values[kept] for values in extended_order_data(data)), omega, 10, symmetric=True)
     assert not double.interval < 0.15  # NaN, or wide
+
+
+def alone(where, stages, horizon, count):
+    """The axis after `count` steps of a composition, by vectors, one step at a time."""
+    top, at = where.top, where.start
+    angles = [np.longdouble(value) for value in (at.theta, at.phi)]
+    e = axis_from_angles(*angles)
+    L = np.array(momentum_parts(np, top, *angles, at.theta_dot, at.phi_dot, at.psi_dot))
+    h, up = np.longdouble(horizon) / count, np.array([0.0, 0.0, 1.0], np.longdouble)
+    kicks, drifts = (
+        np.array(part, np.longdouble) / sum(map(np.longdouble, part)) for part in (stages.kick, stages.drift)
+    )
+    for _ in range(count):
+        for kick, drift in zip(kicks, [*drifts, 0.0], strict=True):
+            L = L + h * kick * top.mgl * np.cross(up, e)
+            length = np.sqrt(L @ L)
+            n, angle = L / length, h * drift * length / top.I1
+            e = np.cos(angle) * e + np.sin(angle) * np.cross(n, e) + (1 - np.cos(angle)) * (n @ e) * n
+    return e
+
+
+@pytest.mark.parametrize("name", ["strang", "kahan-li-6"])
+def test_runs_side_by_side_in_long_double_are_those_alone(name):
+    where = scene("spheroid")
+    horizon, counts = 1.37 * where.nutation_period, np.array([7, 8, 40])
+    stages = extended._composition(where, integrator(name))
+    together = extended._ends(where, stages, horizon, counts)
+    for count, end in zip(counts, together, strict=True):
+        assert np.array_equal(end, extended._ends(where, stages, horizon, np.array([count]))[0])
+        expected = alone(where, stages, horizon, count)
+        assert np.abs(end - expected).max() < 1e-15
+        assert np.abs(end - alone(where, stages, horizon, count + 1)).max() > 1e-12  # the control
 
 
 def test_only_plain_compositions_are_run_in_long_double():

@@ -217,6 +217,18 @@ def test_what_runs_beside_runs_one_after_another_until_nothing_is_computed():
         assert processes(workers) == [1, 2]
 
 
+def test_its_process_is_started_while_the_first_cases_are_computed_and_not_where_none_are(script, tmp_path):
+    study = runner.load(script("first"))
+    for again, expected in ((False, [1]), (True, [])):
+        with Workers(2) as workers:
+            answer = runner.begin(study, tmp_path / "r", workers, quiet=True, beside=True)
+            assert processes(workers) == expected
+            assert answer()["computed"] == (0 if again else 2)
+    with Workers(2) as workers:  # a study by itself concludes in this process
+        runner.begin(study, tmp_path / "other", workers, quiet=True)()
+        assert processes(workers) == []
+
+
 def test_a_conclusion_waits_for_the_timed_study_that_follows(script, tmp_path):
     """Both are told in their order all the same."""
     first, second = runner.load(script("first")), runner.load(script("second"))
