@@ -44,7 +44,7 @@ def on_scene(name: str, quick: bool) -> list[Case]:
         if row.fixed_step:
             settings = step_ladder(row, on, horizon, *((8, 1e5) if quick else (17, MOST_STEPS)))
         elif row.adaptive:
-            settings = tolerance_ladder(row, 6 if quick else 13)
+            settings = tolerance_ladder(row, 5 if quick else 13)
         else:
             continue  # a formula has nothing to set
         chosen = {"horizon": horizon, "settings": settings, "dense": not quick}

@@ -58,11 +58,11 @@ def phase_loss(
 ) -> xr.Dataset:
     """When the phase error of a fixed-step method reaches `LOST`: predicted from `short` nutations, and measured.
 
-    ``steps`` and force ``evaluations`` a nutation; in nutations, ``predicted``, the length ``short`` of the run that
-    predicts, and ``measured``; ``ratio``, predicted over measured. Dimension ``sample``: ``nutations`` and ``phase``
-    (rad) of the run that measures; ``exponent`` of the growth of its phase error in the last decade, with
-    ``exponent_interval`` (half-width, 95 %). If nothing can be predicted there are only ``steps``, ``predicted`` and
-    ``short``.
+    The run that measures takes `most` steps at most. ``steps`` and force ``evaluations`` a nutation; in nutations,
+    ``predicted``, the length ``short`` of the run that predicts, and ``measured``; ``ratio``, predicted over measured.
+    Dimension ``sample``: ``nutations`` and ``phase`` (rad) of the run that measures; ``exponent`` of the growth of its
+    phase error in the last decade, with ``exponent_interval`` (half-width, 95 %). If nothing can be predicted there are
+    only ``steps``, ``predicted`` and ``short``.
     """
     period = scene.nutation_period
     steps = steps_for(scene, method, target)

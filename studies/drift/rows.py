@@ -78,8 +78,8 @@ def pairs(histories: xr.Dataset) -> Iterator[Pair]:
     """Every two charts of a method for every constant; runs that ended early are left out."""
     rows: dict[str, list[str]] = {}
     every = list(map(str, histories["integrator"].values))
-    for name, ended in zip(every, (histories["outcome"] == "ok").all("scene").values, strict=True):
-        if ended:
+    for name, whole in zip(every, (histories["outcome"] == "ok").all("scene").values, strict=True):
+        if whole:
             rows.setdefault(split_name(name)[0], []).append(name)
     for constant, names in itertools.product(CONSTANTS, rows.values()):
         values = histories[f"{constant}_largest"].max("scene", skipna=False).values

@@ -42,7 +42,7 @@ def cases(quick: bool) -> list[Case]:
     take up to a minute, leave out an attitude chart beside an axis chart.
     """
     if quick:
-        return grid(20_000, 2, 100_000, 200_000, 0.05, LEFT_OUT | NOT_QUICK)
+        return grid(20_000, 2, 100_000, 200_000, 0.1, LEFT_OUT | NOT_QUICK)
     return grid(1_000_000, 24, 10_000_000, 100_000_000, 1.0)
 
 

@@ -18,7 +18,7 @@ the exact one has B = delta = 0, A = cos w h and r = w/sin w h, w^2 = -3 b:
 the exact discrete Lagrangian that textbooks give. All differ from it by h^2 in A and B and by h^3 in delta.
 
 wp(t) = sigma |x|^2 + b for every E and J, with g2 = 12 b^2 - 8 sigma E and g3 = 8 b (sigma E - b^2) + 4 sigma^2 J^2.
-The truth is a Taylor series in whole numbers of 2^-96, which knows no elliptic function.
+The truth is a Taylor series in whole numbers of 2^-96, for lengths and times near 1; it knows no elliptic function.
 Sources: McMillan, in Topics in Modern Physics (1971) 219; Suris, The Problem of Integrable Discretization (2003);
 Marsden and West, Acta Numerica 10 (2001) 357, part 1.6 (exact discrete Lagrangian).
 """

@@ -51,7 +51,7 @@ def draw_errors(data: xr.Dataset) -> Picture:
         "quartic-errors",
         figure,
         f"Planar oscillators x'' = (2 sigma |x|^2 + 3 b) x (no chart), {quartic.PERIODS:g} periods of |x|, steps from "
-        f"T/{max(quartic.STEPS):g} to T/{min(quartic.STEPS):g}, against a Taylor series in 24 digits: harmonic as in "
+        f"T/{max(quartic.STEPS):g} to T/{min(quartic.STEPS):g}, against a Taylor series in 29 digits: harmonic as in "
         "the seed, hardening, softening, and the two of which spheroid consists. stormer-verlet, the midpoint rule "
         "and McMillan's map with constants to order h^2 have order 2; with exact constants the same map is the motion, "
         "up to rounding, at any step. A line ends where the map leaves the oscillator for good.",

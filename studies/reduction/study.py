@@ -40,7 +40,7 @@ def cases(quick: bool) -> list[Case]:
             for method in methods().values()
             if method.implementation == "compiled" and len(method.charts()) > 1 and name == FIRST
         ]
-        for method in several[:4] if quick else several:
+        for method in several[2:6] if quick else several:
             settings = ladder(method, start, tables.CHART_PERIODS * period, 8, 1e5)[1 :: 3 if quick else 2]
             plan = {"settings": settings, "horizon": tables.CHART_PERIODS * period, "batches": 3 if quick else 5}
             grid.append(Case(name, method.name, {"part": "charts", **plan}))

@@ -79,7 +79,7 @@ def cases(quick: bool) -> list[Case]:
     phases = np.linspace(0.5, 4.0, 8 if quick else 71).tolist()
     limits = np.geomspace(0.1, 30.0, 4 if quick else 14).tolist()
     tolerances = [math.inf, *(10.0 ** -np.arange(0.0 if quick else 1.0, 13.0, 4.0 if quick else 1.0)).tolist()]
-    fixed = {"steady-fast": {"phases": phases, "steps": 500 if quick else 3000},
+    fixed = {"steady-fast": {"phases": phases, "steps": 1000 if quick else 3000},
              "sleeping": {"steps": [0.1, 0.5] if quick else [0.1, 0.25, 0.5, 0.75, 1.0]},
              "goldstein": {"steps": 100, "periods": 3, "step_size": 0.1, "tolerances": tolerances,
                            "solver_steps": 20_000 if quick else 100_000}}  # fmt: skip

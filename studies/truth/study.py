@@ -30,7 +30,7 @@ AFFORDABLE = {
     "discrete map": 1e6,
     "closed form": 1e6,
 }  # horizons, s: a limit of machine time, not of accuracy
-QUICK = {"quadruple, attitude": 8.0}  # 100 s elsewhere
+QUICK = {"quadruple, attitude": 8.0}  # longest horizons of the quick grid, s; 100 elsewhere
 
 
 def cases(quick: bool) -> list[Case]:

@@ -72,7 +72,7 @@ def measured_order(method: Integrator, scene: Scene, *, quick: bool = False, fin
 def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, finest: float | None = None) -> Order:
     horizon = nutations * scene.time_scale()
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
-    most = FINEST[method.implementation] if finest is None else finest
+    most = FINEST[method.implementation] * (0.25 if quick else 1.0) if finest is None else finest
     settings = ladder(method, scene, horizon, count, most)
     main = observable(method)
     table = order_table(scene, method, settings, horizon, main, dense=finest is None)

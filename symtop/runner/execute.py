@@ -42,16 +42,15 @@ def execute(study: Study, tasks: Iterable[Task], workers: Workers, on_result: On
 def size_for(tasks: list[Task], workers: Workers, *, timed: bool) -> int:
     """How many processes: none for integrators and scenes that only this process knows, nor for few cases.
 
-    Few are not worth the start of a process; where workers are open, they take them, for they have kernels already.
+    Few are not worth the start of a process; workers that are open take them, since they have kernels already.
     Timed cases are handed over one at a time.
     """
-    local = {name for task in tasks for name in (task.case.scene, task.case.integrator)}
-    if any(plugins.is_local(name) for name in local):
+    if any(plugins.is_local(name) for task in tasks for name in task.case.names):
         return HERE
     if workers.scheduler and not timed:
         return CLUSTER
-    if len(tasks) < WORTH_A_POOL and not workers.open_size():
-        return HERE
+    if len(tasks) < WORTH_A_POOL:
+        return workers.open_size()
     return max(workers.open_size(), 1 if timed else min(workers.jobs, len(tasks)))
 
 

@@ -39,7 +39,7 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         self.jobs = jobs or cores()
         self.scheduler = scheduler
         self._client: Any = None
-        self._sideline = Sideline(lambda: self._spawned(1), lambda: self.pool(self.jobs))
+        self._sideline = Sideline(lambda: self._spawned(1), self._idle)
         self._pools: dict[int, Executor] = {HERE: InProcess()}
         if scheduler:
             self._client = cluster.connect(scheduler)
@@ -56,12 +56,17 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         context = multiprocessing.get_context("spawn")
         return ProcessPoolExecutor(size, context, work.begin_worker, (os.getpid(),))
 
+    def _idle(self) -> Executor:
+        """Workers that have nothing to compute: those that are open, if there are several."""
+        size = self.open_size()
+        return self.pool(size if size > 1 else self.jobs)
+
     def open_size(self) -> int:
         """The size of the largest pool of processes that is open, or 0."""
         return max(self._pools, default=HERE)
 
     def beside(self, function: Callable[..., Any], *args: Any) -> Beside:
-        """Call a function in one more process, which works beside untimed cases."""
+        """Call a function in one more process, beside untimed cases, or in a worker that has nothing to compute."""
         return self._sideline.promise(function, *args)
 
     def open_beside(self) -> None:

@@ -74,13 +74,14 @@ def begin(study: Study, results: Path, workers: Workers, *, quick: bool = False,
     before = _drawn(study, results, stamp)
     if before is not None and not fresh and seen.untouched(results, study, stamp, first):
         return _known(before, began)
+    beside = beside and workers.jobs > 1 and not _is_local(cases) and study is scripts.load(str(file_of(study.name)))
     missing = cases.missing(first, fresh=fresh)
     later = None if missing else cases.follow_up(fresh=fresh)  # not known before the first round is done
     if before is not None and later == {} and seen.dataset_untouched(results, study, stamp):
         seen.note(results, study, stamp, cases.paths)
         return _known(before, began)
     try:
-        if beside and missing and workers.jobs > 1:
+        if beside and missing:
             workers.open_beside()
         cases.compute(missing, workers, seconds, fresh=fresh, quiet=quiet)
         later = cases.follow_up(fresh=fresh) if later is None else later
@@ -122,9 +123,9 @@ def _concluding(
 ) -> Begun:
     """What waits for the findings of a study whose cases are computed."""
     study, results = cases.study, cases.results
-    script = str(file_of(study.name))
     told = None
-    if beside and workers.jobs > 1 and not _is_local(cases) and study is scripts.load(script):
+    if beside:
+        script = str(file_of(study.name))
         asked = Asked(script, results, cases.paths, cases.failures, tuple(plugins.loaded()), *made_of, save, quick)
         cases.done.clear()  # its process reads the files
         told = workers.beside(conclude_stored, asked)
@@ -147,4 +148,4 @@ def _concluding(
 
 def _is_local(cases: Round) -> bool:
     """Does this process alone know an integrator or a scene of theirs?"""
-    return any(plugins.is_local(name) for case in cases.paths.values() for name in (case.scene, *case.integrators))
+    return any(plugins.is_local(name) for case in cases.paths.values() for name in case.names)

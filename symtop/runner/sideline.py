@@ -1,7 +1,7 @@
-"""Calls that work beside the cases of studies, in a process of their own.
+"""Calls that work beside the cases of studies, in a process that computes none.
 
 A thread sees to it that they are made one after another, and only while it may: a timed phase stops it and waits for
-the one call that works. When no more cases are computed, all that are left begin at once, where those were computed.
+the one call that works. When no more cases are computed, all that are left begin at once, in workers that are idle.
 No call is handed over from another's callback, which an executor may run while it holds its own lock.
 """
 
@@ -13,7 +13,7 @@ from typing import Any
 
 
 class Beside:
-    """A call in a process of its own, which begins when it may, or when its result is asked for."""
+    """A call in another process, which begins when it may, or when its result is asked for."""
 
     def __init__(self, begin: Callable[[], "Future[Any]"]) -> None:
         self._begin = begin
@@ -50,7 +50,7 @@ class Beside:
 
 
 class Sideline:
-    """The calls that are promised, in order, and the process that makes them; at the end, the `idle` ones."""
+    """The calls that are promised, in order, and the process that makes them, in the end with `idle` workers."""
 
     def __init__(self, spawned: Callable[[], ProcessPoolExecutor], idle: Callable[[], Executor]) -> None:
         self._spawned, self._idle = spawned, idle
@@ -61,7 +61,7 @@ class Sideline:
         self._thread: threading.Thread | None = None
         self._opening = threading.Lock()
         self._own: ProcessPoolExecutor | None = None
-        self._no_more = False  # cases are computed
+        self._all_computed = False
 
     def promise(self, function: Callable[..., Any], *args: Any) -> Beside:
         """A call that begins when it may."""
@@ -73,7 +73,7 @@ class Sideline:
     def open(self) -> None:
         """Start the process, which takes two seconds, before there is a call to make."""
         if self._own is None:
-            self._pool().submit(int)
+            self.promise(int).start()
 
     def go_on(self) -> None:
         """Let promised calls begin, one after another."""
@@ -103,7 +103,7 @@ class Sideline:
             self._may = False
             left = [one for one in self._promised if not one.begun()]
         with self._opening:
-            self._no_more = True
+            self._all_computed = True
         for one in left:
             one.start()
 
@@ -132,9 +132,9 @@ class Sideline:
                 self._changed.notify_all()
 
     def _pool(self) -> Executor:
-        """Where the next call is made: in the one process, and at the end in those that have nothing to compute."""
+        """Where the next call is made."""
         with self._opening:
-            if self._no_more:
+            if self._all_computed:
                 return self._idle()
             self._own = self._own or self._spawned()
             return self._own

@@ -94,6 +94,11 @@ class Case:
         return self.integrator, *self.settings.get("integrators", ())
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """The scene and the integrators."""
+        return self.scene, *self.integrators
+
+    @property
     def label(self) -> str:
         """A name that is safe in a file: ``spheroid--rk4@axis`` for the row rk4[axis]."""
         parts = "--".join(filter(None, (self.scene, self.integrator, self.group)))

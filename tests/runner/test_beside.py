@@ -229,6 +229,15 @@ def test_its_process_is_started_while_the_first_cases_are_computed_and_not_where
         assert processes(workers) == []
 
 
+def test_a_timed_phase_waits_until_the_process_beside_has_started():
+    with Workers(2) as workers:
+        workers.open_beside()
+        (started,) = workers._sideline._promised
+        assert not started.done()
+        workers.quieten()
+        assert started.done()
+
+
 def test_a_conclusion_waits_for_the_timed_study_that_follows(script, tmp_path):
     """Both are told in their order all the same."""
     first, second = runner.load(script("first")), runner.load(script("second"))

@@ -466,3 +466,24 @@ def test_timed_cases_run_one_at_a_time_in_workers_that_are_there_already(tmp_pat
     assert any(begin < end for (_, end), (begin, _) in pairwise(spans[0.0]))  # the control: two at once
     assert crew[1.0] <= crew[0.0]
     assert os.getpid() not in crew[0.0]
+
+
+def test_a_timed_case_with_a_method_of_this_process_runs_here_though_workers_are_open(tmp_path):
+    """Its name stands in the settings; that of shipped methods (the control) goes to the workers."""
+    from symtop.runner.execute import HERE, size_for
+    from symtop.runner.pools import Workers
+    from symtop.runner.work import Task
+
+    def sizes(name):
+        case = Case("spheroid", "together", {"integrators": ["strang", name]}, timed=True)
+        return size_for([Task("", case, "", (), 1.0)], workers, timed=True)
+
+    symtop.register(dataclasses.replace(symtop.integrator("strang"), name="mine"))
+    try:
+        with Workers(2) as workers:
+            assert sizes("midpoint") == HERE  # nobody is there
+            workers.pool(2)
+            assert sizes("midpoint") == 2
+            assert sizes("mine") == HERE
+    finally:
+        registry._registry.pop("mine")
