@@ -6,6 +6,7 @@ failure that the machine causes (a full disk, other sources than the command's) 
 
 import contextlib
 import faulthandler
+import gc
 import os
 import signal
 import threading
@@ -141,6 +142,7 @@ def _last_resort(seconds: float, trace: Path) -> Iterator[None]:
 def begin_worker(parent: int) -> None:
     """Initialise a worker of a pool: ignore interrupts, and exit when the parent process has ended."""
     _expendable.append(True)
+    gc.set_threshold(50_000, 10, 10)  # at 700, looking for garbage takes 4 % of a quick run
     scripts.install()  # settings of a case may hold records of a study's own
     tqdm.set_lock(threading.RLock())  # its own would be a semaphore of the system, left behind when a worker is ended
     signal.signal(signal.SIGINT, signal.SIG_IGN)
