@@ -224,6 +224,7 @@ def test_its_process_is_started_while_the_first_cases_are_computed_and_not_where
             answer = runner.begin(study, tmp_path / "r", workers, quiet=True, beside=True)
             assert processes(workers) == expected
             assert answer()["computed"] == (0 if again else 2)
+            (tmp_path / "r" / "first.json").unlink()  # so that it is concluded again
     with Workers(2) as workers:  # a study by itself concludes in this process
         runner.begin(study, tmp_path / "other", workers, quiet=True)()
         assert processes(workers) == []
