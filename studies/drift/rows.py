@@ -81,10 +81,10 @@ def pairs(histories: xr.Dataset) -> Iterator[Pair]:
     for name, whole in zip(every, (histories["outcome"] == "ok").all("scene").values, strict=True):
         if whole:
             rows.setdefault(split_name(name)[0], []).append(name)
-    for constant, names in itertools.product(CONSTANTS, rows.values()):
+    for constant in CONSTANTS:
         values = histories[f"{constant}_largest"].max("scene", skipna=False).values
         largest = dict(zip(every, map(float, values), strict=True))
-        for two in itertools.combinations(names, 2):
+        for two in itertools.chain.from_iterable(itertools.combinations(names, 2) for names in rows.values()):
             better, worse = sorted(two, key=largest.__getitem__)
             yield Pair(constant, worse, better, largest[worse], largest[better])
 

@@ -5,8 +5,6 @@ precisions and two charts, the discrete map iterated, and the closed form in dou
 digits; and values that others have published are computed anew.
 """
 
-import math
-
 import xarray as xr
 
 from symtop.model.scenes import scene
@@ -38,9 +36,9 @@ def cases(quick: bool) -> list[Case]:
     grid = []
     for name in grid_scenes(LEFT_OUT):
         for source in SOURCES if have_heyoka() else ("discrete map", "closed form"):
-            furthest = min(
-                AFFORDABLE.get(source, LONGEST.get(name, 1e3)), QUICK.get(source, 100.0) if quick else math.inf
-            )
+            furthest = AFFORDABLE.get(source, LONGEST.get(name, 1e3))
+            if quick:
+                furthest = min(furthest, QUICK.get(source, 100.0))
             horizons = [8.0] + [10.0**k for k in range(2, 7) if 10.0**k <= furthest]
             grid.append(Case(name, source, {"horizons": horizons}))
     return grid

@@ -45,6 +45,7 @@ FINER = (1.0, 3.17, 10.03)  # times more, if a run does not reach its end
 SAMPLES = 4001
 PILOT = 400  # steps of the run that is sampled at every step
 EVALUATIONS = {"compiled": 2e8, "python": 4e4}
+QUICK_SHARE = 0.25  # of these; no verdict on a method of the package changes
 TOLERANCE = 1e-6  # of an adaptive method without a default of its own
 KEPT = 1e-11
 REPORTED = 1e-9  # relative, of a reported momentum from that of the states: plain sums leave 1e-11 in a million steps
@@ -136,7 +137,8 @@ def long_run(
         steps = float(PILOT)  # of a formula, which has no steps: nothing adds up
         if method.control is not None:
             cost = max(pilot.run.force_evaluations / PILOT, 1.0)
-            limit = EVALUATIONS[method.implementation] * (0.25 if quick else 1.0) / cost if most is None else most
+            share = QUICK_SHARE if quick else 1.0
+            limit = share * EVALUATIONS[method.implementation] / cost if most is None else most
             steps = max(min(QUICK_STEPS if quick else STEPS, limit) * method.speed, PILOT)
         done = _run(method, scene, chart, steps, step, SAMPLES)
         if done.run.outcome == "ok" or not method.fixed_step:

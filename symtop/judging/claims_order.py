@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
 FALLBACK, LONGER = "goldstein", (8.37, 40.0)
 FINEST = {"compiled": 2e5, "python": 1e4}  # steps of the longest run
+QUICK_SHARE = 0.25  # of these; no verdict on a method of the package changes
 LARGEST_EXACT = 2.37  # steps a nutation that a method with exact steps is tried at, beside the ladder
 SHARE = 0.37  # of a nutation: length of the runs that are extrapolated to h = 0
 STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
@@ -72,7 +73,7 @@ def measured_order(method: Integrator, scene: Scene, *, quick: bool = False, fin
 def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, finest: float | None = None) -> Order:
     horizon = nutations * scene.time_scale()
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
-    most = FINEST[method.implementation] * (0.25 if quick else 1.0) if finest is None else finest
+    most = FINEST[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
     settings = ladder(method, scene, horizon, count, most)
     main = observable(method)
     table = order_table(scene, method, settings, horizon, main, dense=finest is None)
