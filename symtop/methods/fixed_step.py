@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +27,6 @@ class _Whole(NamedTuple):
     """A run in one compiled call, put together once."""
 
     rule: Any  # what compiled code makes the rule from
-    fit: Callable[..., Any] | None  # the same of a rule that hangs on the start
     size: int  # of a sample
     alone: tuple[Any, ...]  # what a run of one takes, for a plain tuple comes apart quicker than a NamedTuple
     blocks: Callable[[], Blocks] | None  # many members in lanes
@@ -38,8 +37,6 @@ class _Whole(NamedTuple):
         most = min(GROUP, loops.BLOCK)
         if self.blocks is not None:
             members = self.blocks().run(members, numbers, self.table, h, marks, done, most)
-        if self.fit is not None:
-            return members
         short = marks[members, -1] <= loops.BLOCK
         for chosen in groups(members[short], marks[:, -1], most):
             heed()
@@ -80,13 +77,12 @@ class FixedStep:
         if whole is None or marks.item(-1) > loops.BLOCK:
             return self._in_stretches(top, start, plan)
         # a field at a time, `counts`, and the class's constructor, which passes its arguments on, take 0.6 us more
-        run, rule, fit, check, size, evaluations, each_step, counted = whole.alone
+        run, rule, check, size, evaluations, each_step, counted = whole.alone
         if check is not None:
             check(start)
         samples, numbers = len(marks), flat(top, start)
         states, momenta = np.empty((samples, size)), np.empty((2, samples))  # a row costs half of what a column does
-        given = rule if fit is None else fit(numbers, h)
-        steps, work, outcome = run(numbers, given, h, marks, states, momenta)
+        steps, work, outcome = run(numbers, rule, h, marks, states, momenta)
         spent, ended = work * evaluations + steps * each_step, OUTCOMES[outcome]
         seen = states, momenta[0], momenta[1], steps, spent, work * counted, ended, steps * h
         return tuple.__new__(Run, seen)
@@ -132,8 +128,8 @@ class FixedStep:
 
     @property
     def in_python(self) -> bool:
-        """Does every run take a call of Python, because its rule hangs on the start or its parts do not compile?"""
-        return self._whole is None or self._whole.fit is not None
+        """Does every run take a call of Python, because parts of it do not compile?"""
+        return self._whole is None
 
     @property
     def in_lanes(self) -> bool:
@@ -147,7 +143,7 @@ class FixedStep:
     @cached_property
     def _whole(self) -> "_Whole | None":
         """The run in one call, if all of its parts are functions that compile."""
-        loop, prepare, present, rule, fit = self.loop, self.prepare, self.present, self.rule, None
+        loop, prepare, present, rule = self.loop, self.prepare, self.present, self.rule
         if not isinstance(loop, Loop) or not isinstance(prepare, Preparation):
             return None
         if present is not None and not isinstance(present, Shown):
@@ -156,8 +152,6 @@ class FixedStep:
         scale = as_it_is
         pack: Pack = (rule.pack if isinstance(rule, Scaled | Later) else None) or as_fields
         if isinstance(rule, Scaled):
-            if rule.fit is not None:
-                fit = _fitting(rule, pack)
             scale, rule = rule.scale, rule.rule
         elif isinstance(rule, Later):
             rule = rule.make()
@@ -165,21 +159,11 @@ class FixedStep:
             return None
         kind, numbers = pack(rule)
         parts = kind, prepare.numbers, scale, sample
-        lanes = None if fit is not None else loop.lanes(rule)
+        lanes = loop.lanes(rule)
         blocks = None if lanes is None else partial(loop.blocks, lanes, as_fields(rule)[0], *parts[1:])
         costs = self.evaluations, self.each_step, int(self.implicit)
-        alone = loop.whole(*parts), numbers, fit, prepare.check, size, *costs
-        return _Whole(numbers, fit, size, alone, blocks, rule)
-
-
-def _fitting(rule: Scaled, pack: Pack) -> Callable[[tuple[float, ...], float], Any]:
-    """What compiled code makes a rule from that hangs on the start: of the numbers of top and start, and the step."""
-
-    @lru_cache(maxsize=256)  # by plain numbers: to look up a top and a start by themselves takes 0.4 us
-    def fitted(numbers: tuple[float, ...], h: float) -> Any:
-        return pack(rule.fitted(SymmetricTop(*numbers[:3]), Angles(*numbers[3:]), h))[1]
-
-    return fitted
+        alone = loop.whole(*parts), numbers, prepare.check, size, *costs
+        return _Whole(numbers, size, alone, blocks, rule)
 
 
 def inside(solver: Solver | None) -> FixedStep | None:

@@ -95,14 +95,13 @@ def _on_numbers(scale: Callable[..., Any], kind: Any) -> Any:
 
 @dataclass(frozen=True)
 class Scaled:
-    """A rule whose numbers hang on the run; `fit(rule, top, start, h)` adds what Python alone can compute.
+    """A rule whose numbers hang on the run: those of `scale(rule, top, start, h)`, which compiles.
 
     `pack` is how the rule travels into compiled code: by default as its fields.
     """
 
     rule: Any  # a NamedTuple
     scale: Callable[..., Any]
-    fit: Callable[..., Any] | None = None
     pack: Pack | None = None
 
     def __post_init__(self) -> None:
@@ -113,11 +112,7 @@ class Scaled:
         kind: Any = type(self.rule)
         compiled = _on_numbers(self.scale, kind)
         numbers = flat(top, at)
-        return compiled(numbers[:3], numbers[3:], tuple(self.fitted(top, at, h)), h)
-
-    def fitted(self, top: SymmetricTop, at: Angles, h: float) -> Any:
-        """The rule before it is scaled."""
-        return self.rule if self.fit is None else self.fit(self.rule, top, at, h)
+        return compiled(numbers[:3], numbers[3:], tuple(self.rule), h)
 
 
 @dataclass(frozen=True)

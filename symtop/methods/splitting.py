@@ -67,10 +67,9 @@ def composition(
         )
     table = rule._replace(turn=ROTATIONS.index(rotation), processor=boost)
     if chart == "angles":
-        stages = Scaled(table, splitting_angles.scale, pack=packed)
+        stages = Scaled(table, splitting_angles.scale, packed)
     else:
-        fit = splitting_space.tuned if table.turn == TUNED else None
-        stages = Scaled(table, splitting_space.scale, fit, packed)
+        stages = Scaled(table, splitting_space.tuned if table.turn == TUNED else splitting_space.scale, packed)
     one_drift = bare and rule.drift == (1.0,)
     closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if one_drift and rule.kick == (0.5, 0.5) else None
     modified, sleeps = closed_forms or (None, None)

@@ -33,7 +33,6 @@ class Composition(NamedTuple):
     forces: int  # a step
     turn: int = 0  # which rotation a drift is
     processor: float = 0.0
-    stretch: float = 1.0  # of a drift whose angle is tuned
 
 
 @functools.cache
@@ -45,7 +44,7 @@ def _opened(n: int) -> Callable[[Any], Composition]:
     def opened(row: Any) -> Composition:
         drift, kick = to_fixed_tuple(row[:n], n), to_fixed_tuple(row[n : n + m], m)
         gradient = to_fixed_tuple(row[n + m : end], m)
-        return Composition(drift, kick, gradient, int(row[end]), int(row[end + 1]), row[end + 2], row[end + 3])
+        return Composition(drift, kick, gradient, int(row[end]), int(row[end + 1]), row[end + 2])
 
     making: Callable[[Any], Composition] = opened
     return making

@@ -35,7 +35,6 @@ Sources: Touma, Wisdom, Astron. J. 107 (1994) 1189 (splitting); Bobenko, Suris, 
 (Cayley); Takahashi, Imada, J. Phys. Soc. Japan 53 (1984) 3765; Rowlands, J. Comput. Phys. 97 (1991) 235 (processed).
 """
 
-import functools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -44,6 +43,7 @@ import numpy as np
 
 from symtop.base.compiled import register_jitable
 from symtop.base.numbers import sign_changes
+from symtop.base.parts import shared
 from symtop.methods.lanes import Lanes
 from symtop.methods.loop import driver
 from symtop.methods.registry import Array
@@ -51,32 +51,34 @@ from symtop.methods.rotor import EXACT, half_square, rotor, without_branch
 from symtop.methods.space import SpaceTop, axis_of, finite_outcome, observe_attitude, observe_axis, with_spin
 from symtop.methods.splitting_lanes import composed
 from symtop.methods.splitting_loop import Composition, compose, stages
-from symtop.model.top import Angles, Momenta, SymmetricTop
+from symtop.model.top import Momenta, SymmetricTop, mean_square_momentum
 from symtop.model.view import View, space_energy
 
 
 def scale(rule: Any, top: Any, at: Any, h: float) -> Any:
     """Drifts in half angles over |L|, kicks in angular momentum."""
-    half, kick = 0.5 * h / top.I1 * rule.stretch, h * top.mgl
+    return _scaled(rule, top, h, 1.0)
+
+
+def tuned(rule: Any, top: Any, at: Any, h: float) -> Any:
+    """The same of a Cayley drift that turns by the right mean angle."""
+    return _scaled(rule, top, h, tangent_scale(top, at, h))
+
+
+@register_jitable
+def _scaled(rule: Any, top: Any, h: float, stretch: float) -> Any:
+    half, kick = 0.5 * h / top.I1 * stretch, h * top.mgl
     return stages(rule, half, kick, 2.0 * h * kick * kick / top.I1, rule.processor * h * kick / top.I1)
 
 
-def tuned(rule: Composition, top: SymmetricTop, start: Angles, h: float) -> tuple[Any, ...]:
-    """The fields of the rule of a Cayley drift that turns by the right mean angle."""
-    return (*rule[:-1], tangent_scale(top, start, h))
-
-
-@functools.lru_cache(maxsize=256)
-def tangent_scale(top: SymmetricTop, start: Angles, h: float) -> float:
+@shared
+def tangent_scale(top: Any, start: Any, h: float) -> float:
     """tan(x)/x with x = h Lm/2 I1: a Cayley drift with tau = (h/2 I1) times this turns |L| = Lm by the exact angle.
 
     Lm is the root of the mean of |L|^2 over a nutation, which is known in closed form.
     """
-    x = 0.5 * h * math.sqrt(_mean_square_momentum(top, start)) / top.I1
+    x = 0.5 * h * math.sqrt(mean_square_momentum(top, start)) / top.I1
     return math.tan(x) / x if x > 0.0 else 1.0
-
-
-_mean_square_momentum = functools.lru_cache(maxsize=256)(SymmetricTop.mean_square_momentum)  # 40 us: two bisections
 
 
 def cayley_energy(top: SymmetricTop, h: float, tau: float, axis: Array, momentum: Array) -> Array:

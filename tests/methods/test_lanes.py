@@ -83,8 +83,7 @@ def test_members_of_every_method_with_lanes_have_the_bits_of_runs_alone(name):
 
 def test_methods_that_have_lanes():
     splitting = {row.name for row in rows() if row.family == "splitting"}
-    alone = {"cayley-tuned[axis]", "cayley-tuned[attitude]", "stormer-verlet-reversible[angles]"}
-    assert splitting - set(IN_LANES) == alone  # fitted by Python one by one, or of steps that differ between members
+    assert splitting - set(IN_LANES) == {"stormer-verlet-reversible[angles]"}  # of steps that differ between members
     assert {"rk4[angles]", "rk4[axis]", "rk4[attitude]"} <= set(IN_LANES)
     assert {f"{name}[{chart}]" for name in ("exact-discrete", "series") for chart in ("axis", "attitude")} <= set(
         IN_LANES
