@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from symtop.measure.settings import FLAT, LEAST_STEPS, ROUNDED
 from symtop.measure.work import TARGETS
+from symtop.methods.adaptive import Adaptive
 from symtop.methods.calling import solve
 from symtop.methods.fixed_step import inside
 from symtop.methods.many import members_of
@@ -101,8 +102,13 @@ def run_level(row: Integrator, tops: Tops, chosen: Members, level: int, budget: 
         h = tops.period[chosen] / FIRST * 0.5**level
         marks = np.broadcast_to(tops.marks << level, (len(chosen), tops.marks.size))
         return stepped(row, tops.numbers[chosen], h, marks)
-    tolerance = setting_of(row, level)
-    return in_turn(row, tops.numbers[chosen], [Plan.until(times, tolerance, budget) for times in tops.times[chosen]])
+    tolerance, solver = setting_of(row, level), row.solvers[row.charts()[0]]
+    numbers, times = tops.numbers[chosen], tops.times[chosen]
+    if isinstance(solver, Adaptive):
+        n, samples = times.shape
+        done, _ = solver.many(numbers, np.full(n, tolerance), times, np.full(n, samples), budget)
+        return Level(done.states, done.momenta, done.work.astype(float), done.outcome)
+    return in_turn(row, numbers, [Plan.until(row_times, tolerance, budget) for row_times in times])
 
 
 def stepped(row: Integrator, numbers: Array, h: Array, marks: NDArray[np.int64]) -> Level:

@@ -13,19 +13,20 @@ Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19; the interpolant:
 the initial step: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.4.
 """
 
+import functools
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.base.compiled import compile_kernel, register_jitable, set_item
+from symtop.methods.adaptive import Adaptive, Loop
 from symtop.methods.euler_lagrange import LEAST_TOLERANCE
-from symtop.methods.formulations import FORMULATIONS, as_run
-from symtop.methods.outcomes import OK, OUT_OF_BUDGET, STEP_TOO_SMALL
-from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator, Solver
-from symtop.methods.runge_kutta import later_stages, plus, store, weighted
-from symtop.model.top import Angles, SymmetricTop
+from symtop.methods.formulations import FORMULATIONS
+from symtop.methods.outcomes import OK, STEP_TOO_SMALL
+from symtop.methods.preparation import Body, Start, as_it_steps
+from symtop.methods.registry import Integrator
+from symtop.methods.runge_kutta import add, later_stages, plus, store, weighted
 
 BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
 EVALUATIONS = 1_000_000_000  # a run's limit: about half a minute
@@ -109,70 +110,79 @@ def _try_steps(
     return state, t, step, evaluations, STEP_TOO_SMALL
 
 
-def _march(field: Any, ended: Any) -> Any:
-    """The loop on states that move by `field`, compiled when it is first used."""
+@register_jitable
+def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, tolerance: float) -> float:
+    """SciPy's initial step: 1 % of |y|/|f|, then from the size of the second derivative, by one evaluation of f."""
+    d0, d1 = _rms(state, state, state, tolerance), _rms(slope, state, state, tolerance)
+    trial = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, end)
+    bent = field(par, add(state, slope, trial))
+    for m in range(len(state)):
+        bent = set_item(bent, m, bent[m] - slope[m])
+    d2 = _rms(bent, state, state, tolerance) / trial
+    guess = max(1e-6, 1e-3 * trial) if max(d1, d2) <= 1e-15 else (0.01 / max(d1, d2)) ** 0.2
+    return min(100.0 * trial, guess, end)
 
-    def march(  # type: ignore[no-untyped-def]
-        par, pair, tolerance, end, times, budget, state, slopes, t, step, steps, seen, states
-    ):
-        """Steps until the end, a failure or `budget` evaluations; fills `states` with samples."""
-        evaluations = 0
-        outcome = OK
-        while t < end and outcome == OK and evaluations < budget:
+
+@functools.cache
+def loop(chart: str, pair: Embedded = DORMAND_PRINCE) -> Loop:  # noqa: C901
+    """The loop in one chart as `adaptive` takes it, compiled when it is first used; it counts force evaluations.
+
+    The place is (state, its slope, time, step).
+    """
+    form: Any = FORMULATIONS[chart]  # whose parts compile
+    field, ended, observe, prepare, size = form.field, form.ended, form.observe, form.prepare.numbers, form.prepare.size
+    sample = as_it_steps if form.present is None else form.present.sample
+    register_jitable(observe)
+    clock, stages = 2 * size, len(pair.error)
+
+    def march(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
+        par, state = prepare(Body(*numbers[:3]), Start(*numbers[3:]))
+        slopes, nothing, end = np.empty((stages, size)), state, times[-1]
+        for m in range(size):
+            nothing = set_item(nothing, m, 0.0)
+        steps = effort = outcome = 0
+        if seen < 0:
+            slope = field(par, state)
+            store(slopes, 0, slope)
+            seen, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance), 2
+        else:
+            t, step = place[clock], place[clock + 1]
+            for m in range(size):
+                state, slopes[0, m] = set_item(state, m, place[m]), place[size + m]
+        while t < end and effort < budget:
             before, start = state, t
-            state, t, step, effort, outcome = _try_steps(field, par, pair, before, slopes, tolerance, start, step, end)
-            evaluations += effort
+            state, t, step, work, outcome = _try_steps(field, par, pair, before, slopes, tolerance, start, step, end)
+            effort += work
             if outcome != OK:
                 break
             steps += 1
             h = t - start
             while seen < len(times) and times[seen] <= t:
-                store(states, seen, _interpolate(pair.dense, before, slopes, h, (times[seen] - start) / h))
+                place_then = _interpolate(pair.dense, before, slopes, h, (times[seen] - start) / h)
+                store(states, seen, sample(par, times[seen], place_then))
+                momenta[seen, 0], momenta[seen, 1] = observe(par, 0.0, place_then, nothing, 0.0)
                 seen += 1
             outcome = ended(state)
-            for m in range(len(state)):
-                slopes[0, m] = slopes[len(pair.b), m]
-        return state, t, step, steps, seen, evaluations, outcome
+            for m in range(size):
+                slopes[0, m] = slopes[stages - 1, m]
+            if outcome != OK:
+                break
+        for m in range(size):
+            place[m], place[size + m] = state[m], slopes[0, m]
+        place[clock], place[clock + 1] = t, step
+        return seen, steps, effort, outcome
 
-    return compile_kernel(march)
-
-
-MARCHES = {chart: _march(form.field, form.ended) for chart, form in FORMULATIONS.items()}
-
-
-def first_step(field: Any, par: Any, state: tuple[float, ...], end: float, tolerance: float) -> float:
-    """SciPy's initial step: 1 % of |y|/|f|, then from the size of the second derivative; two evaluations of f."""
-    slope = field(par, state)
-    d0, d1 = _rms(state, state, state, tolerance), _rms(slope, state, state, tolerance)
-    trial = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, end)
-    moved = field(par, tuple(y + trial * f for y, f in zip(state, slope, strict=True)))
-    d2 = _rms(tuple(x - y for x, y in zip(moved, slope, strict=True)), state, state, tolerance) / trial
-    guess = max(1e-6, 1e-3 * trial) if max(d1, d2) <= 1e-15 else (0.01 / max(d1, d2)) ** 0.2
-    return float(min(100.0 * trial, guess, end))
+    compiled: Loop = compile_kernel(march)
+    return compiled
 
 
-def solver(chart: str, pair: Embedded = DORMAND_PRINCE) -> Solver:
+def solver(chart: str, pair: Embedded = DORMAND_PRINCE) -> Adaptive:
     """A solver of the registry in one chart."""
-    form, march = FORMULATIONS[chart], MARCHES[chart]
-
-    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        par, state = form.prepare(top, start)
-        states, slopes = np.full((plan.times.size, len(state)), np.nan), np.empty((len(pair.error), len(state)))
-        slopes[0] = form.field(par, state)
-        t, step = 0.0, first_step(form.field, par, state, plan.horizon, plan.tolerance)
-        steps, seen, evaluations, outcome = 0, 0, 2, OK
-        budget = plan.most(EVALUATIONS)
-        block = int(min(BLOCK, budget))
-        given = par, pair, plan.tolerance, plan.horizon, plan.times, block
-        while t < plan.horizon and outcome == OK:
-            state, t, step, steps, seen, effort, outcome = march(*given, state, slopes, t, step, steps, seen, states)
-            evaluations += effort
-            if outcome == OK and t < plan.horizon and evaluations > budget:
-                outcome = OUT_OF_BUDGET
-        reached = plan.horizon if outcome == OK else t
-        return as_run(form, par, plan.times, states, steps, evaluations, outcome, reached)
-
-    return solve
+    form: Any = FORMULATIONS[chart]
+    size, shown = form.prepare.size, form.prepare.size if form.present is None else form.present.size
+    return Adaptive(
+        lambda _: loop(chart, pair), shown, 2 * size + 2, 2 * size, EVALUATIONS, BLOCK, check=form.prepare.check
+    )
 
 
 def built_in() -> list[Integrator]:

@@ -18,14 +18,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.base.compiled import compile_kernel, register_jitable, set_item
+from symtop.methods.adaptive import Adaptive
 from symtop.methods.attitude_series import attitude_sum
 from symtop.methods.axis_series import axis_sum
 from symtop.methods.loop import accumulate
-from symtop.methods.outcomes import NOT_FINITE, OK, OUT_OF_BUDGET, OUTCOMES, STEP_TOO_SMALL
-from symtop.methods.plan import Plan, Run
+from symtop.methods.outcomes import NOT_FINITE, STEP_TOO_SMALL
 from symtop.methods.preparation import Body, Start
 from symtop.methods.space import axis_of, on_attitude, on_axis, with_spin
-from symtop.model.top import Angles, SymmetricTop, flat
 
 ORDERS = (8, 12, 16, 20)
 BLOCK = 1_000_000  # series between returns to Python
@@ -73,9 +72,8 @@ def order_for(tolerance: float) -> int:
 def march(chart: str, order: int) -> Callable[..., tuple[int, int, int, int]]:  # noqa: C901
     """The loop of one order in one chart, compiled when it is first used.
 
-    ``march(numbers, tolerance, times, budget, seen, place, states, momenta)`` goes on from `place` (state, its low
-    half, time, its low half, step), or begins if `seen` is negative, and fills `states` and `momenta` until the last
-    time, a failure or `budget` series; it returns samples, steps, series and outcome.
+    It is a loop as `adaptive` takes it, from the place (state, its low half, time, its low half, step), and counts
+    series.
     """
     prepare, series_of, sample, axis, size = CHARTS[chart]
     series = series_of(order)
@@ -144,26 +142,9 @@ def march(chart: str, order: int) -> Callable[..., tuple[int, int, int, int]]:  
     return compiled
 
 
-def solver(chart: str) -> Callable[[SymmetricTop, Angles, Plan], Run]:
+def solver(chart: str) -> Adaptive:
     """A solver of the registry in one chart."""
     size = CHARTS[chart].size
-
-    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        order = order_for(plan.tolerance)
-        run, times = march(chart, order), np.ascontiguousarray(plan.times)
-        states, momenta = np.full((times.size, size), np.nan), np.full((times.size, 2), np.nan)
-        place = np.empty(2 * size + 3)
-        budget = plan.most(order * SERIES) / order
-        seen, steps, effort, outcome = -1, 0, 0, OK
-        while seen < times.size and outcome == OK and effort < budget:
-            block = int(min(BLOCK, budget - effort)) or 1
-            seen, more, work, outcome = run(
-                flat(top, start), plan.tolerance, times, block, seen, place, states, momenta
-            )
-            steps, effort = steps + more, effort + work
-        if seen < times.size and outcome == OK:
-            outcome = OUT_OF_BUDGET
-        reached = plan.horizon if outcome == OK else float(place[2 * size])
-        return Run(states, momenta[:, 0], momenta[:, 1], steps, effort * order, 0, OUTCOMES[outcome], reached)
-
-    return solve
+    return Adaptive(
+        lambda tolerance: march(chart, order_for(tolerance)), size, 2 * size + 3, 2 * size, SERIES, BLOCK, order_for
+    )

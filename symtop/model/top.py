@@ -251,10 +251,6 @@ class SymmetricTop:
         """Time of one nutation, ``2 pi / AGM(sqrt(beta (u3-u1)), sqrt(beta (u3-u2)))``; inf on a separatrix."""
         return nutation_period(self, at)
 
-    def mean_square_momentum(self, at: Angles) -> float:
-        """The mean of ``|L|^2 = 2 I1 (E - mgl u) + p_psi^2 (1 - I1/I3)`` over a nutation, to 1e-14."""
-        return mean_square_momentum(self, at)
-
 
 # the nutation of a state; all of it compiles as it stands
 
@@ -344,13 +340,3 @@ def mean_nutation(top: Any, at: Any, low: float, high: float) -> tuple[float, fl
         weight *= 2.0
         x, y = 0.5 * (x + y), math.sqrt(x * y)
     return (y if x > 0.0 else 0.0), gained  # x = 0: a hanging top on its separatrix
-
-
-@shared
-def mean_square_momentum(top: Any, at: Any) -> float:
-    """`SymmetricTop.mean_square_momentum` of any records with these fields."""
-    low, high = turning_cosines(top, at)
-    excess, beta, a, _ = nutation_cubic(top, at)
-    _, gained = mean_nutation(top, at, low, high)
-    mean: float = top.I1 * top.I1 * (excess + beta * (math.cos(at.theta) - low) - gained + a * a)
-    return mean

@@ -1,8 +1,8 @@
 """A piece of an ensemble: plans, runs and observables of some members, each step made for all of them at once.
 
 A member has the bits of `simulate` alone: the same steps, samples and observables. Steps are made in one compiled call
-(`FixedStep.many`, or the closed form's) where the method has one; a method without such a call runs its members one
-after another, by a call of Python for each.
+(`FixedStep.many`, or the closed form's) where the method has one, or in one for each member (`Adaptive.many`); any
+other method runs its members one after another by `calling.solve`, as anybody's solver is called.
 """
 
 from collections.abc import Iterator
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from symtop.base.threads import heed
 from symtop.base.validate import SymtopError
 from symtop.methods import exact
+from symtop.methods.adaptive import Adaptive
 from symtop.methods.calling import solve
 from symtop.methods.fixed_step import FixedStep
 from symtop.methods.lanes import W
@@ -104,6 +105,8 @@ class Job:
         solver = self.method.solvers[self.chart]
         if solver is exact.solve:
             return IN_TURN
+        if isinstance(solver, Adaptive):
+            return IN_TURN
         if not isinstance(solver, FixedStep) or solver.in_python:
             return IN_PYTHON
         return IN_LANES if solver.in_lanes else IN_TURN
@@ -150,6 +153,9 @@ class Job:
             done = sampled(solver, self.numbers, plan)
             reached = done.steps * plan.step_size
             return _Runs(done.states, done.momenta, done.steps, *solver.counts(*done[2:4]), done.outcome, reached)
+        if isinstance(solver, Adaptive) and self.tolerance is not None:
+            done, ended = solver.many(self.numbers, self.tolerance, plan.times, plan.counts, self.budget)
+            return _Runs(done.states, done.momenta, done.steps, done.work, 0 * done.work, done.outcome, ended)
         if solver is exact.solve:
             states, momenta = exact.solve_many(self.numbers, np.nan_to_num(plan.times))
             none = np.zeros(len(self.numbers), dtype=np.int64)

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,6 +20,7 @@ from symtop.methods.registry import integrator
 from symtop.methods.runge_kutta import LOOPS, Tableau, runge_kutta
 from symtop.methods.scipy_ivp import RightHandSide, compiled_field, scipy_method
 from symtop.model.scenes import closed_form
+from symtop.model.top import flat
 from symtop.run.simulation import make_plan
 from tests.slopes import assert_order
 
@@ -251,21 +253,19 @@ def test_the_chart_tables_count_of_operations_is_that_of_the_formulas(monkeypatc
 # --- Dormand-Prince -------------------------------------------------------------------------------------------------
 
 
-def _walk(scene, tolerance, horizon, pair=dormand_prince.DORMAND_PRINCE):
+def _walk(scene, tolerance, horizon, pair=dormand_prince.DORMAND_PRINCE, **limits):
     plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon=horizon, samples=301)
-    return plan, dormand_prince.solver("angles", pair)(scene.top, scene.start, plan)
+    return plan, replace(dormand_prince.solver("angles", pair), **limits)(scene.top, scene.start, plan)
 
 
 def _step_ends(scene, tolerance, horizon, pair):
     """The ends of the accepted steps: with a budget of one evaluation the loop returns after each."""
-    par, state = with_rates(scene.top, scene.start)
-    slopes, samples = np.empty((7, 6)), np.empty((0, 6))
-    slopes[0] = field_angles(par, state)
-    given, ends, t = (par, pair, tolerance, horizon, np.empty(0), 1), [], 0.0
-    step = dormand_prince.first_step(field_angles, par, state, horizon, tolerance)
-    while t < horizon:
-        state, t, step, *_ = dormand_prince.MARCHES["angles"](*given, state, slopes, t, step, 0, 0, samples)
-        ends.append(t)
+    loop, place, seen, ends = dormand_prince.loop("angles", pair), np.empty(14), -1, []
+    samples = np.array([horizon]), np.empty((1, 4)), np.empty((1, 2))
+    while seen < 1:
+        budget = 3 if seen < 0 else 1  # two evaluations choose the first step
+        seen, *_ = loop(flat(scene.top, scene.start), tolerance, samples[0], budget, seen, place, *samples[1:])
+        ends.append(place[12])
     return np.array(ends)
 
 
@@ -316,25 +316,22 @@ def test_both_rk45_are_one_method():
         np.testing.assert_allclose(second[name], first[name], atol=1e-10)
 
 
-def test_adaptive_outcomes(monkeypatch):
+def test_adaptive_outcomes():
     scene, pair = symtop.scene("spheroid"), dormand_prince.DORMAND_PRINCE
     for error in (math.inf, math.nan):
         hopeless = _walk(scene, 1e-6, 8.0, pair._replace(error=(error,) * 7))[1]
         assert (hopeless.outcome, hopeless.steps) == ("step_too_small", 0)
     assert _walk(POLE, 1e-2, 5.0)[1].outcome == "left_chart"
-    monkeypatch.setattr(dormand_prince, "BLOCK", 500)
-    monkeypatch.setattr(dormand_prince, "EVALUATIONS", 1000)
-    plan, run = _walk(scene, 1e-9, 8.0)
+    plan, run = _walk(scene, 1e-9, 8.0, block=500, most=1000)
     assert run.outcome == "out_of_budget"
     assert 0.0 < run.reached < 8.0
     assert np.array_equal(np.isfinite(run.states[:, 0]), plan.times <= run.reached)
 
 
-def test_blocks_do_not_show(monkeypatch):
+def test_blocks_do_not_show():
     scene = symtop.scene("spheroid")
     whole = _walk(scene, 1e-7, 8.0)[1]
-    monkeypatch.setattr(dormand_prince, "BLOCK", 100)
-    parts = _walk(scene, 1e-7, 8.0)[1]
+    parts = _walk(scene, 1e-7, 8.0, block=100)[1]
     np.testing.assert_array_equal(parts.states, whole.states)
     assert (parts.steps, parts.force_evaluations) == (whole.steps, whole.force_evaluations)
 

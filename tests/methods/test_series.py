@@ -1,6 +1,7 @@
 """The own Taylor series: coefficients, orders, agreement with the closed form, tolerance, and the vectors beneath."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -189,16 +190,12 @@ def test_samples_do_not_change_the_steps_and_a_budget_ends_a_run(chart, method):
     assert np.isnan(short.states[-1]).all()
 
 
-def test_blocks_of_series_join_without_a_seam(monkeypatch):
-    from symtop.methods import series_steps
-
+def test_blocks_of_series_join_without_a_seam():
     scene = symtop.scene("goldstein")
     plan = Plan.until(np.linspace(0.0, 40.0, 41), 1e-10)
     for chart, method in ADAPTIVE:
         whole = method.solvers[chart](scene.top, scene.start, plan)
-        monkeypatch.setattr(series_steps, "BLOCK", 7)
-        parts = method.solvers[chart](scene.top, scene.start, plan)
-        monkeypatch.undo()
+        parts = replace(method.solvers[chart], block=7)(scene.top, scene.start, plan)
         assert np.array_equal(whole.states, parts.states)
         assert whole.steps == parts.steps
 

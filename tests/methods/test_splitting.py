@@ -311,7 +311,7 @@ def test_the_mean_square_momentum_is_that_of_the_closed_form(name):
     potential = scene.top.mgl * np.cos(closed_form(scene)(times).theta).mean()
     mean = 2.0 * scene.top.I1 * (scene.top.energy(scene.start) - potential)
     mean += momenta.p_psi**2 * (1.0 - scene.top.I1 / scene.top.I3)
-    assert scene.top.mean_square_momentum(scene.start) == pytest.approx(mean, rel=1e-13)
+    assert space.mean_square_momentum(scene.top, scene.start) == pytest.approx(mean, rel=1e-13)
 
 
 # ---- what each is good at --------------------------------------------------------------------------------------------

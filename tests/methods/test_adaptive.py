@@ -1,0 +1,89 @@
+"""Own solvers that choose their steps, of many members: the bits of runs alone, budgets, and members that fail."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import symtop
+from symtop.methods.adaptive import Adaptive
+from symtop.methods.many import members_of
+from symtop.methods.outcomes import OUTCOMES
+from symtop.methods.plan import Plan
+from symtop.methods.registry import rows
+from symtop.run.members import read_members
+from symtop.run.schedule import nutation_periods
+
+SOLVERS = {
+    row.name: row.solvers[row.charts()[0]] for row in rows() if isinstance(row.solvers[row.charts()[0]], Adaptive)
+}
+COUNTS = 7
+BUDGET = 900.0
+
+
+def members(count=60):
+    """Tops of every stratum, each with a tolerance, times and a number of samples of its own."""
+    numbers = read_members(symtop.population(count, seed=7)).numbers
+    period = nutation_periods(numbers)
+    times = np.outer(np.where(np.isfinite(period), period, 1.0), np.linspace(0.3, 4.0, COUNTS))
+    return numbers, 10.0 ** -(2.0 + np.arange(count) % 9), times, 1 + np.arange(count) % COUNTS
+
+
+def test_the_adaptive_solvers_are_own_ones():
+    assert {name.split("[")[0] for name in SOLVERS} == {"rk45-compiled", "series-adaptive"}
+    assert len(SOLVERS) == 5
+
+
+@pytest.mark.parametrize("budget", [None, BUDGET])
+@pytest.mark.parametrize("name", SOLVERS)
+def test_members_have_the_bits_of_runs_alone(name, budget):
+    numbers, tolerance, times, counts = members()
+    if "angles" in name:
+        numbers[5, 3] = 0.0  # on a pole
+    done, reached = SOLVERS[name].many(numbers, tolerance, times, counts, budget)
+    for i, (top, start) in enumerate(members_of(numbers)):
+        if "angles" in name and i == 5:
+            assert (OUTCOMES[done.outcome[i]], done.steps[i], reached[i]) == ("left_chart", 0, 0.0)
+            assert np.isnan(done.states[i]).all()
+            continue
+        run = SOLVERS[name](top, start, Plan.until(times[i, : counts[i]], tolerance[i], budget))
+        np.testing.assert_array_equal(done.states[i, : counts[i]], run.states)
+        np.testing.assert_array_equal(done.momenta[i, : counts[i]].T, (run.p_phi, run.p_psi))
+        assert np.isnan(done.states[i, counts[i] :]).all()
+        assert (done.steps[i], done.work[i], OUTCOMES[done.outcome[i]], reached[i]) == (*run[3:5], *run[6:])
+    outcomes = {OUTCOMES[k] for k in done.outcome}
+    assert ("out_of_budget" in outcomes) == (budget is not None)
+    assert "ok" in outcomes
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_a_budget_is_passed_by_less_than_a_step(name):
+    numbers, tolerance, times, _ = members(20)
+    done, reached = SOLVERS[name].many(numbers, tolerance, times, np.full(20, COUNTS), BUDGET)
+    ended = done.outcome == OUTCOMES.index("out_of_budget")
+    assert ended.any()
+    most = (
+        20.0 * (1 + COUNTS) if name.startswith("series") else 6.0 * 8
+    )  # a step and the samples in it; some rejections
+    assert (done.work[ended] < BUDGET + most).all()
+    assert (reached[ended] < times[ended, -1]).all()
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_an_ensemble_says_how_it_was_run_and_equals_simulate(name):
+    tops = symtop.population(8, seed=3)
+    runs = symtop.ensemble(tops, name, tolerance=1e-6, horizon=2.0, samples=5, quiet=True)
+    assert runs.attrs["execution"] == "compiled, one after another"
+    for i, (top, start) in enumerate(members_of(read_members(tops).numbers)):
+        alone = symtop.simulate(symtop.Scene("one", top, start, 2.0), name, tolerance=1e-6, samples=5, guard=False)
+        for quantity in ("axis", "energy", "p_phi", "p_psi"):
+            np.testing.assert_array_equal(runs[quantity].values[i], alone[quantity].values)
+        assert int(runs["force_evaluations"][i]) == alone.attrs["force_evaluations"]
+
+
+def test_a_run_in_pieces_has_the_bits_of_a_run_in_one():
+    numbers, tolerance, times, counts = members(12)
+    for solver in SOLVERS.values():
+        whole, parts = (one.many(numbers, tolerance, times, counts)[0] for one in (solver, replace(solver, block=9)))
+        np.testing.assert_array_equal(whole.states, parts.states)
+        np.testing.assert_array_equal(whole.work, parts.work)
