@@ -21,7 +21,7 @@ from .failures import sampled_energy_error, separatrix_horizon, surviving_displa
 from .outcome_maps import family, outcome_map
 from .solver_tolerance import solver_sweep, textbook_midpoint
 
-PERIODS = 12.0  # nutations of a run of a map over spin
+PERIODS = 10.0  # nutations of a run of a map over spin, as in the other studies' short runs
 SOUGHT_PHASE = 10.0  # h omega up to which a linear limit is looked for
 PAST_RESONANCE = 1.05  # times the resonant step: far enough for what a resonance kills to live again
 

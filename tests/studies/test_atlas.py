@@ -469,7 +469,7 @@ def test_words_of_mechanisms_come_only_from_what_is_there():
     data = hand_made([[A, B, L]] * 4)
     assert words.mechanism_sentences(data) == []
     assert [table.title for table in words.tables(data)] == [
-        "The atlas in words: cusp with its spin changed, 12 nutations"
+        "The atlas in words: cusp with its spin changed, 10 nutations"
     ]
 
 
