@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT, DRIFTING, GROWING, NO_GAP, WRONG_REGIME, barriers
+from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT, DRIFTING, FEWEST, GROWING, NO_GAP, WRONG_REGIME, barriers
 from symtop.methods.outcomes import NOT_FINITE
 from symtop.model import effective, motion_samples
 from symtop.model.closed_forms import ClosedForms
@@ -152,13 +152,14 @@ def _kernel() -> Any:  # noqa: C901  (one loop, read in one piece)
         return False
 
     @register_jitable
-    def drifts(scene, states, momenta, count, samples):  # type: ignore[no-untyped-def]
-        """Does the energy error grow and pass the bound? The halves of a run of few steps are its own."""
-        half = samples // 2 if count > samples // 2 else count // 2
+    def drifts(scene, states, momenta, count):  # type: ignore[no-untyped-def]
+        """Does the energy error grow and pass the bound? With few samples nothing is said to grow."""
+        half = count // 2
+        before = half if half >= FEWEST else count
         start, early, late = energy_of(scene, states[0], momenta[0, 0], momenta[0, 1]), 0.0, 0.0
         for j in range(count):
             error = abs(energy_of(scene, states[j], momenta[j, 0], momenta[j, 1]) - start) / scene[8]
-            if j < half and error > early:
+            if j < before and error > early:
                 early = error
             if j >= half and error > late:
                 late = error
@@ -188,6 +189,6 @@ def _kernel() -> Any:  # noqa: C901  (one loop, read in one piece)
                 elif strays(scene, run, kept, count):
                     verdict[i, k] = WRONG_REGIME
                 else:
-                    verdict[i, k] = DRIFTING if drifts(scene, run, kept, count, phases.shape[1]) else BOUNDED_BUT_WRONG
+                    verdict[i, k] = DRIFTING if drifts(scene, run, kept, count) else BOUNDED_BUT_WRONG
 
     return compile_kernel(judge_all)

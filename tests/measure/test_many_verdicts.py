@@ -37,6 +37,11 @@ def one_pass(scene_, times, states, momenta, followed=True):
     return VERDICTS[judged.verdict[0, 0]], judged.axis_error[0, 0]
 
 
+def padded(values):
+    """A row of a map: NaN beyond the last sample of a run."""
+    return np.concatenate([values, np.full((SAMPLES - len(values), *values.shape[1:]), math.nan)])
+
+
 @pytest.mark.parametrize(
     ("name", "chart", "step", "word"),
     [
@@ -63,6 +68,24 @@ def test_one_pass_says_what_verdict_says(name, chart, step, word):
     assert early == word
     assert some <= largest
     assert (some <= 1e-2) == (word == "accurate")
+
+
+@pytest.mark.parametrize("name", ["rk4", "commutator-free-4", "rkmk-se3-4"])
+def test_one_pass_says_what_verdict_says_of_runs_of_few_steps(name):
+    """Fewer steps than a run has samples: each run has halves of its own, and fewer than 16 samples never drift."""
+    cusp, words = scene("cusp"), set()
+    for count in range(6, 41):
+        for step in (0.08, 0.13, 0.2, 0.3):
+            times, run, seen, shown = run_of(cusp, name, "axis", step, count)
+            if run.outcome == "ok":
+                error = axis_distance(seen.axis, closed_form(cusp).axis(times))
+                seen_by_map = times, run.states, np.stack([run.p_phi, run.p_psi], axis=-1)
+                word = one_pass(cusp, *(padded(values) for values in seen_by_map))[0]
+                assert word == verdict(cusp, shown, error), (count, step)
+                words.add((word, times.size < 16))
+    assert ("bounded_but_wrong", True) in words
+    assert (("drifting", False) in words) == (name != "rkmk-se3-4")
+    assert ("drifting", True) not in words
 
 
 def test_a_state_that_is_not_finite_and_a_pole_on_the_wrong_side_are_seen():
