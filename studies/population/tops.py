@@ -20,11 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.base.numbers import EPSILON, GOLDEN, TINY
-from symtop.model import charts
+from symtop.model import charts, scales
 from symtop.model.charts import Array
 from symtop.model.closed_forms import ClosedForms
-from symtop.model.effective import effective_force, effective_potential, effective_stiffness
-from symtop.model.scenes import NEXT_TO_POLE, STEADY
+from symtop.model.effective import effective_potential
 from symtop.model.view import axis_of, space_energy
 from symtop.run.bounds import ROUNDING
 from symtop.run.population import NUMBERS, STRATA, population
@@ -34,7 +33,6 @@ SAMPLES = 12
 ASKED = ("axis", "attitude", "energy")  # quantities that have targets
 MOMENTA = "momenta"
 CLEAR = 0.1  # a target is asked where the truth's bound is at most this part of it
-BISECTIONS = 60
 
 
 class Body(NamedTuple):
@@ -93,41 +91,17 @@ class Tops:
     @cached_property
     def momenta(self) -> tuple[Array, Array, Array, Array]:
         """p_phi, p_psi, p_phi - p_psi and p_phi + p_psi of the starts, each (n,)."""
-        I1, I3, _, theta, _, _, _, phi_dot, psi_dot = self.numbers.T
-        p_psi = I3 * (psi_dot + phi_dot * np.cos(theta))
-        sin_x, cos_x = np.sin(0.5 * theta), np.cos(0.5 * theta)
-        swing = 4.0 * I1 * phi_dot * (sin_x * cos_x) ** 2
-        north, south = swing - 2.0 * p_psi * sin_x**2, swing + 2.0 * p_psi * cos_x**2
-        return swing + p_psi * np.cos(theta), p_psi, north, south
+        return scales.momenta(self.numbers)
 
     @cached_property
     def energy(self) -> Array:
         """Total energy (n,)."""
-        I1, I3, mgl, theta, _, _, theta_dot, phi_dot, psi_dot = self.numbers.T
-        across = theta_dot**2 + (phi_dot * np.sin(theta)) ** 2
-        return 0.5 * I1 * across + 0.5 * I3 * (psi_dot + phi_dot * np.cos(theta)) ** 2 + mgl * np.cos(theta)
+        return scales.energy(self.numbers)
 
     @cached_property
     def energy_scale(self) -> Array:
         """What energy errors are divided by, (n,): `Scene.energy_scale`, the energy of the nutation."""
-        I1, _, mgl = (self.numbers[:, k] for k in range(3))
-        _, _, north, south = self.momenta
-        low, high = np.clip(self.forms.theta_range.T, NEXT_TO_POLE, math.pi - NEXT_TO_POLE)
-        for _ in range(BISECTIONS):  # the lowest place of the potential lies between the turning points
-            middle = 0.5 * (low + high)
-            falls = effective_force(middle, north, south, I1, mgl)[0] < 0.0
-            low, high = np.where(falls, middle, low), np.where(falls, high, middle)
-        lowest = 0.5 * (low + high)
-        start = np.clip(self.numbers[:, 3], NEXT_TO_POLE, math.pi - NEXT_TO_POLE)
-        depth = (
-            0.5 * I1 * self.numbers[:, 6] ** 2
-            + effective_potential(start, north, south, I1, mgl)
-            - effective_potential(lowest, north, south, I1, mgl)
-        )
-        swing = 0.5 * np.maximum(effective_stiffness(lowest, north, south, I1, mgl), 0.0)
-        rounding = STEADY * EPSILON * (np.abs(self.energy) + np.abs(mgl))
-        kinds = [depth > rounding, swing > rounding, np.abs(mgl) > rounding]
-        return np.asarray(np.select(kinds, [depth, swing, np.abs(mgl)], TINY))
+        return scales.energy_scale(self.numbers, self.forms.theta_range)
 
     @cached_property
     def width(self) -> Array:

@@ -1,7 +1,7 @@
 """Errors of the members of an ensemble, and how they spread: quantiles over members at each sample.
 
     axis      angle between the member's axis and that of its closed form, rad
-    energy    abs(E - E0) / (abs(mgl) + I1 (theta'^2 + phi'^2 sin^2 theta)/2), both of the start
+    energy    abs(E - E0) / (E0 - min V), the unit of `errors`
 
 A member that has failed has an infinite error from there on, so that it counts among the worst and is not left out.
 Quantiles are those of the sample, without interpolation: an infinite one says that so many have failed.
@@ -12,13 +12,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.base.validate import SymtopError, one_of
-from symtop.model import charts
+from symtop.model import charts, scales
 from symtop.model.closed_forms import ClosedForms
 from symtop.run.members import read_members
 
 Array = NDArray[np.float64]
 
-QUANTITIES = {"axis": "angle between axes (rad)", "energy": "error of the energy, relative"}
+QUANTITIES = {"axis": "angle between axes (rad)", "energy": "energy error / (E0 - min V)"}
 LEVELS = (0.01, 0.1, 0.5, 0.9, 0.99)
 BLOCK = 1 << 20  # samples that are compared at a time
 
@@ -47,9 +47,7 @@ def _errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
             truth = ClosedForms(numbers).axis(np.where(asked, times, 0.0))
             errors = charts.axis_distance(values, truth)
         else:
-            I1, _, mgl, theta, _, _, theta_dot, phi_dot, _ = numbers.T
-            swing = phi_dot * np.sin(theta)
-            unit = np.abs(mgl) + 0.5 * I1 * (theta_dot * theta_dot + swing * swing)
+            unit = scales.energy_scale(numbers, ClosedForms(numbers).theta_range)
             errors = np.abs(values - values[:, :1]) / unit[:, None]
     known = np.isfinite(truth).all(axis=2) if quantity == "axis" else True
     return np.where(asked & known, np.where(np.isfinite(errors), errors, np.inf), np.nan)
