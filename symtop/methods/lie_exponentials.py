@@ -65,12 +65,6 @@ def _bracket(w: Any, f: Any, x: Any, g: Any) -> Any:
 
 
 @register_jitable
-def _bracket(w: Any, f: Any, x: Any, g: Any) -> Any:
-    """[(w, f), (x, g)] = (w x x, w x g + f x x)."""
-    return cross(w, x), plus(cross(w, g), 1.0, cross(f, x))
-
-
-@register_jitable
 def bent_back(w: Any, f: Any, slope: Any, g: Any) -> Any:
     """dexp^-1 of (w, f), two brackets of it, on an element of the algebra."""
     once, once_f = _bracket(w, f, slope, g)

@@ -34,6 +34,8 @@ from typing import Any, NamedTuple
 from symtop.base.compiled import register_jitable
 from symtop.methods.coefficients import SUZUKI_4
 from symtop.methods.engine_parts import cross, dot, plus, scaled
+from symtop.methods.lanes import Lanes
+from symtop.methods.lie_lanes import iterated
 from symtop.methods.lie_loop import SPUN, cayley, gravity, in_both_charts, lie_loop, moved
 from symtop.methods.outcomes import NOT_CONVERGED, OK
 from symtop.methods.registry import Integrator
@@ -51,67 +53,143 @@ class Variational(NamedTuple):
 
 
 @register_jitable
+def _moser_veselov_pass(par: Any, A: float, square: float, n: float) -> Any:
+    """Newton's next n of the discrete rigid body, whether it is the last, and whether there is none."""
+    d, rate = par.I3 - par.I1, A / par.I3
+    along = rate * rate * n * n
+    D = par.I1 * par.I1 + d * d * along
+    gap = 1.0 + along + square * n * n / D - n
+    slope = 1.0 - 2.0 * along / n - 2.0 * square * n * par.I1 * par.I1 / (D * D)
+    after = n + gap / slope
+    return after, gap <= ENOUGH * slope * after, not slope > 0.0
+
+
+@register_jitable
 def _moser_veselov(par: Any, A: float, square: float) -> Any:
     """n, i and x of the discrete rigid body, iterations, and did they converge."""
-    d, rate, n = par.I3 - par.I1, A / par.I3, 1.0
+    n, rate = 1.0, A / par.I3
     for k in range(MOST):
-        along = rate * rate * n * n
-        D = par.I1 * par.I1 + d * d * along
-        gap = 1.0 + along + square * n * n / D - n
-        slope = 1.0 - 2.0 * along / n - 2.0 * square * n * par.I1 * par.I1 / (D * D)
-        if not slope > 0.0:
-            return n, par.I1, rate * n, k + 1, False
-        n += gap / slope
-        if gap <= ENOUGH * slope * n:
-            return n, par.I1, rate * n, k + 1, True
+        n, ended, lost = _moser_veselov_pass(par, A, square, n)
+        if ended or lost:
+            return n, par.I1, rate * n, k + 1, not lost
     return n, par.I1, rate * n, MOST, False
 
 
 @register_jitable
+def _euler_poincare_pass(par: Any, A: float, square: float, k: float, low: float, high: float) -> Any:
+    """The next k of Cayley's retraction and its interval, and whether it is the last; its middle where Newton leaves it.
+    """
+    d, i, j = par.I3 - par.I1, par.I1 + k, par.I3 + k
+    x = A / j
+    bent = d * d * x * x
+    D = i * i + bent
+    gap = par.I1 * square / D + par.I3 * x * x - k
+    slope = 1.0 + 2.0 * par.I1 * square * (i - bent / j) / (D * D) + 2.0 * par.I3 * x * x / j
+    low, high = (k, high) if gap > 0.0 else (low, k)
+    after = k + gap / slope
+    after = after if low <= after <= high else 0.5 * (low + high)
+    return after, low, high, abs(after - k) <= ENOUGH * j
+
+
+@register_jitable
+def _highest(par: Any, A: float, square: float) -> float:
+    """Above the k of Cayley's retraction."""
+    highest: float = square / par.I1 + A * A / par.I3
+    return highest
+
+
+@register_jitable
 def _euler_poincare(par: Any, A: float, square: float) -> Any:
-    """The same of Cayley's retraction; the middle of the interval where Newton's leaves it."""
-    d, k, low, high = par.I3 - par.I1, 0.0, 0.0, square / par.I1 + A * A / par.I3
+    """The same of Cayley's retraction."""
+    k, low, high = 0.0, 0.0, _highest(par, A, square)
     for number in range(MOST):
-        i, j = par.I1 + k, par.I3 + k
-        x = A / j
-        bent = d * d * x * x
-        D = i * i + bent
-        gap = par.I1 * square / D + par.I3 * x * x - k
-        slope = 1.0 + 2.0 * par.I1 * square * (i - bent / j) / (D * D) + 2.0 * par.I3 * x * x / j
-        if gap > 0.0:
-            low = k
-        else:
-            high = k
-        after = k + gap / slope
-        if not low <= after <= high:
-            after = 0.5 * (low + high)
-        change, k = after - k, after
-        if abs(change) <= ENOUGH * j:
+        k, low, high, ended = _euler_poincare_pass(par, A, square, k, low, high)
+        if ended:
             return 1.0, par.I1 + k, A / (par.I3 + k), number + 1, True
     return 1.0, par.I1 + k, A / (par.I3 + k), MOST, False
+
+
+@register_jitable
+def _kicked(par: Any, e: Any, L: Any, half: float) -> Any:
+    """Half a step's momentum after half of the kick, a: what is across the axis and what is along it."""
+    a = scaled(half, plus(L, 1.0, scaled(half, gravity(par, e))))
+    A = dot(a, e)
+    return plus(a, -A, e), A
+
+
+@register_jitable
+def _rotated(par: Any, e: Any, across: Any, half: float, n: float, i: float, x: float) -> Any:
+    """The rotation of n, i and x, and the change of L with both halves of the kick."""
+    bent = (par.I3 - par.I1) * x
+    side = plus(scaled(i, across), -bent, cross(across, e))
+    u = plus(scaled(x, e), n / (i * i + bent * bent), side)
+    m, v = cayley(u)
+    kick = scaled(half, gravity(par, e))
+    return m, v, plus(kick, half, gravity(par, plus(e, 1.0, moved(m, v, e))))
 
 
 def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
     """One step; the work counted is the number of Newton iterations."""
     half = 0.5 * h
-    kick = scaled(half, gravity(par, e))
-    a = scaled(half, plus(L, 1.0, kick))
-    A = dot(a, e)
-    across = plus(a, -A, e)
+    across, A = _kicked(par, e, L, half)
     square = dot(across, across)
     if rule.kind == MOSER_VESELOV:
         n, i, x, work, converged = _moser_veselov(par, A, square)
     else:
         n, i, x, work, converged = _euler_poincare(par, A, square)
-    bent = (par.I3 - par.I1) * x
-    side = plus(scaled(i, across), -bent, cross(across, e))
-    u = plus(scaled(x, e), n / (i * i + bent * bent), side)
-    m, v = cayley(u)
-    dL = plus(kick, half, gravity(par, plus(e, 1.0, moved(m, v, e))))
+    m, v, dL = _rotated(par, e, across, half, n, i, x)
     return m, v, dL, work, OK if converged else NOT_CONVERGED
 
 
-march = lie_loop(turn)
+@register_jitable
+def _opened(par: Any, e: Any, L: Any, h: float) -> Any:
+    """The axis, what lies across it, what lies along it and the square of the former."""
+    across, A = _kicked(par, e, L, 0.5 * h)
+    return (*e, *across, A, dot(across, across))
+
+
+def _moser_veselov_start(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
+    return _opened(par, e, L, h), (1.0,)
+
+
+def _moser_veselov_again(par: Any, rule: Any, carry: Any, h: float, opened: Any, x: Any) -> Any:
+    n, ended, lost = _moser_veselov_pass(par, opened[6], opened[7], x[0])
+    return (n,), ended, lost
+
+
+def _moser_veselov_close(par: Any, rule: Any, carry: Any, h: float, opened: Any, x: Any) -> Any:
+    n, rate = x[0], opened[6] / par.I3
+    return (*_rotated(par, opened[:3], opened[3:6], 0.5 * h, n, par.I1, rate * n), carry)
+
+
+def _euler_poincare_start(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
+    opened = _opened(par, e, L, h)
+    return opened, (0.0, 0.0, _highest(par, opened[6], opened[7]))
+
+
+def _euler_poincare_again(par: Any, rule: Any, carry: Any, h: float, opened: Any, x: Any) -> Any:
+    k, low, high, ended = _euler_poincare_pass(par, opened[6], opened[7], *x)
+    return (k, low, high), ended, False
+
+
+def _euler_poincare_close(par: Any, rule: Any, carry: Any, h: float, opened: Any, x: Any) -> Any:
+    k = x[0]
+    return (*_rotated(par, opened[:3], opened[3:6], 0.5 * h, 1.0, par.I1 + k, opened[6] / (par.I3 + k)), carry)
+
+
+_RIGID_BODY = iterated(
+    _moser_veselov_start, _moser_veselov_again, _moser_veselov_close, MOST, opened=8, unknowns=1
+)
+_RETRACTION = iterated(
+    _euler_poincare_start, _euler_poincare_again, _euler_poincare_close, MOST, opened=8, unknowns=3
+)
+
+
+def _in_lanes(rule: Variational) -> Lanes:
+    return _RIGID_BODY if rule.kind == MOSER_VESELOV else _RETRACTION
+
+
+march = lie_loop(turn, lanes=_in_lanes)
 
 
 def lie_variational(name: str, rule: Variational, order: int, summary: str, reference: str) -> Integrator:
