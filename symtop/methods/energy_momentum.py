@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 from symtop.base.compiled import register_jitable
 from symtop.methods.engine_parts import cross, dot, plus, scaled
-from symtop.methods.lie_lanes import iterated
+from symtop.methods.lie_iterated_lanes import iterated
 from symtop.methods.lie_loop import SPUN, cayley, gravity, in_both_charts, lie_loop
 from symtop.methods.outcomes import NOT_CONVERGED, OK
 from symtop.methods.registry import Integrator

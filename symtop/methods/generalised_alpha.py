@@ -24,7 +24,7 @@ from symtop.base.compiled import register_jitable
 from symtop.base.validate import SymtopError, finite
 from symtop.methods.energy_momentum import inertia, solved
 from symtop.methods.engine_parts import axis, cross, plus, scaled
-from symtop.methods.lie_lanes import iterated
+from symtop.methods.lie_iterated_lanes import iterated
 from symtop.methods.lie_loop import SPUN, gravity, in_both_charts, lie_loop, moved
 from symtop.methods.outcomes import NOT_CONVERGED, OK
 from symtop.methods.registry import Integrator
@@ -139,7 +139,7 @@ def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
     return 0.0, a, a, MOST, NOT_CONVERGED
 
 
-# ---- in lanes: x is W'_1, the size of the last correction, and W'_1 before that, which the rotation is made of ----
+# ---- in lanes: x is W'_1, the size of its last correction, and W'_1 before that, which the rotation is made of -------
 
 
 def _carried(par: Any, rule: Any, state: Any, h: float) -> Any:

@@ -3,14 +3,9 @@
     for each share:   q, L <- state + step;   (m, v, dL) of the map;   step <- step with that rotation
     at the end:       the compensated sums
 
-A family writes what stands between, one loop over the lanes or several (`stepped`), or hands over the parts of an
-iteration (`iterated`). Both charts are shown by the same kernel.
-
-*Iterations.* One pass x <- x + c(x) evaluates all lanes, and a lane that has ended keeps its x; a step takes as many
-passes as its slowest lane. A lane that is live after half of the passes that a run alone may take is given up, and so
-is one whose equation cannot be solved: alone, it goes on or fails.
-
-The table holds the numbers of the top, those of the rule and, share by share, what a share is made of.
+A family writes what stands between, one loop over the lanes or several; `lie_iterated_lanes` does it for iterations.
+The table holds the numbers of the top, those of the rule and, share by share, what a share is made of: one kernel for
+compositions of any length, and for both charts, which differ in what is shown of a sample.
 """
 
 from collections.abc import Callable
@@ -19,9 +14,8 @@ from typing import Any
 from symtop.base.compiled import register_jitable
 from symtop.base.vectors import wide_vectors
 from symtop.methods.lanes import Lanes, W, column, put
-from symtop.methods.lie_loop import SPUN, STILL, Carried, composed, ended, reached, shown_in
+from symtop.methods.lie_loop import STILL, Carried, composed, ended, reached, shown_in
 from symtop.methods.loop import accumulate
-from symtop.methods.one_loop_lanes import reading
 from symtop.methods.outcomes import OK
 from symtop.methods.space import axis_of
 
@@ -54,12 +48,6 @@ def give_up(block: Any, j: int, when: bool) -> None:
     block[FLAG * W + j] = 1.0 if when else block[FLAG * W + j]
 
 
-@register_jitable
-def no_numbers(rule: Any) -> Any:
-    """Of a rule that is nothing but shares."""
-    return (0.0,)
-
-
 def _read(numbers: Any) -> Any:
     """What `observe` and `present` see of the rule, who ask for nothing."""
     return 0.0
@@ -72,7 +60,7 @@ def stepped(
 ) -> Lanes:  # fmt: skip
     """A map in lanes: ``part(block, table, row)`` is one share of all lanes, whose own numbers begin with `row`.
 
-    ``lay(par, rule, h, numbers)`` writes `fields` numbers of the rule and `each` of a share.
+    ``lay(par, rule, h, numbers)`` writes `fields` numbers of the rule, then `each` for every share.
     """
     shares_at = len(carried.top._fields) + fields
     register_jitable(part)
@@ -95,83 +83,3 @@ def stepped(
 
     show = shown_in(carried)
     return Lanes(step, lay, _read, size, carried.top, SIZE, carry, effort, lambda _: room, begin, show)
-
-
-def iterated(
-    start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
-    opened: int, unknowns: int, numbers: Callable[..., Any] = no_numbers, count: int = 1,
-    begin: Callable[..., Any] = begin, carry: int = 1,
-) -> Lanes:  # fmt: skip
-    """An iterated map of a body in lanes, from the parts of which its `turn` is made.
-
-        numbers(rule) -> rule                      `count` numbers of the rule, as the parts take them
-        start(par, rule, e, L, carry, h) -> (opened, x)           what no pass changes, and the first guess
-        again(par, rule, carry, h, opened, x) -> (x, ended, lost)    one pass; a lane that is lost runs alone
-        close(par, rule, carry, h, opened, x) -> (m, v, dL, carry)
-
-    `opened`, x and the carry are flat tuples. A run alone makes `most` passes.
-    """
-    body, top_of = SPUN.top, reading(len(SPUN.top._fields))
-    tops, first = len(body._fields), CARRY + carry
-    x_at, live_at = first + opened, first + opened + unknowns
-    rule_of, carried, opens, unknown = reading(count), reading(carry), reading(opened), reading(unknowns)
-    for function in (start, again, close, numbers):
-        register_jitable(function)
-
-    @register_jitable
-    def given(block, table, row, j):  # type: ignore[no-untyped-def]
-        return body(*top_of(table, 0, j)), rule_of(table, tops, j), carried(block, CARRY, j), row[j]
-
-    @register_jitable
-    def begun(block, table, row, j):  # type: ignore[no-untyped-def]
-        par, rule, carry, h = given(block, table, row, j)
-        _, e, L = entered(block, j)
-        fixed, x = start(par, rule, e, L, carry, h)
-        put(block, first, j, fixed)
-        put(block, x_at, j, x)
-        block[live_at * W + j] = 1.0 - block[FLAG * W + j]
-
-    @register_jitable
-    def passed(block, table, row, j):  # type: ignore[no-untyped-def]
-        par, rule, carry, h = given(block, table, row, j)
-        x, live = unknown(block, x_at, j), block[live_at * W + j]
-        after, ended, lost = again(par, rule, carry, h, opens(block, first, j), x)
-        for i in range(unknowns):
-            block[(x_at + i) * W + j] = after[i] if live != 0.0 else x[i]
-        block[FLAG * W + j] = max(block[FLAG * W + j], live if lost else 0.0)
-        block[WORK * W + j] += live
-        block[live_at * W + j] = 0.0 if ended or lost else live
-
-    @register_jitable
-    def closed(block, table, row, j):  # type: ignore[no-untyped-def]
-        par, rule, carry, h = given(block, table, row, j)
-        m, v, dL, after = close(par, rule, carry, h, opens(block, first, j), unknown(block, x_at, j))
-        left(block, j, entered(block, j)[0], m, v, dL)
-        put(block, CARRY, j, after)
-        give_up(block, j, block[live_at * W + j] != 0.0)
-
-    def part(block, table, row):  # type: ignore[no-untyped-def]
-        wide_vectors()
-        for j in range(W):
-            begun(block, table, row, j)
-        for _ in range(most // 2):
-            for j in range(W):
-                passed(block, table, row, j)
-            live = 0
-            for j in range(W):
-                live += block[live_at * W + j] != 0.0
-            if live == 0:
-                break
-        for j in range(W):
-            closed(block, table, row, j)
-
-    def lay(par, rule, h, out):  # type: ignore[no-untyped-def]
-        values, i = numbers(rule), count
-        for q in range(count):
-            out[q] = values[q]
-        for share in rule.shares:
-            out[i] = h * share
-            i += 1
-
-    room = live_at + 1 - first
-    return stepped(part, lay, count, 1, carried=SPUN, carry=carry, begin=begin, room=room)

@@ -29,13 +29,14 @@ Sources: Moser, Veselov, Commun. Math. Phys. 139 (1991) 217; Lee, Leok, McClamro
 (2007) 2907; Bou-Rabee, Marsden, Found. Comput. Math. 9 (2009) 197; McLachlan, Zanna, Found. Comput. Math. 5 (2005) 87.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.base.compiled import register_jitable
 from symtop.methods.coefficients import SUZUKI_4
 from symtop.methods.engine_parts import cross, dot, plus, scaled
 from symtop.methods.lanes import Lanes
-from symtop.methods.lie_lanes import iterated
+from symtop.methods.lie_iterated_lanes import iterated
 from symtop.methods.lie_loop import SPUN, cayley, gravity, in_both_charts, lie_loop, moved
 from symtop.methods.outcomes import NOT_CONVERGED, OK
 from symtop.methods.registry import Integrator
@@ -53,32 +54,39 @@ class Variational(NamedTuple):
 
 
 @register_jitable
-def _moser_veselov_pass(par: Any, A: float, square: float, n: float) -> Any:
-    """Newton's next n of the discrete rigid body, whether it is the last, and whether there is none."""
-    d, rate = par.I3 - par.I1, A / par.I3
+def _one(par: Any, A: float, square: float) -> Any:
+    """The first n of the discrete rigid body."""
+    return (1.0,)
+
+
+@register_jitable
+def _next_n(par: Any, A: float, square: float, x: Any) -> Any:
+    """Newton's next n, whether it is the last, and whether there is none."""
+    d, rate, n = par.I3 - par.I1, A / par.I3, x[0]
     along = rate * rate * n * n
     D = par.I1 * par.I1 + d * d * along
     gap = 1.0 + along + square * n * n / D - n
     slope = 1.0 - 2.0 * along / n - 2.0 * square * n * par.I1 * par.I1 / (D * D)
-    after = n + gap / slope
-    return after, gap <= ENOUGH * slope * after, not slope > 0.0
+    n += gap / slope
+    return (n,), gap <= ENOUGH * slope * n, not slope > 0.0
 
 
 @register_jitable
-def _moser_veselov(par: Any, A: float, square: float) -> Any:
-    """n, i and x of the discrete rigid body, iterations, and did they converge."""
-    n, rate = 1.0, A / par.I3
-    for k in range(MOST):
-        n, ended, lost = _moser_veselov_pass(par, A, square, n)
-        if ended or lost:
-            return n, par.I1, rate * n, k + 1, not lost
-    return n, par.I1, rate * n, MOST, False
+def _of_n(par: Any, A: float, x: Any) -> Any:
+    """n, i and x of the discrete rigid body."""
+    return x[0], par.I1, A / par.I3 * x[0]
 
 
 @register_jitable
-def _euler_poincare_pass(par: Any, A: float, square: float, k: float, low: float, high: float) -> Any:
-    """The next k of Cayley's retraction and its interval, and whether it is the last; its middle where Newton leaves it.
-    """
+def _interval(par: Any, A: float, square: float) -> Any:
+    """The first k of Cayley's retraction, and the interval that it lies in."""
+    return 0.0, 0.0, square / par.I1 + A * A / par.I3
+
+
+@register_jitable
+def _next_k(par: Any, A: float, square: float, x: Any) -> Any:
+    """Newton's next k, the middle of the interval where that leaves it, and whether it is the last."""
+    k, low, high = x
     d, i, j = par.I3 - par.I1, par.I1 + k, par.I3 + k
     x = A / j
     bent = d * d * x * x
@@ -88,25 +96,48 @@ def _euler_poincare_pass(par: Any, A: float, square: float, k: float, low: float
     low, high = (k, high) if gap > 0.0 else (low, k)
     after = k + gap / slope
     after = after if low <= after <= high else 0.5 * (low + high)
-    return after, low, high, abs(after - k) <= ENOUGH * j
+    return (after, low, high), abs(after - k) <= ENOUGH * j, False
 
 
 @register_jitable
-def _highest(par: Any, A: float, square: float) -> float:
-    """Above the k of Cayley's retraction."""
-    highest: float = square / par.I1 + A * A / par.I3
-    return highest
+def _of_k(par: Any, A: float, x: Any) -> Any:
+    """n, i and x of Cayley's retraction."""
+    return 1.0, par.I1 + x[0], A / (par.I3 + x[0])
 
 
-@register_jitable
-def _euler_poincare(par: Any, A: float, square: float) -> Any:
-    """The same of Cayley's retraction."""
-    k, low, high = 0.0, 0.0, _highest(par, A, square)
-    for number in range(MOST):
-        k, low, high, ended = _euler_poincare_pass(par, A, square, k, low, high)
-        if ended:
-            return 1.0, par.I1 + k, A / (par.I3 + k), number + 1, True
-    return 1.0, par.I1 + k, A / (par.I3 + k), MOST, False
+class Equation(NamedTuple):
+    """The equation for one number, in functions of what a holds along the axis and of the square of what lies across.
+
+    first(par, A, square) -> x
+    after(par, A, square, x) -> (x, ended, lost)      one iteration
+    rates(par, A, x) -> (n, i, x)
+    """
+
+    first: Callable[..., Any]
+    after: Callable[..., Any]
+    rates: Callable[..., Any]
+
+
+RIGID_BODY, RETRACTION = Equation(_one, _next_n, _of_n), Equation(_interval, _next_k, _of_k)
+
+
+def _solving(equation: Equation) -> Callable[..., Any]:
+    """``(par, A, square)`` to n, i and x, iterations, and did they converge."""
+    first, after, rates = equation
+
+    def solve(par, A, square):  # type: ignore[no-untyped-def]
+        x = first(par, A, square)
+        for k in range(MOST):
+            x, ended, lost = after(par, A, square, x)
+            if ended or lost:
+                return (*rates(par, A, x), k + 1, not lost)
+        return (*rates(par, A, x), MOST, False)
+
+    registered: Callable[..., Any] = register_jitable(solve)
+    return registered
+
+
+_moser_veselov, _euler_poincare = _solving(RIGID_BODY), _solving(RETRACTION)
 
 
 @register_jitable
@@ -141,55 +172,29 @@ def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
     return m, v, dL, work, OK if converged else NOT_CONVERGED
 
 
-@register_jitable
-def _opened(par: Any, e: Any, L: Any, h: float) -> Any:
-    """The axis, what lies across it, what lies along it and the square of the former."""
-    across, A = _kicked(par, e, L, 0.5 * h)
-    return (*e, *across, A, dot(across, across))
+def _side_by_side(equation: Equation, unknowns: int) -> Lanes:
+    """The same step in lanes, with so many numbers in x."""
+    first, after, rates = equation
+
+    def start(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
+        across, A = _kicked(par, e, L, 0.5 * h)
+        square = dot(across, across)
+        return (*e, *across, A, square), first(par, A, square)
+
+    def again(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
+        return after(par, opened[6], opened[7], x)
+
+    def close(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
+        n, i, along = rates(par, opened[6], x)
+        return (*_rotated(par, opened[:3], opened[3:6], 0.5 * h, n, i, along), carry)
+
+    return iterated(start, again, close, MOST, opened=8, unknowns=unknowns)
 
 
-def _moser_veselov_start(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
-    return _opened(par, e, L, h), (1.0,)
+_LANES = {MOSER_VESELOV: _side_by_side(RIGID_BODY, 1), EULER_POINCARE: _side_by_side(RETRACTION, 3)}
 
 
-def _moser_veselov_again(par: Any, rule: Any, carry: Any, h: float, opened: Any, x: Any) -> Any:
-    n, ended, lost = _moser_veselov_pass(par, opened[6], opened[7], x[0])
-    return (n,), ended, lost
-
-
-def _moser_veselov_close(par: Any, rule: Any, carry: Any, h: float, opened: Any, x: Any) -> Any:
-    n, rate = x[0], opened[6] / par.I3
-    return (*_rotated(par, opened[:3], opened[3:6], 0.5 * h, n, par.I1, rate * n), carry)
-
-
-def _euler_poincare_start(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
-    opened = _opened(par, e, L, h)
-    return opened, (0.0, 0.0, _highest(par, opened[6], opened[7]))
-
-
-def _euler_poincare_again(par: Any, rule: Any, carry: Any, h: float, opened: Any, x: Any) -> Any:
-    k, low, high, ended = _euler_poincare_pass(par, opened[6], opened[7], *x)
-    return (k, low, high), ended, False
-
-
-def _euler_poincare_close(par: Any, rule: Any, carry: Any, h: float, opened: Any, x: Any) -> Any:
-    k = x[0]
-    return (*_rotated(par, opened[:3], opened[3:6], 0.5 * h, 1.0, par.I1 + k, opened[6] / (par.I3 + k)), carry)
-
-
-_RIGID_BODY = iterated(
-    _moser_veselov_start, _moser_veselov_again, _moser_veselov_close, MOST, opened=8, unknowns=1
-)
-_RETRACTION = iterated(
-    _euler_poincare_start, _euler_poincare_again, _euler_poincare_close, MOST, opened=8, unknowns=3
-)
-
-
-def _in_lanes(rule: Variational) -> Lanes:
-    return _RIGID_BODY if rule.kind == MOSER_VESELOV else _RETRACTION
-
-
-march = lie_loop(turn, lanes=_in_lanes)
+march = lie_loop(turn, lanes=lambda rule: _LANES[rule.kind])
 
 
 def lie_variational(name: str, rule: Variational, order: int, summary: str, reference: str) -> Integrator:
