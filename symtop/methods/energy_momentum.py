@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 
 from symtop.base.compiled import register_jitable
 from symtop.methods.engine_parts import cross, dot, plus, scaled
+from symtop.methods.lie_iterated_lanes import iterated
 from symtop.methods.lie_loop import SPUN, cayley, gravity, in_both_charts, lie_loop
 from symtop.methods.outcomes import NOT_CONVERGED, OK
 from symtop.methods.registry import Integrator
@@ -64,35 +65,71 @@ def _column(par: Any, e: Any, u: Any, Ju: Any, mean: Any, pull: Any, quarter: fl
     return plus(plus(plus(Jd, 1.0, cross(d, Ju)), 1.0, cross(u, Jd)), -quarter, rest)
 
 
+@register_jitable
+def _mean(e: Any, u: Any) -> Any:
+    """The mean of the axis before and after the rotation cay(2 u)."""
+    part = 1.0 / (1.0 + dot(u, u))
+    return scaled(part, plus(plus(e, 1.0, cross(u, e)), dot(u, e), u))
+
+
+@register_jitable
+def _guess(par: Any, e: Any, a: Any, quarter: float) -> Any:
+    """The first u."""
+    start = plus(a, quarter, gravity(par, e))
+    along = dot(start, e)
+    return plus(scaled(1.0 / par.I1, start), along / par.I3 - along / par.I1, e)
+
+
+@register_jitable
+def _corrected(par: Any, e: Any, a: Any, quarter: float, u: Any) -> Any:
+    """Newton's next u, and whether it is the last."""
+    mean = _mean(e, u)
+    pull, Ju = gravity(par, mean), inertia(par, e, u)
+    rest = plus(plus(a, -1.0, Ju), -1.0, cross(u, Ju))
+    rest = plus(rest, quarter, plus(pull, -1.0, cross(u, pull)))
+    first = _column(par, e, u, Ju, mean, pull, quarter, (1.0, 0.0, 0.0))
+    second = _column(par, e, u, Ju, mean, pull, quarter, (0.0, 1.0, 0.0))
+    third = _column(par, e, u, Ju, mean, pull, quarter, (0.0, 0.0, 1.0))
+    change = solved(first, second, third, rest)
+    u = plus(u, 1.0, change)
+    size = abs(change[0]) + abs(change[1]) + abs(change[2])
+    return u, size <= ENOUGH * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2]))
+
+
+@register_jitable
+def _rotated(par: Any, e: Any, h: float, u: Any) -> Any:
+    """The rotation of u, and the change of L."""
+    m, v = cayley(u)
+    return m, v, scaled(h, gravity(par, _mean(e, u)))
+
+
 def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
     """One step; the work counted is the number of Newton iterations."""
     quarter, a = 0.25 * h * h, scaled(0.5 * h, L)
-    start = plus(a, quarter, gravity(par, e))
-    along = dot(start, e)
-    u = plus(scaled(1.0 / par.I1, start), along / par.I3 - along / par.I1, e)
-    pull = gravity(par, e)
+    u = _guess(par, e, a, quarter)
     for k in range(MOST):
-        part = 1.0 / (1.0 + dot(u, u))
-        mean = scaled(part, plus(plus(e, 1.0, cross(u, e)), dot(u, e), u))
-        pull = gravity(par, mean)
-        Ju = inertia(par, e, u)
-        rest = plus(plus(a, -1.0, Ju), -1.0, cross(u, Ju))
-        rest = plus(rest, quarter, plus(pull, -1.0, cross(u, pull)))
-        first = _column(par, e, u, Ju, mean, pull, quarter, (1.0, 0.0, 0.0))
-        second = _column(par, e, u, Ju, mean, pull, quarter, (0.0, 1.0, 0.0))
-        third = _column(par, e, u, Ju, mean, pull, quarter, (0.0, 0.0, 1.0))
-        change = solved(first, second, third, rest)
-        u = plus(u, 1.0, change)
-        size = abs(change[0]) + abs(change[1]) + abs(change[2])
-        if size <= ENOUGH * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2])):
-            part = 1.0 / (1.0 + dot(u, u))
-            mean = scaled(part, plus(plus(e, 1.0, cross(u, e)), dot(u, e), u))
-            m, v = cayley(u)
-            return m, v, scaled(h, gravity(par, mean)), k + 1, OK
-    return 0.0, u, pull, MOST, NOT_CONVERGED
+        u, ended = _corrected(par, e, a, quarter, u)
+        if ended:
+            m, v, dL = _rotated(par, e, h, u)
+            return m, v, dL, k + 1, OK
+    return 0.0, u, u, MOST, NOT_CONVERGED
 
 
-march = lie_loop(turn)
+def _start(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
+    a = scaled(0.5 * h, L)
+    return (*e, *a), _guess(par, e, a, 0.25 * h * h)
+
+
+def _again(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
+    return (*_corrected(par, opened[:3], opened[3:], 0.25 * h * h, u), False)
+
+
+def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
+    return (*_rotated(par, opened[:3], h, u), carry)
+
+
+_LANES = iterated(_start, _again, _close, MOST, opened=6, unknowns=3)
+march = lie_loop(turn, lanes=lambda _: _LANES)
 
 
 def built_in() -> list[Integrator]:

@@ -31,6 +31,7 @@ calls and that has a loop of its own, which is made into vectors before it is in
 ``kernel.inspect_asm()`` (zmm) and in the time: a step of `strang` takes 3.6 ns a member, alone 29.
 """
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -79,8 +80,9 @@ class Lanes:
         size(rule)                       how many numbers `lay` writes
         effort(rule)                     work of a step that is known beforehand
         room(rule)                       numbers of working space that a lane has beside its carry
+        show(par, t, state, out)         write a sample at the time t; None where there is a kernel for each chart
 
-    The first four compile; the others take the rule of a method before it is scaled.
+    The first four and the last compile; the others take the rule of a method before it is scaled.
     """
 
     step: Callable[[Any, Any], None]
@@ -93,9 +95,10 @@ class Lanes:
     effort: Callable[[Any], int] = _no_numbers
     room: Callable[[Any], int] = _no_numbers
     begin: Callable[..., Any] | None = None
+    show: Callable[..., None] | None = None  # of charts that differ in how many numbers a sample has
 
     def __post_init__(self) -> None:
-        for part in (self.step, self.lay, self.read, self.begin):  # at once, as in `preparation.Preparation`
+        for part in (self.step, self.lay, self.read, self.begin, self.show):  # at once, as in `preparation.Preparation`
             if part is not None:
                 register_jitable(part)
 
@@ -138,8 +141,21 @@ def preparing(lanes: Lanes, begin: Any, enter: Any, kind: Any, numbers: Any, sca
     return compile_kernel(prepare)
 
 
-def marching(lanes: Lanes, observe: Any, present: Any, sample: Any) -> Any:  # noqa: C901  (one loop, read in one piece)
-    """The compiled run of the members that `prepare` prepared, block after block.
+@functools.cache
+def showing(sample: Callable[..., Any]) -> Callable[..., None]:
+    """`sample` as `Lanes.show` has it."""
+
+    def show(par, t, state, out):  # type: ignore[no-untyped-def]
+        shown = sample(par, t, state)
+        for q in range(len(shown)):
+            out[q] = shown[q]
+
+    registered: Callable[..., None] = register_jitable(show)
+    return registered
+
+
+def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # noqa: C901  (one loop, read in one piece)
+    """The compiled run of the members that `prepare` prepared, block after block; `write` is as `Lanes.show`.
 
     ``march(at, most, ...)`` begins with block `at[0]`, after step `at[1]` of it (-1: before it is filled), and returns
     when all blocks are done or about `most` steps of members were made; called again it goes on from there.
@@ -166,9 +182,7 @@ def marching(lanes: Lanes, observe: Any, present: Any, sample: Any) -> Any:  # n
     @register_jitable
     def show(block, table, before, j, rule, k, h, states, momenta):  # type: ignore[no-untyped-def]
         par = kind(*column(table, 0, j, top_like))
-        shown = sample(par, k * h, present(par, rule, column(block, 0, j, state_like), k, h))
-        for q in range(len(shown)):
-            states[q] = shown[q]
+        write(par, k * h, present(par, rule, column(block, 0, j, state_like), k, h), states)
         if k > 0:
             last, dstate = column(before, 0, j, state_like), column(block, 2 * size, j, state_like)
             momenta[0], momenta[1] = observe(par, rule, last, dstate, h)

@@ -22,10 +22,12 @@ from typing import Any, NamedTuple
 from symtop.base.compiled import register_jitable
 from symtop.methods.engine_parts import cross, dot, plus, scaled
 from symtop.methods.fixed_step import FixedStep
+from symtop.methods.lanes import Lanes, showing
 from symtop.methods.loop import Loop, driver
 from symtop.methods.outcomes import OK
-from symtop.methods.preparation import Body, Preparation, Shown
+from symtop.methods.preparation import Body, Preparation, Shown, as_it_steps
 from symtop.methods.space import (
+    SpaceTop,
     axis_of,
     finite_outcome,
     momentum_parts,
@@ -57,10 +59,13 @@ class Carried(NamedTuple):
 
     prepare: Preparation
     present: Shown | None
+    top: Any  # the NamedTuple of the numbers of the top
 
 
-UNSPUN, SPUN = Carried(on_attitude, Shown(_spin_shown, 7)), Carried(Preparation(_on_body, 7), None)
+UNSPUN = Carried(on_attitude, Shown(_spin_shown, 7), SpaceTop)
+SPUN = Carried(Preparation(_on_body, 7), None, Body)
 _AXIS = Shown(_axis_shown, 6)
+STILL = (0.0,) * 7  # no increment
 
 
 @register_jitable
@@ -84,36 +89,80 @@ def cayley(u: Any) -> Any:
     return -square / (root * (1.0 + root)), scaled(1.0 / root, u)
 
 
+@register_jitable
+def reached(state: Any, step: Any) -> Any:
+    """The quaternion and the momentum that an increment leads to."""
+    q = state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3]
+    return q, (state[4] + step[4], state[5] + step[5], state[6] + step[6])
+
+
+@register_jitable
+def composed(step: Any, q: Any, m: float, v: Any, dL: Any) -> Any:
+    """The increment with one more rotation, of the quaternion q that it has led to."""
+    a, b, c, d, X, Y, Z = step
+    w, x, y, z = q
+    m += 0.5 * (1.0 + m) * (1.0 - (w * w + x * x + y * y + z * z))
+    a += m * w - (v[0] * x + v[1] * y + v[2] * z)
+    b += m * x + (v[0] * w + v[1] * z - v[2] * y)
+    c += m * y + (v[1] * w + v[2] * x - v[0] * z)
+    d += m * z + (v[2] * w + v[0] * y - v[1] * x)
+    return a, b, c, d, X + dL[0], Y + dL[1], Z + dL[2]
+
+
+@register_jitable
+def ended(step: Any) -> int:
+    """The outcome of a step that was solved."""
+    a, b, c, d, X, Y, Z = step
+    outcome: int = finite_outcome(a + b + c + d + X + Y + Z)
+    return outcome
+
+
 def _nothing(par: Any, rule: Any, state: Any, h: float) -> Any:
     """A step depends on its start alone."""
     return 0.0
 
 
-def lie_loop(turn: Callable[..., Any], begin: Callable[..., Any] = _nothing) -> Loop:
-    """The loop on (q, L) around a map."""
+def _alone(rule: Any) -> None:
+    return None
+
+
+def lie_loop(
+    turn: Callable[..., Any], begin: Callable[..., Any] = _nothing, lanes: Callable[[Any], Lanes | None] = _alone
+) -> Loop:  # fmt: skip
+    """The loop on (q, L) around a map; `lanes` is how it steps many, by its rule (`lie_lanes`)."""
     register_jitable(turn)
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        a, b, c, d, X, Y, Z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        step = STILL
         effort = outcome = 0
         for share in rule.shares:
-            w, x, y, z = state[0] + a, state[1] + b, state[2] + c, state[3] + d
-            L = state[4] + X, state[5] + Y, state[6] + Z
-            m, v, dL, work, outcome = turn(par, rule, axis_of(w, x, y, z), L, carry, h * share)
+            q, L = reached(state, step)
+            m, v, dL, work, outcome = turn(par, rule, axis_of(*q), L, carry, h * share)
             effort += work
             if outcome != OK:
                 break
-            m += 0.5 * (1.0 + m) * (1.0 - (w * w + x * x + y * y + z * z))
-            a += m * w - (v[0] * x + v[1] * y + v[2] * z)
-            b += m * x + (v[0] * w + v[1] * z - v[2] * y)
-            c += m * y + (v[1] * w + v[2] * x - v[0] * z)
-            d += m * z + (v[2] * w + v[0] * y - v[1] * x)
-            X, Y, Z = X + dL[0], Y + dL[1], Z + dL[2]
+            step = composed(step, q, m, v, dL)
         if outcome == OK:
-            outcome = finite_outcome(a + b + c + d + X + Y + Z)
-        return (a, b, c, d, X, Y, Z), carry, effort, outcome
+            outcome = ended(step)
+        return step, carry, effort, outcome
 
-    return driver(begin, increment, observe_attitude)
+    return driver(begin, increment, observe_attitude, lanes=lanes)
+
+
+def shown_in(carried: Carried) -> Callable[..., None]:
+    """A sample of either chart, by how many numbers it has: ``(par, t, state, out)``, for a kernel of both."""
+    axis, attitude = _AXIS, carried.present
+    sample = as_it_steps if attitude is None else attitude.sample
+    small, large = showing(axis.sample), showing(sample)
+    size = axis.size
+
+    def show(par, t, state, out):  # type: ignore[no-untyped-def]
+        if len(out) == size:
+            small(par, t, state, out)
+        else:
+            large(par, t, state, out)
+
+    return show
 
 
 def in_both_charts(

@@ -25,20 +25,18 @@ Marthinsen, Owren, Future Gener. Comput. Syst. 19 (2003) 341; Engo, Faltinsen, S
 top on coadjoint orbits).
 """
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.base.compiled import register_jitable
-from symtop.methods.engine_parts import cross, dot, plus, scaled
-from symtop.methods.lie_loop import UNSPUN, in_both_charts, lie_loop, moved
+from symtop.methods.engine_parts import plus, scaled
+from symtop.methods.lie_exponentials import NOUGHT, acted, any_angle, bent_back, half_square
+from symtop.methods.lie_loop import UNSPUN, in_both_charts, lie_loop
+from symtop.methods.lie_runge_kutta_lanes import in_lanes
 from symtop.methods.outcomes import OK
 from symtop.methods.registry import Integrator
-from symtop.methods.rotor import COSINE, SINE, series
-
-CUBIC = tuple(1.0 / math.factorial(2 * k + 3) for k in range(9))  # C in powers of -a^2
 
 
 class LieTable(NamedTuple):
@@ -48,28 +46,6 @@ class LieTable(NamedTuple):
     counts: tuple[float, ...]  # exponentials of each stage from the second on, and of the step
     bent: float = 0.0  # 1 for Munthe-Kaas
     shares: tuple[float, ...] = (1.0,)
-
-
-@register_jitable
-def _exponential(w: Any, f: Any) -> Any:
-    """The rotation (m, v) and the shift b of exp(w, f)."""
-    square = 0.25 * dot(w, w)
-    if square < 1.0:
-        s, m = 0.5 * series(square, SINE), -square * series(square, COSINE)
-        cubic = series(4.0 * square, CUBIC)
-    else:
-        x = math.sqrt(square)
-        half = math.sin(0.5 * x)
-        s, m = 0.5 * math.sin(x) / x, -2.0 * half * half
-        cubic = (1.0 - 2.0 * s * (1.0 + m)) / (4.0 * square)
-    bent = cross(w, f)
-    return m, scaled(s, w), plus(plus(f, 2.0 * s * s, bent), cubic, cross(w, bent))
-
-
-@register_jitable
-def _bracket(w: Any, f: Any, x: Any, g: Any) -> Any:
-    """[(w, f), (x, g)] = (w x x, w x g + f x x)."""
-    return cross(w, x), plus(cross(w, g), 1.0, cross(f, x))
 
 
 @register_jitable
@@ -89,35 +65,27 @@ def turn(par: Any, rule: Any, e: Any, L: Any, slopes: Any, h: float) -> Any:
     stages, row = len(rule.counts), 0
     f0 = 0.0, 0.0, par.mgl
     _store(slopes, 0, scaled(1.0 / par.I1, L), f0)
-    total, v, dL = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    made = 0.0, NOUGHT, e, NOUGHT
     for i in range(1, stages + 1):
-        total, v, dL, x = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), e
-        w, f = v, v
+        made = 0.0, NOUGHT, e, NOUGHT
+        w, f = NOUGHT, NOUGHT
         for _ in range(int(rule.counts[i - 1])):
-            w, f = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+            w, f = NOUGHT, NOUGHT
             for j in range(i):
                 weight = h * rule.weights[row + j]
                 w = plus(w, weight, (slopes[j, 0], slopes[j, 1], slopes[j, 2]))
                 f = plus(f, weight, (slopes[j, 3], slopes[j, 4], slopes[j, 5]))
             row += stages
-            m, u, b = _exponential(w, f)
-            x = plus(x, 1.0, moved(m, u, x))
-            dL = plus(plus(dL, 1.0, moved(m, u, plus(L, 1.0, dL))), 1.0, cross(b, x))
-            mixed = total + m + total * m - dot(u, v)
-            v = plus(plus(scaled(1.0 + m, v), 1.0 + total, u), 1.0, cross(u, v))
-            total = mixed
+            made = acted(made, L, w, f, any_angle(half_square(w)))
         if i < stages:
-            slope, g = scaled(1.0 / par.I1, plus(L, 1.0, dL)), f0
+            slope, g = scaled(1.0 / par.I1, plus(L, 1.0, made[3])), f0
             if rule.bent != 0.0:
-                once, once_f = _bracket(w, f, slope, g)
-                twice, twice_f = _bracket(w, f, once, once_f)
-                slope = plus(plus(slope, -0.5, once), 1.0 / 12.0, twice)
-                g = plus(plus(g, -0.5, once_f), 1.0 / 12.0, twice_f)
+                slope, g = bent_back(w, f, slope, g)
             _store(slopes, i, slope, g)
-    return total, v, dL, stages, OK
+    return made[0], made[1], made[3], stages, OK
 
 
-march = lie_loop(turn, begin)
+march = lie_loop(turn, begin, in_lanes)
 
 
 def lie_runge_kutta(

@@ -29,11 +29,14 @@ Sources: Moser, Veselov, Commun. Math. Phys. 139 (1991) 217; Lee, Leok, McClamro
 (2007) 2907; Bou-Rabee, Marsden, Found. Comput. Math. 9 (2009) 197; McLachlan, Zanna, Found. Comput. Math. 5 (2005) 87.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.base.compiled import register_jitable
 from symtop.methods.coefficients import SUZUKI_4
 from symtop.methods.engine_parts import cross, dot, plus, scaled
+from symtop.methods.lanes import Lanes
+from symtop.methods.lie_iterated_lanes import iterated
 from symtop.methods.lie_loop import SPUN, cayley, gravity, in_both_charts, lie_loop, moved
 from symtop.methods.outcomes import NOT_CONVERGED, OK
 from symtop.methods.registry import Integrator
@@ -51,67 +54,147 @@ class Variational(NamedTuple):
 
 
 @register_jitable
-def _moser_veselov(par: Any, A: float, square: float) -> Any:
-    """n, i and x of the discrete rigid body, iterations, and did they converge."""
-    d, rate, n = par.I3 - par.I1, A / par.I3, 1.0
-    for k in range(MOST):
-        along = rate * rate * n * n
-        D = par.I1 * par.I1 + d * d * along
-        gap = 1.0 + along + square * n * n / D - n
-        slope = 1.0 - 2.0 * along / n - 2.0 * square * n * par.I1 * par.I1 / (D * D)
-        if not slope > 0.0:
-            return n, par.I1, rate * n, k + 1, False
-        n += gap / slope
-        if gap <= ENOUGH * slope * n:
-            return n, par.I1, rate * n, k + 1, True
-    return n, par.I1, rate * n, MOST, False
+def _one(par: Any, A: float, square: float) -> Any:
+    """The first n of the discrete rigid body."""
+    return (1.0,)
 
 
 @register_jitable
-def _euler_poincare(par: Any, A: float, square: float) -> Any:
-    """The same of Cayley's retraction; the middle of the interval where Newton's leaves it."""
-    d, k, low, high = par.I3 - par.I1, 0.0, 0.0, square / par.I1 + A * A / par.I3
-    for number in range(MOST):
-        i, j = par.I1 + k, par.I3 + k
-        x = A / j
-        bent = d * d * x * x
-        D = i * i + bent
-        gap = par.I1 * square / D + par.I3 * x * x - k
-        slope = 1.0 + 2.0 * par.I1 * square * (i - bent / j) / (D * D) + 2.0 * par.I3 * x * x / j
-        if gap > 0.0:
-            low = k
-        else:
-            high = k
-        after = k + gap / slope
-        if not low <= after <= high:
-            after = 0.5 * (low + high)
-        change, k = after - k, after
-        if abs(change) <= ENOUGH * j:
-            return 1.0, par.I1 + k, A / (par.I3 + k), number + 1, True
-    return 1.0, par.I1 + k, A / (par.I3 + k), MOST, False
+def _next_n(par: Any, A: float, square: float, x: Any) -> Any:
+    """Newton's next n, whether it is the last, and whether there is none."""
+    d, rate, n = par.I3 - par.I1, A / par.I3, x[0]
+    along = rate * rate * n * n
+    D = par.I1 * par.I1 + d * d * along
+    gap = 1.0 + along + square * n * n / D - n
+    slope = 1.0 - 2.0 * along / n - 2.0 * square * n * par.I1 * par.I1 / (D * D)
+    n += gap / slope
+    return (n,), gap <= ENOUGH * slope * n, not slope > 0.0
+
+
+@register_jitable
+def _of_n(par: Any, A: float, x: Any) -> Any:
+    """n, i and x of the discrete rigid body."""
+    return x[0], par.I1, A / par.I3 * x[0]
+
+
+@register_jitable
+def _interval(par: Any, A: float, square: float) -> Any:
+    """The first k of Cayley's retraction, and the interval that it lies in."""
+    return 0.0, 0.0, square / par.I1 + A * A / par.I3
+
+
+@register_jitable
+def _next_k(par: Any, A: float, square: float, x: Any) -> Any:
+    """Newton's next k, the middle of the interval where that leaves it, and whether it is the last."""
+    k, low, high = x
+    d, i, j = par.I3 - par.I1, par.I1 + k, par.I3 + k
+    x = A / j
+    bent = d * d * x * x
+    D = i * i + bent
+    gap = par.I1 * square / D + par.I3 * x * x - k
+    slope = 1.0 + 2.0 * par.I1 * square * (i - bent / j) / (D * D) + 2.0 * par.I3 * x * x / j
+    low, high = (k, high) if gap > 0.0 else (low, k)
+    after = k + gap / slope
+    after = after if low <= after <= high else 0.5 * (low + high)
+    return (after, low, high), abs(after - k) <= ENOUGH * j, False
+
+
+@register_jitable
+def _of_k(par: Any, A: float, x: Any) -> Any:
+    """n, i and x of Cayley's retraction."""
+    return 1.0, par.I1 + x[0], A / (par.I3 + x[0])
+
+
+class Equation(NamedTuple):
+    """The equation for one number, in functions of what a holds along the axis and of the square of what lies across.
+
+    first(par, A, square) -> x
+    after(par, A, square, x) -> (x, ended, lost)      one iteration
+    rates(par, A, x) -> (n, i, x)
+    """
+
+    first: Callable[..., Any]
+    after: Callable[..., Any]
+    rates: Callable[..., Any]
+
+
+RIGID_BODY, RETRACTION = Equation(_one, _next_n, _of_n), Equation(_interval, _next_k, _of_k)
+
+
+def _solving(equation: Equation) -> Callable[..., Any]:
+    """``(par, A, square)`` to n, i and x, iterations, and did they converge."""
+    first, after, rates = equation
+
+    def solve(par, A, square):  # type: ignore[no-untyped-def]
+        x = first(par, A, square)
+        for k in range(MOST):
+            x, ended, lost = after(par, A, square, x)
+            if ended or lost:
+                return (*rates(par, A, x), k + 1, not lost)
+        return (*rates(par, A, x), MOST, False)
+
+    registered: Callable[..., Any] = register_jitable(solve)
+    return registered
+
+
+_moser_veselov, _euler_poincare = _solving(RIGID_BODY), _solving(RETRACTION)
+
+
+@register_jitable
+def _kicked(par: Any, e: Any, L: Any, half: float) -> Any:
+    """Half a step's momentum after half of the kick, a: what is across the axis and what is along it."""
+    a = scaled(half, plus(L, 1.0, scaled(half, gravity(par, e))))
+    A = dot(a, e)
+    return plus(a, -A, e), A
+
+
+@register_jitable
+def _rotated(par: Any, e: Any, across: Any, half: float, n: float, i: float, x: float) -> Any:
+    """The rotation of n, i and x, and the change of L with both halves of the kick."""
+    bent = (par.I3 - par.I1) * x
+    side = plus(scaled(i, across), -bent, cross(across, e))
+    u = plus(scaled(x, e), n / (i * i + bent * bent), side)
+    m, v = cayley(u)
+    kick = scaled(half, gravity(par, e))
+    return m, v, plus(kick, half, gravity(par, plus(e, 1.0, moved(m, v, e))))
 
 
 def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
     """One step; the work counted is the number of Newton iterations."""
     half = 0.5 * h
-    kick = scaled(half, gravity(par, e))
-    a = scaled(half, plus(L, 1.0, kick))
-    A = dot(a, e)
-    across = plus(a, -A, e)
+    across, A = _kicked(par, e, L, half)
     square = dot(across, across)
     if rule.kind == MOSER_VESELOV:
         n, i, x, work, converged = _moser_veselov(par, A, square)
     else:
         n, i, x, work, converged = _euler_poincare(par, A, square)
-    bent = (par.I3 - par.I1) * x
-    side = plus(scaled(i, across), -bent, cross(across, e))
-    u = plus(scaled(x, e), n / (i * i + bent * bent), side)
-    m, v = cayley(u)
-    dL = plus(kick, half, gravity(par, plus(e, 1.0, moved(m, v, e))))
+    m, v, dL = _rotated(par, e, across, half, n, i, x)
     return m, v, dL, work, OK if converged else NOT_CONVERGED
 
 
-march = lie_loop(turn)
+def _side_by_side(equation: Equation, unknowns: int) -> Lanes:
+    """The same step in lanes, with so many numbers in x."""
+    first, after, rates = equation
+
+    def start(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
+        across, A = _kicked(par, e, L, 0.5 * h)
+        square = dot(across, across)
+        return (*e, *across, A, square), first(par, A, square)
+
+    def again(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
+        return after(par, opened[6], opened[7], x)
+
+    def close(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
+        n, i, along = rates(par, opened[6], x)
+        return (*_rotated(par, opened[:3], opened[3:6], 0.5 * h, n, i, along), carry)
+
+    return iterated(start, again, close, MOST, opened=8, unknowns=unknowns)
+
+
+_LANES = {MOSER_VESELOV: _side_by_side(RIGID_BODY, 1), EULER_POINCARE: _side_by_side(RETRACTION, 3)}
+
+
+march = lie_loop(turn, lanes=lambda rule: _LANES[rule.kind])
 
 
 def lie_variational(name: str, rule: Variational, order: int, summary: str, reference: str) -> Integrator:

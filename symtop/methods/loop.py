@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from symtop.base.compiled import compile_kernel, register_jitable, set_item
 from symtop.methods.blocks import Blocks
-from symtop.methods.lanes import Lanes, marching as marching_lanes, preparing
+from symtop.methods.lanes import Lanes, marching as marching_lanes, preparing, showing
 from symtop.methods.outcomes import OK
 from symtop.methods.preparation import Body, Start, as_it_steps, conserved
 
@@ -217,9 +217,12 @@ def driver(  # noqa: C901  (one loop, read in one piece)
         return compiled
 
     @functools.cache
-    def blocks(family: Lanes, kind: Any, numbers: Any, scale: Any, sample: Any) -> Blocks:
+    def together(family: Lanes, kind: Any, numbers: Any, scale: Any, show: Any) -> Blocks:
         prepare = preparing(family, begin, enter, kind, numbers, scale)
-        return Blocks(family, prepare, marching_lanes(family, observe, present, sample))
+        return Blocks(family, prepare, marching_lanes(family, observe, present, show))
+
+    def blocks(family: Lanes, kind: Any, numbers: Any, scale: Any, sample: Any) -> Blocks:
+        return together(family, kind, numbers, scale, family.show or showing(sample))
 
     @functools.cache
     def plain() -> Loop:

@@ -15,7 +15,7 @@ from symtop.methods.outcomes import OK
 AT_ONCE = 8  # numbers of a tuple that LLVM still reads without a loop, which would stand in the way
 
 
-def _reading(count: int) -> Callable[..., Any]:
+def reading(count: int) -> Callable[..., Any]:
     """``(array, first, j)`` to so many numbers of lane j."""
     like, after = (0.0,) * min(count, AT_ONCE), count - AT_ONCE
     if after <= 0:
@@ -23,7 +23,7 @@ def _reading(count: int) -> Callable[..., Any]:
         def read(array, first, j):  # type: ignore[no-untyped-def]
             return column(array, first, j, like)
     else:
-        rest = _reading(after)
+        rest = reading(after)
 
         def read(array, first, j):  # type: ignore[no-untyped-def]
             return column(array, first, j, like) + rest(array, first + AT_ONCE, j)
@@ -44,7 +44,7 @@ def one_loop(
     zeros, given = (0.0,) * dimension, (0.0,) * fields
     step_at, flag, carry_at = 2 * dimension, 3 * dimension, 3 * dimension + 2
     register_jitable(advance)
-    top_of, rule_of, carried = _reading(tops), _reading(fields), _reading(carry)
+    top_of, rule_of, carried = reading(tops), reading(fields), reading(carry)
 
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
         for i in range(fields):

@@ -140,7 +140,8 @@ def test_an_ensemble_costs_little_around_its_steps():
 
 
 def test_every_kind_of_method_has_the_limit_that_is_set_for_it():
-    limits = {"strang": "7", "srkn-14-6": "7", "rk4": "7", "midpoint": "6", "trapezoidal": "6", "gauss-2": "3"}
+    limits = {"strang": "7", "srkn-14-6": "7", "rk4": "7", "midpoint": "6", "trapezoidal": "6", "gauss-2": "3",
+              "rkmk-se3-4": "5"}  # fmt: skip
     assert {name: lanes.limit_of(name) for name in limits} == limits
     assert {lanes.kind_of(name) for name in ("series", "exact-discrete")} == {lanes.WIDE}
     assert (

@@ -109,7 +109,7 @@ def test_blocks_that_are_not_full(count):
     assert_runs_alone(SOLVERS["strang[axis]"], *given, SOLVERS["strang[axis]"].many(*given))
 
 
-@pytest.mark.parametrize("name", ["strang[axis]", "lie-variational[axis]"])  # in lanes, and one after another
+@pytest.mark.parametrize("name", ["strang[axis]", "kahan[axis]"])  # in lanes, and one after another
 def test_arrays_that_cannot_be_written_to_compile_nothing_again(name):
     """numba gives such an array another type, and the last member of a ladder came as a broadcast one."""
     solver, given = SOLVERS[name], members(1)

@@ -1,0 +1,158 @@
+"""Lie-group integrators in lanes: the bits and counts of runs alone, one kernel for both charts and for all numbers."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from symtop.measure.timing import timings
+from symtop.methods import loop as loops
+from symtop.methods.coefficients import SUZUKI_4
+from symtop.methods.generalised_alpha import generalised_alpha
+from symtop.methods.lanes import W
+from symtop.methods.lie_runge_kutta import LieTable, lie_runge_kutta
+from symtop.methods.lie_variational import EULER_POINCARE, Variational, lie_variational
+from symtop.methods.many import Many, in_turn
+from symtop.methods.outcomes import OUTCOMES
+from tests.methods.test_lanes import FAR, SOLVERS, assert_runs_alone, left_alone, members
+from tests.methods.test_newton_lanes import spread
+
+EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
+ITERATED = ("lie-variational", "lie-variational-suzuki-4", "euler-poincare", "simo-wong", "generalised-alpha")
+CHARTS = ("axis", "attitude")
+
+
+@pytest.mark.parametrize("chart", CHARTS)
+@pytest.mark.parametrize("name", ["rkmk-se3-2", "crouch-grossman-3", "lie-variational", "generalised-alpha"])
+def test_members_have_the_bits_of_runs_alone(name, chart):
+    """A few of them; the slow tests of `test_lanes` have all."""
+    solver, given = SOLVERS[f"{name}[{chart}]"], members(400, seed=10)
+    done = solver.many(*given)
+    assert_runs_alone(solver, *given, done)
+    assert {OUTCOMES[k] for k in done.outcome} == {"ok", "not_finite" if name in EXPLICIT else "not_converged"}
+
+
+def test_all_of_them_have_lanes_but_for_the_collective_ones():
+    for name in (*EXPLICIT, *ITERATED):
+        assert all(SOLVERS[f"{name}[{chart}]"].in_lanes for chart in CHARTS)
+    assert not any(SOLVERS[f"collective-gauss-{order}[{chart}]"].in_lanes for order in (2, 4, 6) for chart in CHARTS)
+
+
+def test_kernels_are_shared_by_charts_compositions_and_numbers():
+    """Axis and attitude differ in what is shown, compositions in the table; other equations are other kernels."""
+    kernels = {
+        (name, chart): SOLVERS[f"{name}[{chart}]"]._whole.blocks().march
+        for name in (*EXPLICIT, *ITERATED)
+        for chart in CHARTS
+    }
+    assert all(kernels[name, "axis"] is kernels[name, "attitude"] for name in (*EXPLICIT, *ITERATED))
+    assert kernels["lie-variational", "axis"] is kernels["lie-variational-suzuki-4", "axis"]
+    assert len(set(map(id, kernels.values()))) == 8
+    other = generalised_alpha("other", 0.3).solvers["axis"]
+    assert other._whole.blocks().march is kernels["generalised-alpha", "axis"]
+
+
+def with_shares(name, shares):
+    """A method as a composition of itself."""
+    solver = SOLVERS[name]
+    return dataclasses.replace(solver, rule=solver.rule._replace(shares=shares))
+
+
+def of_table(*rows, bent=False):
+    return lie_runge_kutta("any", rows, 1, "", "", bent=bent).solvers["attitude"]
+
+
+@pytest.mark.parametrize(
+    "solver",
+    [
+        of_table(((1.0,),)),
+        of_table(((1.0,),), ((0.5, 0.5), (0.0, 0.0)), bent=True),
+        lie_variational("any", Variational(EULER_POINCARE, SUZUKI_4.drift), 4, "", "").solvers["axis"],
+        generalised_alpha("any", 0.0).solvers["axis"],
+        with_shares("rkmk-se3-2[attitude]", (0.25, 0.75)),
+        with_shares("generalised-alpha[axis]", (0.25, 0.5, 0.25)),
+    ],
+    ids=["euler", "heun", "euler-poincare-4", "alpha-0", "rkmk-twice", "alpha-thrice"],
+)
+def test_tables_and_compositions_of_ones_own_have_the_bits_of_runs_alone(solver):
+    """A weight of 0 is carried out like any other, and each share of generalised-alpha goes on from the last one."""
+    given = members(200, seed=12)
+    assert solver.in_lanes
+    assert_runs_alone(solver, *given, solver.many(*given))
+
+
+def test_a_table_of_no_weight_but_zeros_stands_still():
+    table = LieTable((0.0,), (1.0,))
+    solver, given = dataclasses.replace(SOLVERS["rkmk-se3-2[attitude]"], rule=table), members(W, seed=13)
+    done = solver.many(*given)
+    assert (done.outcome == 0).all()
+    assert_runs_alone(solver, *given, done)
+
+
+@pytest.mark.parametrize("name", ["commutator-free-4", "generalised-alpha"])
+def test_lanes_whose_exponential_turns_too_far_for_its_series_run_alone(name):
+    solver, given = SOLVERS[f"{name}[axis]"], members(400, seed=11)
+    left = set(left_alone(solver, *given).tolist())
+    done = solver.many(*given)
+    failed = set(np.flatnonzero(done.outcome != 0).tolist())
+    assert failed < left  # some of those that are left end well, with sine and cosine
+    assert len(set(range(400)[FAR]) & left) > 0.6 * len(range(400)[FAR])
+    assert len(left) < 80
+
+
+@pytest.mark.parametrize("name", ["lie-variational", "euler-poincare", "simo-wong"])
+def test_cayleys_rotation_turns_as_far_as_it_likes_in_lanes(name):
+    """Only members whose equation cannot be solved, or takes half of the passes or more, are left."""
+    solver, given = SOLVERS[f"{name}[axis]"], members(400, seed=11)
+    left, done = set(left_alone(solver, *given).tolist()), solver.many(*given)
+    failed = set(np.flatnonzero(done.outcome != 0).tolist())
+    assert failed <= left
+    assert len(left) <= len(failed) + 5
+    assert len(set(range(400)[FAR]) - left) > (0 if name == "lie-variational" else 5)
+
+
+@pytest.mark.parametrize("name", ITERATED)
+def test_a_lane_that_takes_more_iterations_changes_no_other(name):
+    """A step so large that one lane takes more passes; the others keep bits and counts, and that one does not."""
+    numbers, h, marks = spread(W, 40)
+    solver = SOLVERS[f"{name}[attitude]"]
+    before = solver.many(numbers, h, marks)
+    h[5] *= 20.0
+    after = solver.many(numbers, h, marks)
+    others = np.arange(W) != 5
+    assert left_alone(solver, numbers, h, marks).size == 0
+    assert (before.outcome == 0).all()
+    assert after.work[5] > before.work[5]
+    assert not np.array_equal(before.states[5], after.states[5])
+    for one, other in zip(before, after, strict=True):
+        np.testing.assert_array_equal(one[others], other[others])
+    assert_runs_alone(solver, numbers, h, marks, after)
+
+
+@pytest.mark.parametrize("name", ["rkmk-se3-2", "generalised-alpha", "euler-poincare"])
+def test_a_member_does_not_see_its_neighbours(name):
+    """Bits of the members that were not touched; those that were differ (the negative control)."""
+    numbers, h, marks = members(200)
+    solver = SOLVERS[f"{name}[attitude]"]
+    before = solver.many(numbers, h, marks)
+    numbers[100, 5], h[101], numbers[102, 8] = numbers[100, 5] + 1.0, 1e200, np.nan
+    after = solver.many(numbers, h, marks)
+    assert OUTCOMES[after.outcome[102]] != "ok"
+    moved = [i for i in range(200) if not np.array_equal(before.states[i], after.states[i], equal_nan=True)]
+    assert moved == [100, 101, 102]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "times"), [*((name, 4.0) for name in EXPLICIT), *((name, 2.5) for name in ITERATED)])
+def test_lanes_are_faster_than_members_one_after_another(name, times):
+    """So many times in any case: what LLVM does not turn into vectors gains nothing (`make bench` measures)."""
+    numbers, h, marks = spread(128, 500)
+    solver = SOLVERS[f"{name}[axis]"]
+    assert left_alone(solver, numbers, h, marks).size == 0
+    whole = solver._whole
+    done = Many.begun(128, 2, whole.size)
+    together, alone = timings(
+        [lambda: whole.blocks().run(np.arange(128), numbers, whole.table, h, marks, done, loops.BLOCK),
+         lambda: in_turn(whole.alone[0], np.arange(128), numbers, whole.rule, h, marks, done)], batches=25, batch=0.005,
+    )  # fmt: skip
+    assert alone.best > times * together.best
