@@ -18,6 +18,9 @@ and `simulate` dithers samples that would fall on the same phases.
 """
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from symtop.base.numbers import EPSILON
 from symtop.methods.outcomes import sentence
@@ -37,20 +40,50 @@ BESIDE = 1e-2  # rad
 MOST_FOLDS = 100.0  # e times that a nutation grows: any is too much
 NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a resonance
 COARSE = 1.0  # rad of precession in a step
+PRECESSED = 0.1  # the same, of a step that is tried past a pole
+TRIES, LESS = 8, 0.6  # steps that are tried, each at most so much of the one before
+
+
+class Trouble(NamedTuple):
+    """Why a run will go wrong, and what to try instead."""
+
+    reason: str  # with what to do, if that is not a step
+    step: float = math.nan  # a first try
+    otherwise: str = ""  # what may be done instead of it
 
 
 def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, done: Run | None = None) -> str:
     """Warn before the run if a large error is expected: one sentence with a remedy, else an empty one.
 
-    `done` is the run itself, where it has been made already because the probe would repeat it (`forecast.repeats`).
+    A step is advised if the guard would be silent about it, and otherwise named as one to try. `done` is the run
+    itself, where it has been made already because the probe would repeat it (`forecast.repeats`).
     """
     if method.control is None:
         return ""
-    expected, marks = forecast(scene, method, chart, plan, done), landmarks(scene)
-    reason = _unstable(scene, method, chart, plan, marks, expected) or _cause(
-        scene, method, chart, plan, marks, expected
-    )
-    return f"{method.name} on {scene.name}: {reason}" if reason else ""
+    expected = forecast(scene, method, chart, plan, done)
+    trouble = _trouble(scene, method, chart, plan, expected)
+    if trouble is None:
+        return ""
+    remedy = "" if math.isnan(trouble.step) else f"; {_remedy(scene, method, chart, plan, trouble.step)}"
+    return f"{method.name} on {scene.name}: {trouble.reason}{remedy}{trouble.otherwise if remedy else ''}"
+
+
+def _remedy(scene: Scene, method: Integrator, chart: str, plan: Plan, step: float) -> str:
+    """A step of two digits of which nothing is expected to go wrong: the first try, or the next smaller ones."""
+    for _ in range(TRIES):
+        step = float(f"{step:.2g}")
+        tried = plan._replace(step_size=step, marks=np.array([max(1, round(plan.horizon / step))]))
+        expected = forecast(scene, method, chart, tried)
+        if expected.outcome == "ok" and _trouble(scene, method, chart, tried, expected) is None:
+            return f"take a step of about {step:.2g}"
+        step = min(LESS * step, _smaller(method, tried, expected))
+    return f"try a step of about {step:.2g}"
+
+
+def _trouble(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
+    marks = landmarks(scene)
+    grows = _unstable(scene, method, chart, plan, marks, expected)
+    return grows or _cause(scene, method, chart, plan, marks, expected)
 
 
 def _growth(scene: Scene, method: Integrator, chart: str, step: float, frequency: float) -> Growth:
@@ -60,12 +93,14 @@ def _growth(scene: Scene, method: Integrator, chart: str, step: float, frequency
     return Growth(trace(method, scene, step, chart).growth if step * frequency > SMALL_TURN else 1.0, EPSILON)
 
 
-def _unstable(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks, expected: Forecast) -> str:
-    """Small nutations that grow until they are seen, and what to do; empty if they do not, or a probe has shown it."""
+def _unstable(
+    scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks, expected: Forecast
+) -> Trouble | None:
+    """Small nutations that grow until they are seen; None if they do not, or if a probe has shown that they do not."""
     step, frequency = plan.step_size, marks.frequency
     seen = expected.whole and expected.outcome == "ok" and expected.axis_error <= EXPECTED
     if method.adaptive or seen:
-        return ""
+        return None
     growth, steps = _growth(scene, method, chart, step, frequency), plan.horizon / step
     beside = marks.gap if marks.gap < BESIDE else 0.0  # of a pole, what grows is the tilt
     size, folds = marks.width + beside + growth.size, steps * math.log(max(growth.factor, 1.0))
@@ -73,70 +108,77 @@ def _unstable(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: L
         not growth.factor > 1.0 + max(NO_GROWTH, NONLINEAR * growth.size)
         or not size * math.expm1(min(folds, MOST_FOLDS)) > EXPECTED
     ):
-        return ""
+        return None
     good, bad = SMALL_TURN / frequency, step
     if growth.factor > 1.0 + GROWS and good < bad:
         while bad - good > 1e-3 * bad:
             middle = 0.5 * (good + bad)
             stable = _growth(scene, method, chart, middle, frequency).factor <= 1.0 + GROWS
             good, bad = (middle, bad) if stable else (good, middle)
-        return (
+        return Trouble(
             f"small nutations (frequency {frequency:.4g}) grow at a step of {step:.4g}, the method is stable up to "
-            f"{good:.4g} (h omega = {good * frequency:.3f}); take a step below {0.5 * good:.2g}"
-        )
+            f"{good:.4g} (h omega = {good * frequency:.3f})", 0.5 * good,
+        )  # fmt: skip
     finer = step * math.pow(math.log1p(AIM / size) / folds, 1.0 / (method.order or 1))
-    return (
+    return Trouble(
         f"small nutations (frequency {frequency:.4g}) of {size:.1g} rad grow by {growth.factor - 1.0:.1g} of "
-        f"themselves in each of {steps:.3g} steps; take a step of about {finer:.2g}"
-    )
+        f"themselves in each of {steps:.3g} steps", finer,
+    )  # fmt: skip
 
 
-def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks, expected: Forecast) -> str:
-    """Why the run will go wrong, and what to do; empty if it will not."""
+def _cause(
+    scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks, expected: Forecast
+) -> Trouble | None:
+    """Why the run will go wrong; None if it will not."""
     if expected.rounding > EXPECTED and expected.rounding >= min(expected.axis_error, 1.0):
-        return (
+        return Trouble(
             "the motion passes so close to a separatrix that rounding alone decides when it falls; no method and no "
             f"step help, shorten the horizon to less than one nutation of {marks.period:.4g}"
         )
     if not expected.axis_error > EXPECTED:
-        return ""
+        return None
     size = f"expect an axis error of {min(expected.axis_error, math.pi):.1g} rad by t = {plan.horizon:.4g}"
+    if (coarse := _coarse(scene, method, chart, plan, marks, expected, size)) is not None:
+        return coarse
+    if expected.outcome != "ok":
+        return Trouble(f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon)}")
+    if method.adaptive:
+        return Trouble(f"{size}: {_adaptive(method, plan, marks, expected)}")
+    if method.order is None:
+        return Trouble(
+            f"{size}: it has no order, so that a smaller step need not help; take another method, such as strang"
+        )
+    return Trouble(
+        f"{size}: a step is 1/{expected.steps_per_nutation:.3g} of a nutation, and errors add up over "
+        f"{plan.horizon / marks.period:.3g} nutations", _smaller(method, plan, expected),
+    )  # fmt: skip
+
+
+def _coarse(
+    scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks, expected: Forecast, size: str
+) -> Trouble | None:
+    """A step that is too long for a pole or for the nutation, or in resonance with it."""
     step, frequency = plan.step_size, marks.frequency
     if chart == "angles" and expected.passage > COARSE:
-        return (
+        return Trouble(
             f"{size}: the axis passes the {marks.pole} pole at {marks.gap:.2g} rad and precesses there by "
-            f"{expected.passage:.2g} rad in a step; take a step below {0.1 / marks.rate:.1g} or an integrator whose "
-            "chart has no poles, such as strang"
-        )
+            f"{expected.passage:.2g} rad in a step", PRECESSED / marks.rate,
+            ", or an integrator whose chart has no poles, such as strang",
+        )  # fmt: skip
     if expected.steps_per_nutation < 2.0:
-        return (
-            f"{size}: a step of {step:.4g} jumps over the nutation, whose period is {marks.period:.4g}; take a step "
-            f"below {marks.period / 20.0:.2g}"
+        return Trouble(
+            f"{size}: a step of {step:.4g} jumps over the nutation, whose period is {marks.period:.4g}",
+            marks.period / 20.0,
         )
     if step * frequency > SMALL_TURN:
         turn = trace(method, scene, step, chart).turn
         for order in (3, 4):
             if abs(order * turn - 2.0 * math.pi) < NEAR * order:
-                return (
+                return Trouble(
                     f"{size}: a step turns the nutation by {turn:.4g} rad, close to 1/{order} of a turn, a resonance "
-                    f"(h omega = {step * frequency:.3f}); take a step of about {_smaller(method, plan, expected):.2g}"
-                )
-    if expected.outcome != "ok":
-        return f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon)}"
-    return f"{size}: {_adding_up(method, plan, marks, expected)}"
-
-
-def _adding_up(method: Integrator, plan: Plan, marks: Landmarks, expected: Forecast) -> str:
-    """What to do about errors that add up over the nutations."""
-    nutations = plan.horizon / marks.period
-    if method.adaptive:
-        return _adaptive(method, plan, marks, expected)
-    if method.order is None:
-        return "it has no order, so that a smaller step need not help; take another method, such as strang"
-    return (
-        f"a step is 1/{expected.steps_per_nutation:.3g} of a nutation, and errors add up over {nutations:.3g} "
-        f"nutations; take a step of about {_smaller(method, plan, expected):.2g}"
-    )
+                    f"(h omega = {step * frequency:.3f})", _smaller(method, plan, expected),
+                )  # fmt: skip
+    return None
 
 
 def _adaptive(method: Integrator, plan: Plan, marks: Landmarks, expected: Forecast) -> str:
