@@ -318,9 +318,10 @@ def draw_guard(data: xr.DataTree) -> Picture:
         axis.set(xlabel="share of right runs that are suspected")
     axes[0, 0].set_ylabel("share of wrong runs that are found")
     figure.supxlabel(
-        "The guard runs a short piece of the method and foretells the error of the axis. Wrong: the axis is off by "
-        f"more than\n{WRONG:g} rad; right: by less than {EXPECTED:g} rad. Lines: any threshold; dots: the guard warns "
-        f"at {EXPECTED:g} rad, energy and momenta at {KEPT:.0%}.",
+        "The guard tries the method on a piece of the run and foretells the error of the axis. Runs that this piece "
+        f"covers whole are\nleft out. Wrong: the axis is off by more than {WRONG:g} rad; right: by less than "
+        f"{EXPECTED:g} rad. Lines: any threshold; dots: the guard\nwarns at {EXPECTED:g} rad, energy and momenta at "
+        f"{KEPT:.0%}.",
         fontsize=7.5, ha="left", x=0.01,
     )  # fmt: skip
     headline(figure, messages.guard(data))
@@ -331,7 +332,8 @@ def draw_guard(data: xr.DataTree) -> Picture:
         f"forecast before the run (dot: it warns at {EXPECTED:g} rad). Orange: by the larger error of energy and "
         f"momenta after the run (dot: {KEPT:.0%}). All rows, method[chart], at their ten coarsest steps or "
         "tolerances, on "
-        f"{' and on '.join(messages.guarded(data, one) for one in spans)}; no named scene. The higher a line, the more "
+        f"{' and on '.join(messages.guarded(data, one) for one in spans)}, without those that the guard's trial covers "
+        "whole; no named scene. The higher a line, the more "
         "wrong runs are found at equal false alarms. Silent failures are counted on all tops instead.",
         "Receiver operating characteristics of the guard and of the conserved quantities, with their thresholds.",
     )

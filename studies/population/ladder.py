@@ -20,6 +20,7 @@ Variables over `quantity`, `target`, `member`, `level`, `stratum`, `guarded`:
     foretold, measured (level, guarded)            axis error, rad: of the guard's forecast, and of the run
     made, evaluated                                runs of the ladder, and their force evaluations
     watched(level, guarded)                        the larger error of energy and momenta, infinite if it ended badly
+    whole(level, guarded)                          1 if the guard's trial was the whole run, and nothing was foretold
 """
 
 import math
@@ -241,7 +242,7 @@ def _healthy(done: Climb, tops: Tops, strata: NDArray[np.int64], kinds: int) -> 
 def guarded_runs(row: Integrator, tops: Tops, done: Climb, guarded: int) -> dict[str, Array]:
     """What the guard foretells, what is watched and what is measured, for the first members; (LEVELS, guarded)."""
     (chart,) = row.charts()
-    seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured")}
+    seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
     chosen = np.flatnonzero(tops.known)[:guarded]
     for place, (top, start) in enumerate(bodies(tops, chosen)):
         member = chosen[place]
@@ -252,7 +253,8 @@ def guarded_runs(row: Integrator, tops: Tops, done: Climb, guarded: int) -> dict
                     plan = Plan.steps(float(tops.period[member]) / FIRST * 0.5**level, tops.marks << level)
                 else:
                     plan = Plan.until(tops.times[member], setting_of(row, level))
-                seen["foretold"][level, place] = forecast(scene, row, chart, plan).axis_error
+                expected = forecast(scene, row, chart, plan)
+                seen["foretold"][level, place], seen["whole"][level, place] = expected.axis_error, expected.whole
                 seen["watched"][level, place] = max(done.errors[name][level, member] for name in ("energy", MOMENTA))
                 seen["measured"][level, place] = done.errors["axis"][level, member]
     return seen

@@ -130,12 +130,15 @@ def silent(data: xr.DataTree) -> str:
 
 
 def guard(data: xr.DataTree) -> str:
-    """How many wrong runs the guard finds, and what share a look at them afterwards finds."""
-    found, after = ([verdicts.caught(data, horizon, score)[0] for horizon in verdicts.horizons(data)]
-                    for score in ("foretold", "watched"))  # fmt: skip
-    together = Share(sum(share.count for share in found), sum(share.total for share in found))
+    """How many wrong runs the guard finds over each horizon, and what share a look at them afterwards finds."""
+    spans = verdicts.horizons(data)
+    before, after = (
+        [verdicts.caught(data, horizon, score)[0] for horizon in spans] for score in ("foretold", "watched")
+    )
+    foreseen = [f"{found_of(share)} over {verdicts.nutations(data, horizon):g} nutations"
+                for share, horizon in zip(before, spans, strict=True)]  # fmt: skip
     return (
-        f"The guard finds {found_of(together)} before they are made; energy and momenta afterwards find "
+        f"The guard foresees {' and '.join(foreseen)}; energy and momenta afterwards find "
         f"{' and '.join(map(percent, after))} of them"
     )
 

@@ -196,12 +196,21 @@ def scored(
     """A score of the runs that the guard was asked about, and whether they were wrong.
 
     The score is the guard's forecast of the axis error ("foretold"), or the larger error of energy and momenta of the
-    run ("watched"). Runs between `EXPECTED` and `WRONG` are neither right nor wrong and are left out.
+    run ("watched"). Runs between `EXPECTED` and `WRONG` are neither right nor wrong and are left out, and so are those
+    that the guard's trial repeats whole: there it measures the error and forecasts nothing.
     """
     group = data[horizon].to_dataset().isel(scene=0).sel(integrator=names or judged_rows(data, horizon))
     values, errors = group[score].values.ravel(), group["measured"].values.ravel()
-    asked = ~np.isnan(values) & ((errors <= EXPECTED) | (errors > WRONG))
+    told = ~np.isnan(values) & ((errors <= EXPECTED) | (errors > WRONG))
+    asked = told & ~(group["whole"].values.ravel() > 0.0)
     return values[asked], errors[asked] > WRONG
+
+
+def repeated(data: xr.DataTree, horizon: str, names: list[str] | None = None) -> Share:
+    """Of the wrong runs that the guard was asked about, those that its trial repeats whole."""
+    group = data[horizon].to_dataset().isel(scene=0).sel(integrator=names or judged_rows(data, horizon))
+    wrong = (group["measured"].values > WRONG) & ~np.isnan(group["foretold"].values)
+    return Share(int((wrong & (group["whole"].values > 0.0)).sum()), int(wrong.sum()))
 
 
 def detected(

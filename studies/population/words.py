@@ -184,10 +184,12 @@ def guard_sentence(data: xr.DataTree) -> str:
             f"over {verdicts.nutations(data, horizon):g} nutations ({asked_of(data, horizon)} tops) of {hits.count:,} "
             f"of {hits.total:,}{wrong} and {percent(alarms)} of {alarms.total:,}{right}"
         )
+    whole = " and ".join(percent(verdicts.repeated(data, horizon)) for horizon in verdicts.horizons(data))
     return (
-        f"The guard tries a method on two nutations before a run. Asked about the {GUARDED_LEVELS} coarsest settings "
+        f"The guard tries a method on a piece of a run before it. Asked about the {GUARDED_LEVELS} coarsest settings "
         f"of each row, it warned {', '.join(said)}. Wrong is more than {WRONG:g} rad off, right less than {EXPECTED:g} "
-        "rad, at which it warns; the others are not counted."
+        "rad, at which it warns; the others are not counted, nor are runs that the piece covers whole "
+        f"({whole} of the wrong ones)."
     )
 
 

@@ -23,7 +23,7 @@ TERMS = {  # of the answers, with what they mean
     "[angles]": "the method integrates Euler's angles, which are singular where the axis is vertical",
     "[axis]": "the method integrates the direction of the axis and the angular momentum, which are singular nowhere",
     "[attitude]": "the method integrates a quaternion, the whole orientation, and the angular momentum",
-    "guard": "the forecast before a run: it tries the method on two nutations",
+    "guard": "the forecast before a run: it tries the method on a piece of it",
 }
 
 

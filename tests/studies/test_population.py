@@ -23,6 +23,7 @@ from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.report import style
 from symtop.report.style import look
+from symtop.run.guard import EXPECTED
 from symtop.runner.check import differences
 
 INF, NAN = math.inf, math.nan
@@ -224,6 +225,26 @@ def test_wrong_runs_are_few_where_steps_are_fine_and_silent_ones_are_wrong(stran
     asked = np.isfinite(strang["foretold"].values)
     assert asked.any()
     assert np.isfinite(strang["measured"].values[asked]).any()
+
+
+def test_runs_that_the_trial_of_the_guard_covers_are_no_forecasts(strang):
+    """Over five nutations coarse runs are shorter than the trial and fine ones longer; over 600, none is as short."""
+    there = np.isfinite(strang["foretold"].values)
+    assert set(strang["whole"].values[there]) == {0.0, 1.0}
+    exact = strang["whole"].values == 1.0  # then the forecast is the error, but for where it is looked at
+    ratio = strang["foretold"].values[exact] / strang["measured"].values[exact]
+    assert 0.9 < np.nanmedian(ratio) < 1.1
+    long = table_of(integrator("strang[axis]"), Tops.drawn(6, 3, 600.0), 1e6, 2)
+    assert set(long["whole"].values[np.isfinite(long["foretold"].values)]) == {0.0}
+    data = xr.DataTree.from_dict({"short": strang.expand_dims(scene=["population"], integrator=["strang[axis]"])})
+    scores, wrong = verdicts.scored(data, "short", "foretold", ["strang[axis]"])
+    error, counted = strang["measured"].values, there & ~exact
+    clear = counted & ((error <= EXPECTED) | (error > ladder.WRONG))
+    assert scores.size == clear.sum() > 0
+    assert wrong.sum() == (clear & (error > ladder.WRONG)).sum()
+    share = verdicts.repeated(data, "short", ["strang[axis]"])
+    wrong_ones = there & (error > ladder.WRONG)
+    assert (share.count, share.total) == ((exact & wrong_ones).sum(), wrong_ones.sum())
 
 
 def test_a_row_is_asked_for_what_it_shows_and_does_not_keep_anyway():
