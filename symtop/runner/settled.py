@@ -7,6 +7,7 @@ takes 3 s.
 """
 
 import importlib.metadata
+import importlib.util
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,8 +22,21 @@ NOTE = Path("cases") / "settled.json"
 
 
 def announced() -> str:
-    """The hash of what installed packages announce to symtop."""
-    return hashed(*sorted(map(str, importlib.metadata.entry_points(group=ENTRY_POINTS))))
+    """The hash of what installed packages announce to symtop, and of the code of these packages."""
+    points = sorted(importlib.metadata.entry_points(group=ENTRY_POINTS), key=str)
+    code = [file_hash(path) for name in sorted({point.module.partition(".")[0] for point in points})
+            for path in _sources(name)]  # fmt: skip
+    return hashed(*map(str, points), *code)
+
+
+def _sources(module: str) -> list[Path]:
+    """The files of a module or a package, which is not imported."""
+    spec = importlib.util.find_spec(module)
+    if spec is None:
+        return []
+    folders = [Path(folder) for folder in spec.submodule_search_locations or ()]
+    alone = [Path(spec.origin)] if spec.origin and not folders and Path(spec.origin).is_file() else []
+    return alone + sorted(path for folder in folders for path in folder.rglob("*.py"))
 
 
 def made_by(grid: str) -> str:

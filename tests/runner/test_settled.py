@@ -155,3 +155,24 @@ def test_names_that_stand_in_two_places_agree():
     assert settled.ENTRY_POINTS == registry.ENTRY_POINTS
     assert scripts.folder().name in settled.STUDIES
     assert scripts.STUDIES in settled.STUDIES
+
+
+def test_another_version_of_a_package_that_announces_methods_is_seen(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    for name in ("announcing", "silent"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text("")
+        (tmp_path / name / "methods.py").write_text("STEP = 0.5\n")
+    told = tmp_path / "announcing-1.0.dist-info"
+    told.mkdir()
+    (told / "METADATA").write_text("Metadata-Version: 2.1\nName: announcing\nVersion: 1.0\n")
+    (told / "entry_points.txt").write_text("[symtop.integrators]\nmine = announcing.methods:methods\n")
+    before = settled.announced()
+    assert before != settled.hashed()
+    settled.file_hash.cache_clear()
+    (tmp_path / "silent" / "methods.py").write_text("STEP = 0.6\n")
+    assert settled.announced() == before
+    settled.file_hash.cache_clear()
+    (tmp_path / "announcing" / "methods.py").write_text("STEP = 0.6\n")
+    assert settled.announced() != before
+    assert "announcing" not in sys.modules
