@@ -201,7 +201,8 @@ def _job(
     elif method.fixed_step:
         steps = _steps(for_each("step_size", asked.step_size, n), horizon, budget or MOST_STEPS)
     elif method.adaptive:
-        bounds = _tolerances(method, asked.tolerance, numbers, horizon)
+        period = nutation_periods(numbers) if period is None else period
+        bounds = _tolerances(method, asked.tolerance, numbers, horizon, period)
     return Job(method, chart, numbers, horizon, steps, bounds, samples, budget, shown, period)
 
 
@@ -227,9 +228,10 @@ def _steps(step: Array, horizon: Array, most: float) -> NDArray[np.int64]:
     return np.maximum(1, np.rint(ratio)).astype(np.int64)
 
 
-def _tolerances(method: Integrator, tolerance: object, numbers: Array, horizon: Array) -> Array:
-    """Tolerance of each member, and no horizon too long for an adaptive method."""
-    swings = horizon * np.sqrt(np.abs(numbers[:, 2]) / numbers[:, 0]) / (2.0 * np.pi)
+def _tolerances(method: Integrator, tolerance: object, numbers: Array, horizon: Array, period: Array) -> Array:
+    """Tolerance of each member; a horizon that `simulation.make_plan` would refuse is refused."""
+    pendulum = np.sqrt(np.abs(numbers[:, 2]) / numbers[:, 0]) / (2.0 * np.pi)
+    swings = horizon * np.maximum(1.0 / period, pendulum)
     for i in np.flatnonzero(swings > MOST_SWINGS)[:1]:
         raise SymtopError(
             f"the horizon of member {i} is {swings[i]:.3g} swings of the top; an adaptive method may take "

@@ -310,3 +310,11 @@ def test_numbers_that_leave_the_range_fail_alone_and_other_errors_end_the_ensemb
     assert np.isnan(other.theta[3]).all()
     with pytest.raises(symtop.SymtopError, match=r"rk4-python.* on member 3 failed: TypeError: a reason"):
         symtop.ensemble(SOME, python, **asked | {"horizon": 6.0})
+
+
+def test_a_fast_top_has_as_many_swings_as_simulate_says():
+    """Its nutations count, where gravity alone would let it run."""
+    fast = symtop.Scene("fast-one", symtop.SymmetricTop(1.0, 0.5, 1e-6), symtop.Angles(0.5, psi_dot=200.0), 2e7)
+    for run in (symtop.simulate, lambda one, name, **asked: symtop.ensemble([one], name, quiet=True, **asked)):
+        with pytest.raises(symtop.SymtopError, match="3.18e\\+08 swings"):
+            run(fast, "rk45-compiled[axis]", tolerance=1e-3)
