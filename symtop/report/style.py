@@ -8,13 +8,16 @@ of print, 6.5 inches, and its text is at least 7 points high there.
 import textwrap
 import zlib
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 
 from symtop.base import datasets
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 WIDTH = 6.5  # inches, of a figure: the text block of a page
 LEAST_TEXT = 7.0  # points, of any text at that width
@@ -184,8 +187,8 @@ def use() -> None:
     )
 
 
-def compact(path: str | Path) -> None:
-    """Rewrite a PNG with 256 colours, a third of the bytes: ours exactly as they are, the rest as the picture needs.
+def compact(picture: "Image.Image") -> "Image.Image":
+    """A picture with 256 colours, a third of the bytes: ours exactly as they are, the rest as the picture needs.
 
     A palette made from the picture alone would merge the colour of a few small markers with a neighbour's.
     """
@@ -195,8 +198,7 @@ def compact(path: str | Path) -> None:
     shades = [shade for family in _SHADES.values() for shade in family]
     ours = dict.fromkeys([*shades, *(look.color for look in _LOOKS.values()), *OUTCOME_COLORS.values(), "#FFFFFF"])
     fixed = [value for color in ours for value in getrgb(color)]
-    with Image.open(path) as image:
-        picture = image.convert("RGB")
+    picture = picture.convert("RGB")
     free = picture.quantize(256 - len(ours)).getpalette() or []
     palette = Image.new("P", (1, 1))
     palette.putpalette((fixed + free)[:768])
@@ -209,7 +211,7 @@ def compact(path: str | Path) -> None:
         known[nearest] == seen, nearest, np.asarray(drawn)
     )  # the library's search for the nearest is a little coarse
     drawn.frombytes(places.astype(np.uint8).tobytes())
-    drawn.save(path, optimize=True)
+    return drawn
 
 
 def save(figure: Any, target: Path) -> None:
@@ -236,9 +238,28 @@ def publish(figure: Any, target: Path) -> None:
 def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
     datasets.sweep(target)
     with datasets.replacing(target, target.suffix) as partial:
-        figure.savefig(partial, metadata={UNDATED.get(target.suffix, "Software"): None}, dpi=dpi)
-        if target.suffix == ".png" and dpi == DPI:
-            compact(partial)
+        _written(figure, partial, dpi)
+
+
+def _written(figure: Any, path: Path, dpi: float) -> None:
+    """A figure in a file of its kind. ``savefig`` would lay a PNG or a PDF out in one drawing and draw it in another."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+    from PIL import Image
+
+    metadata = {UNDATED.get(path.suffix, "Software"): None}
+    if path.suffix not in {".png", ".pdf"}:
+        figure.savefig(path, metadata=metadata, dpi=dpi)
+        return
+    figure.set_dpi(dpi)
+    if path.suffix == ".pdf":
+        FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
+    elif dpi == DPI:
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        compact(Image.fromarray(np.asarray(canvas.buffer_rgba()))).save(path, optimize=True)
+    else:
+        FigureCanvasAgg(figure).print_png(path, metadata=metadata)
 
 
 def least_text(figure: Any) -> tuple[float, str]:
