@@ -15,6 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from symtop.base import datasets
+from symtop.report import embedded
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -242,7 +243,7 @@ def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
 
 
 def _written(figure: Any, path: Path, dpi: float) -> None:
-    """A figure in a file of its kind. ``savefig`` would lay a PNG or a PDF out in one drawing and draw it in another."""
+    """A figure in a file of its kind; ``savefig`` draws a PNG or a PDF twice, once to lay it out."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
     from PIL import Image
@@ -253,7 +254,8 @@ def _written(figure: Any, path: Path, dpi: float) -> None:
         return
     figure.set_dpi(dpi)
     if path.suffix == ".pdf":
-        FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
+        with embedded.letters_alone():
+            FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
     elif dpi == DPI:
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
