@@ -43,6 +43,7 @@ class Front(NamedTuple):
 
 def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     """Every run of every compiled row, one panel a scene, with the front and the two rows that have most of it."""
+    data = data[[*COSTS, "axis", "axis_bound", "control", "implementation"]]  # of these alone: a dataset has dozens
     scenes = [str(scene) for scene in data["scene"].values]
     cells = {scene: data.sel(scene=scene).isel(horizon=far) for scene in scenes}
     compiled = [row for row in words.of_implementation(data, "compiled") if row in ranking.ranked(data)]
