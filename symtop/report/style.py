@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 WIDTH = 6.5  # inches, of a figure: the text block of a page
 LEAST_TEXT = 7.0  # points, of any text at that width
 DPI, SKETCHED = 200, 100
+LEVEL = 7  # of the compression of a picture: 12 ms, where 9 takes 75 for 7 % less bytes
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
@@ -198,14 +199,13 @@ def compact(picture: "Image.Image") -> "Image.Image":
 
     shades = [shade for family in _SHADES.values() for shade in family]
     ours = dict.fromkeys([*shades, *(look.color for look in _LOOKS.values()), *OUTCOME_COLORS.values(), "#FFFFFF"])
-    fixed = [value for color in ours for value in getrgb(color)]
+    fixed = np.array([getrgb(color) for color in ours], np.uint8)
     picture = picture.convert("RGB")
     free = picture.quantize(256 - len(ours)).getpalette() or []
     palette = Image.new("P", (1, 1))
-    palette.putpalette((fixed + free)[:768])
+    palette.putpalette([*fixed.ravel().tolist(), *free][:768])
     drawn = picture.quantize(palette=palette, dither=Image.Dither.NONE)
-    seen = np.asarray(picture) @ np.array([1, 256, 65536])  # a colour as one number
-    known = np.reshape(fixed, (-1, 3)) @ np.array([1, 256, 65536])
+    seen, known = _as_numbers(picture), _as_numbers(Image.fromarray(fixed[np.newaxis])).ravel()
     order = np.argsort(known)
     nearest = order[np.minimum(np.searchsorted(known, seen, sorter=order), len(known) - 1)]
     places = np.where(
@@ -213,6 +213,11 @@ def compact(picture: "Image.Image") -> "Image.Image":
     )  # the library's search for the nearest is a little coarse
     drawn.frombytes(places.astype(np.uint8).tobytes())
     return drawn
+
+
+def _as_numbers(picture: "Image.Image") -> Any:
+    """Every colour of a picture as one number."""
+    return np.asarray(picture.convert("RGBA")).view(np.uint32)[..., 0]
 
 
 def save(figure: Any, target: Path) -> None:
@@ -259,7 +264,7 @@ def _written(figure: Any, path: Path, dpi: float) -> None:
     elif dpi == DPI:
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
-        compact(Image.fromarray(np.asarray(canvas.buffer_rgba()))).save(path, optimize=True)
+        compact(Image.fromarray(np.asarray(canvas.buffer_rgba()))).save(path, compress_level=LEVEL)
     else:
         FigureCanvasAgg(figure).print_png(path, metadata=metadata)
 
