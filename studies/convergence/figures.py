@@ -42,7 +42,7 @@ WINDOWS = 18  # of time, in each of which the largest energy error is drawn
 def pictures(data: xr.Dataset) -> list[Picture]:
     """The five named methods; the work that each row with a step needs; error against the tolerance."""
     drawn = [_named(data)] if any(split_name(str(name))[0] in NAMED for name in data["integrator"].values) else []
-    works = efficiencies(stepping(data), TARGET)
+    works = efficiencies(data, TARGET)
     drawn += [_constants(data, works)] if works else []
     chosen = adaptive(data)
     return [*drawn, _by_tolerance(chosen)] if chosen.sizes["integrator"] else drawn

@@ -61,11 +61,13 @@ def _residual_table(histories: xr.Dataset) -> Table:
     header, rows = ["scene", "row", "step or tolerance", "nutations", "outcome"], []
     for name in CONSTANTS:
         header += [f"largest {name} residual", f"trend of {name} over the run", f"exponent, law of {name}"]
+    ends = histories["sample_time"].max("sample")
+    histories = histories.drop_dims("sample")  # a cell is chosen of the few numbers of a run, not of its series
     for scene, integrator in product(histories["scene"].values, histories["integrator"].values):
-        cell = histories.sel(scene=scene, integrator=integrator)
+        cell, end = (part.sel(scene=scene, integrator=integrator) for part in (histories, ends))
         row = [str(scene), str(integrator), used(cell), f"{cell['nutations']:.4g}", str(cell["outcome"].item())]
         for name in CONSTANTS:
-            doubt = cell[f"{name}_interval"] * cell["sample_time"].max()  # 95%, of the rise over the whole run
+            doubt = cell[f"{name}_interval"] * end  # 95%, of the rise over the whole run
             trend = f"{_number(cell[f'{name}_rise'])} +- {_number(doubt)}"
             row += [_number(cell[f"{name}_largest"]), trend, law(cell, name)]
         rows.append([*row, law(cell, "phase")])
@@ -75,7 +77,7 @@ def _residual_table(histories: xr.Dataset) -> Table:
 
 def _number_table(title: str, runs: Mapping[str, xr.Dataset], columns: Mapping[str, str], form: str) -> Table:
     rows = [
-        [name, *(format(cell[column], form) if np.isfinite(cell[column]) else "" for column in columns.values())]
+        [name, *(format(cell[column], form) if math.isfinite(cell[column]) else "" for column in columns.values())]
         for name, cell in runs.items()
     ]
     return Table(title, ["row", *columns], rows)
@@ -86,7 +88,7 @@ def _scene(group: xr.Dataset) -> str:
 
 
 def _number(value: xr.DataArray) -> str:
-    return f"{value:.2e}" if np.isfinite(value) else ""
+    return f"{value:.2e}" if math.isfinite(value) else ""
 
 
 def _exponent(cell: xr.Dataset, name: str) -> str:
@@ -99,11 +101,11 @@ def law(cell: xr.Dataset, name: str) -> str:
     A change of law is told only above rounding: a single walk of rounding bends anywhere. A drift of the energy is what
     bends the phase.
     """
-    if not np.isfinite(cell[f"{name}_exponent"]):
+    if not math.isfinite(cell[f"{name}_exponent"]):
         return ""
     above_rounding = float(cell[f"{'energy' if name == 'phase' else name}_largest"]) > rounding(cell, name)
     time, before, after = (cell[f"{name}_{part}"] for part in ("change", "before", "after"))
-    changes = np.isfinite(time) and above_rounding
+    changes = math.isfinite(time) and above_rounding
     change = f"; t^{before:.2f} to t^{after:.2f} at t = {time:.3g}" if changes else ""
     word = cell[f"{name}_law"].item() if name == "phase" or above_rounding else "at rounding"
     return f"{_exponent(cell, name)}, {word}{change}"

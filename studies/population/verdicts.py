@@ -18,6 +18,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from symtop.base.remembered import of_one_dataset
 from symtop.model.charts import Array
 from symtop.run.guard import EXPECTED
 
@@ -104,6 +105,7 @@ def price(data: xr.DataTree, names: list[str], unit: str) -> Array:
     return np.stack([timed[unit].values, *timed[f"{unit}_half"].transpose("half", "integrator").values])
 
 
+@of_one_dataset
 def costs(data: xr.DataTree, cell: Cell, unit: str) -> Costs:
     """Costs of all rows that show a cell's quantity, on the tops that are asked."""
     group = data[cell.horizon]["cost"].isel(scene=0)
@@ -136,6 +138,7 @@ def standings(taken: Costs) -> list[Standing]:
     return sorted(listed, key=lambda one: (-one.won.count, -one.level.count, one.slowdown[1], -one.solved.count))
 
 
+@of_one_dataset
 def best(data: xr.DataTree, cell: Cell, unit: str) -> tuple[Costs, Winner | None]:
     """Costs of a cell, and its winner, which is sure if it is with the times of either half of the rounds."""
     taken = costs(data, cell, unit)

@@ -169,7 +169,8 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
     rows with the largest and the smallest share are bold, but for closed forms.
     """
     shown = common({name: one for name, one in maps(data, scene).items() if name in names})
-    judged = [name for name in names if name not in closed_forms(data, names)] or names
+    exact = closed_forms(data, names)
+    judged = [name for name in names if name not in exact] or names
     ends = [f"{shown[name].shares[0]:.0%}" for name in (judged[0], judged[-1])]
     drawn = dict[str, None]()  # outcomes and lines, for the legend
     across, upwards = (_reach([one[k] for one in shown.values()]) for k in (2, 1))

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from symtop.base.remembered import of_one_dataset
 from symtop.measure import ranking
 from symtop.methods.registry import split_name
 from symtop.report.sentences import abridged, joined
@@ -37,6 +38,7 @@ class Crossing(NamedTuple):
     gain: float  # ratio of the energy errors there, second over first
 
 
+@of_one_dataset
 def in_chart(data: xr.Dataset, chart: str) -> tuple[list[str], list[str]]:
     """The compiled rows of a chart that are compared: the classical ones, and those that preserve structure."""
     names = [str(name) for name in ranking.ranked(data)]
@@ -83,6 +85,7 @@ def crossing(cell: xr.Dataset, first: str, second: str) -> Crossing | None:
     return Crossing(str(cell["scene"].values), float(ahead.mean()), bool(ahead[0]), bool(ahead[-1]), won, error, gain)
 
 
+@of_one_dataset
 def crossings(data: xr.Dataset, chart: str) -> dict[str, dict[str, list[Crossing]]]:
     """All comparisons of a chart over the long horizon, by the classical row and by the other one."""
     last = data[["seconds", "energy", "outcome"]].isel(horizon=-1)  # of these alone: a dataset has dozens

@@ -43,6 +43,7 @@ class Front(NamedTuple):
 
 def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     """Every run of every compiled row, one panel a scene, with the front and the two rows that have most of it."""
+    data = data[[*COSTS, "axis", "axis_bound", "control", "implementation"]]  # of these alone: a dataset has dozens
     scenes = [str(scene) for scene in data["scene"].values]
     cells = {scene: data.sel(scene=scene).isel(horizon=far) for scene in scenes}
     compiled = [row for row in words.of_implementation(data, "compiled") if row in ranking.ranked(data)]
@@ -60,10 +61,10 @@ def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
         _front(axis, fronts[scene], most)
         axis.set(xscale="log", yscale="log", ylim=(0.03 * LEAST, 10.0))  # the band is seen
         axis.set_title(f"{scene}\n{fronts[scene].of(most)} of {len(fronts[scene].owners)} runs")
-        axis.tick_params(which="minor", length=0)
     axes[0].plot([], [], **(OTHERS | {"lw": 0.8, "alpha": 0.8}), label=OFF)
     figure.supylabel("largest axis error (rad)", fontsize=8.0)
     few_ticks(*axes, most=4)
+    axes[0].minorticks_off()  # all panels share their axes
     legend_below(figure, axes)
     said = f"The front: runs that no other beats in both {BEATEN[cost]} and error, of all compiled methods on a scene. "
     if cost == "seconds":

@@ -23,7 +23,7 @@ def opening(data: xr.Dataset) -> Opening:
     It is, of the compiled rows that meet the target on the most scenes, the one that is closest to the fastest.
     """
     rows, sentences = [], []
-    data = data[[name for name in USED if name in data]]
+    whole, data = data, data[[name for name in USED if name in data]]
     compiled = of_implementation(data, "compiled")
     names = [name for name in ranking.ranked(data) if name in compiled]
     ahead: Counter[str] = Counter()
@@ -54,7 +54,7 @@ def opening(data: xr.Dataset) -> Opening:
         )
     steps = energy.at_equal_steps(data, COMPARED[:2], str(data["scene"].values[0]))
     sentences += [
-        *filter(None, [*(energy.sentence(data, chart) for chart in ("axis",)), steps]),
+        *filter(None, [*(energy.sentence(whole, chart) for chart in ("axis",)), steps]),
         "For your own scene and accuracy: symtop recommend SCENE --accuracy 1e-6; it also runs what it recommends.",
     ]
     header = ["horizon", "axis error (rad)", "begin with", "meets it on", "time over the fastest", "then"]

@@ -51,7 +51,8 @@ def table(data: xr.Dataset) -> Table:
     for name in names:
         best = [problem for problem, won in wins.items() if won.best.integrator == name]
         mine = costs.sel(integrator=name)
-        near = {problem for problem in wins if float(mine.sel(target=problem[2])[place(*problem[:2])]) <= WITHIN}
+        behind = {float(target): mine.sel(target=target).values for target in costs["target"].values}
+        near = {problem for problem in wins if behind[problem[2]][place(*problem[:2])] <= WITHIN}
         level = [problem for problem, won in wins.items() if name in won.level and problem in near]
         ratios = mine.values
         met = ratios[np.isfinite(ratios)]

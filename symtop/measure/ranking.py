@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from symtop.base.remembered import of_one_dataset
 from symtop.measure.timing import MISSED, met_again
 from symtop.measure.work import TARGETS
 
@@ -139,6 +140,7 @@ def win(cell: xr.Dataset, target: float, implementation: str = "compiled") -> Wi
     return Win(best, level, behind, ratio)
 
 
+@of_one_dataset
 def winners(data: xr.Dataset) -> dict[tuple[str, int, float], Win | None]:
     """The compiled winners in axis error of every scene, horizon (by index) and target that is asked there."""
     data = data[["axis", *NEEDS]]

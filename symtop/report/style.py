@@ -8,17 +8,22 @@ of print, 6.5 inches, and its text is at least 7 points high there.
 import textwrap
 import zlib
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 
 from symtop.base import datasets
+from symtop.report import embedded
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 WIDTH = 6.5  # inches, of a figure: the text block of a page
 LEAST_TEXT = 7.0  # points, of any text at that width
 DPI, SKETCHED = 200, 100
+LEVEL = 7  # of the compression of a picture: 12 ms, where 9 takes 75 for 7 % less bytes
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
@@ -184,8 +189,8 @@ def use() -> None:
     )
 
 
-def compact(path: str | Path) -> None:
-    """Rewrite a PNG with 256 colours, a third of the bytes: ours exactly as they are, the rest as the picture needs.
+def compact(picture: "Image.Image") -> "Image.Image":
+    """A picture with 256 colours, a third of the bytes: ours exactly as they are, the rest as the picture needs.
 
     A palette made from the picture alone would merge the colour of a few small markers with a neighbour's.
     """
@@ -194,22 +199,25 @@ def compact(path: str | Path) -> None:
 
     shades = [shade for family in _SHADES.values() for shade in family]
     ours = dict.fromkeys([*shades, *(look.color for look in _LOOKS.values()), *OUTCOME_COLORS.values(), "#FFFFFF"])
-    fixed = [value for color in ours for value in getrgb(color)]
-    with Image.open(path) as image:
-        picture = image.convert("RGB")
+    fixed = np.array([getrgb(color) for color in ours], np.uint8)
+    picture = picture.convert("RGB")
     free = picture.quantize(256 - len(ours)).getpalette() or []
     palette = Image.new("P", (1, 1))
-    palette.putpalette((fixed + free)[:768])
+    palette.putpalette([*fixed.ravel().tolist(), *free][:768])
     drawn = picture.quantize(palette=palette, dither=Image.Dither.NONE)
-    seen = np.asarray(picture) @ np.array([1, 256, 65536])  # a colour as one number
-    known = np.reshape(fixed, (-1, 3)) @ np.array([1, 256, 65536])
+    seen, known = _as_numbers(picture), _as_numbers(Image.fromarray(fixed[np.newaxis])).ravel()
     order = np.argsort(known)
     nearest = order[np.minimum(np.searchsorted(known, seen, sorter=order), len(known) - 1)]
     places = np.where(
         known[nearest] == seen, nearest, np.asarray(drawn)
     )  # the library's search for the nearest is a little coarse
     drawn.frombytes(places.astype(np.uint8).tobytes())
-    drawn.save(path, optimize=True)
+    return drawn
+
+
+def _as_numbers(picture: "Image.Image") -> Any:
+    """Every colour of a picture as one number."""
+    return np.asarray(picture.convert("RGBA")).view(np.uint32)[..., 0]
 
 
 def save(figure: Any, target: Path) -> None:
@@ -236,9 +244,29 @@ def publish(figure: Any, target: Path) -> None:
 def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
     datasets.sweep(target)
     with datasets.replacing(target, target.suffix) as partial:
-        figure.savefig(partial, metadata={UNDATED.get(target.suffix, "Software"): None}, dpi=dpi)
-        if target.suffix == ".png" and dpi == DPI:
-            compact(partial)
+        _written(figure, partial, dpi)
+
+
+def _written(figure: Any, path: Path, dpi: float) -> None:
+    """A figure in a file of its kind; ``savefig`` draws a PNG or a PDF twice, once to lay it out."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+    from PIL import Image
+
+    metadata = {UNDATED.get(path.suffix, "Software"): None}
+    if path.suffix not in {".png", ".pdf"}:
+        figure.savefig(path, metadata=metadata, dpi=dpi)
+        return
+    figure.set_dpi(dpi)
+    if path.suffix == ".pdf":
+        with embedded.letters_alone():
+            FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
+    elif dpi == DPI:
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        compact(Image.fromarray(np.asarray(canvas.buffer_rgba()))).save(path, compress_level=LEVEL)
+    else:
+        FigureCanvasAgg(figure).print_png(path, metadata=metadata)
 
 
 def least_text(figure: Any) -> tuple[float, str]:

@@ -1,0 +1,66 @@
+"""How a figure is written: drawn once for each file, as savefig draws it, and with the letters of its fonts alone."""
+
+import numpy as np
+import pytest
+from fontTools import subset
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont
+from PIL import Image
+
+from symtop.report import embedded, style
+
+
+def drawn() -> Figure:
+    """A figure with a layout, a legend, a shared axis and a formula."""
+    figure, axes = style.panels(2, 2, sharex=True)
+    for k, axis in enumerate(axes.flat):
+        axis.loglog([1.0, 10.0, 100.0], [1e-3, 1e-5, 10.0 ** -(k + 6)], **style.line("rk4"), label=rf"$x^{k}$")
+        axis.set(title=f"panel {k}", ylabel="error")
+    style.few_ticks(*axes.flat)
+    style.legend_below(figure, axes)
+    style.headline(figure, "A message above all panels that is long enough for a second line of letters " * 2)
+    return figure
+
+
+def pixels(path, mode: str) -> np.ndarray:
+    with Image.open(path) as picture:
+        return np.asarray(picture.convert(mode))
+
+
+def test_a_sketch_has_the_pixels_of_savefig(tmp_path):
+    style.sketch(drawn(), tmp_path / "a.png")
+    drawn().savefig(tmp_path / "b.png", dpi=style.SKETCHED)
+    assert np.array_equal(pixels(tmp_path / "a.png", "RGBA"), pixels(tmp_path / "b.png", "RGBA"))
+
+
+def test_a_published_picture_has_the_pixels_of_savefig_in_fewer_colours(tmp_path):
+    style.publish(drawn(), tmp_path / "a.png")
+    drawn().savefig(tmp_path / "b.png", dpi=style.DPI)
+    with Image.open(tmp_path / "b.png") as whole:
+        assert np.array_equal(pixels(tmp_path / "a.png", "RGB"), np.asarray(style.compact(whole).convert("RGB")))
+
+
+@pytest.mark.parametrize(("write", "files"), [(style.sketch, 1), (style.save, 1), (style.publish, 2)])
+def test_a_figure_is_drawn_once_a_file(tmp_path, monkeypatch, write, files):
+    figure, times = drawn(), []
+    draw = Figure.draw
+    monkeypatch.setattr(Figure, "draw", lambda *args: (times.append(1), draw(*args))[1])
+    write(figure, tmp_path / "a.png")
+    assert len(times) == files == len(list(tmp_path.iterdir()))
+
+
+def tables() -> set[str]:
+    with subset.load_font(findfont(FontProperties(family="DejaVu Sans")), subset.Options()) as font:
+        return set(font.keys())
+
+
+def test_fonts_of_a_vector_figure_have_no_layout_tables(tmp_path, monkeypatch):
+    whole = tables()
+    assert {"GSUB", "GPOS"} < whole
+    with embedded.letters_alone():
+        assert tables() == whole - set(embedded.LAYOUT)
+    assert tables() == whole
+    loaded, load = [], subset.load_font
+    monkeypatch.setattr(subset, "load_font", lambda *args, **options: (loaded.append(1), load(*args, **options))[1])
+    style.publish(drawn(), tmp_path / "a.png")
+    assert loaded  # matplotlib asks here for its fonts: if it did not, they would be whole
