@@ -135,11 +135,16 @@ def figure_file(option: str, file: str | None) -> None:
 
 
 def standing(option: str, file: str | None) -> None:
-    """Refuse a file whose folder is not there or not to be written to: a result should have a place before a run."""
+    """Refuse a folder, and a file whose folder is not there or not to be written to.
+
+    A result should have a place before a run.
+    """
     if file is None:
         return
     if not (file and Path(file).absolute().parent.is_dir()):
         raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
+    if place(option, file).is_dir():
+        raise SymtopError(f"{option} must be a file, not the folder {file!r}")
     try:
         with tempfile.TemporaryFile(dir=place(option, file).absolute().parent):
             pass

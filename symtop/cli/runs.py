@@ -112,7 +112,6 @@ def long(
     standing("--output", output)
     standing("--checkpoint", checkpoint)
     with ticking("loading"):
-        from symtop.base import datasets
         from symtop.base.validate import whole
         from symtop.model import scenes
         from symtop.run.long_run import PER_NUTATION, long_run
@@ -120,7 +119,7 @@ def long(
     h = scenes.scene(scene).nutation_period / PER_NUTATION if step_size is None else step_size
     count = whole("steps", steps, 1)
     try:
-        data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True)
+        data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True, output=output)
     except KeyboardInterrupt:
         warn("interrupted; the steps that were run are kept, and the same command resumes after them")
         sys.exit(130)
@@ -137,7 +136,6 @@ def long(
         ]  # fmt: skip
         click.echo(table(["change since the start", "least", "largest", "last window's mean"], rows))
     if output is not None:
-        datasets.write(data, output)
         click.echo(f"written to {output}")
     if data.attrs["outcome"] != "ok":
         sys.exit(3)

@@ -96,8 +96,8 @@ def sweep(
     asked = [_cell(one, method, given, horizon, observe) for one in chosen for method in methods]
     file = None if path is None else place("path", path)
     stored = {} if file is None else _stored(file)
-    names = [(cell.scene.name, cell.method.name) for cell in asked]
-    if others := [f"{name} on {of}" for of, name in stored if (of, name) not in names]:
+    pairs = [(cell.scene.name, cell.method.name) for cell in asked]
+    if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:
         raise SymtopError(
             f"path {str(file)!r} holds what was not asked for, {_few(others)}: ask for these as well, or name another "
             "path"
@@ -133,7 +133,7 @@ def sweep(
                 datasets.write(combined(), file)
             raise
     data = combined()
-    if file is not None and (rest or names != [*stored]):  # in another order, the file would not be what is returned
+    if file is not None and (rest or pairs != [*stored]):  # in another order, the file would not be what is returned
         datasets.write(data, file)
     return data
 
