@@ -1,11 +1,10 @@
 """``symtop run``, ``long`` and ``claims``: one integrator on one scene, compared with the truth."""
 
-import json
 import sys
 
 import click
 
-from symtop.cli.common import figure_file, json_option, plugin_option, say, standing, table, warn
+from symtop.cli.common import as_text, figure_file, json_option, plugin_option, say, standing, table, warn
 from symtop.cli.completion import completing
 
 
@@ -72,7 +71,7 @@ def run(
     if as_json:
         names = ("outcome", "outcome_message", "reached_time", "steps", "force_evaluations")
         findings = {**{name: data.attrs[name] for name in names}, "judgement": verdict._asdict(), "errors": largest}
-        click.echo(json.dumps(findings, indent=1))
+        click.echo(as_text(findings))
     else:
         told = data.attrs
         say(f"{told['integrator']}[{told['chart']}] on {chosen.name}: {told['outcome_message']}")
@@ -176,6 +175,6 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
         else:
             say("\n".join(ledger.sentences()))
     if as_json:
-        click.echo(json.dumps(entries, indent=1))
+        click.echo(as_text(entries))
     if refuted:
         sys.exit(1)
