@@ -38,13 +38,8 @@ from symtop.runner.study import Case, Combined, Study
 SEED = 0  # of the order in which batches are timed; nothing else here is random
 
 
-def case_path(results: Path, study: Study, case: Case) -> Path:
-    """The file of a case; its name holds the digest of everything the numbers depend on."""
-    return case_paths(results, study, [case])[0]
-
-
 def case_paths(results: Path, study: Study, cases: Sequence[Case]) -> list[Path]:
-    """The files of many cases."""
+    """The files of cases; their names hold the digest of everything the numbers depend on."""
     folder = results / "cases" / study.name
     keys = [depends.settings_key(study, case)[:8] for case in cases]
     made_of = depends.digests(study, cases)
