@@ -120,17 +120,17 @@ def recommend(
 ) -> Advice:  # fmt: skip
     """The cheapest integrator, with its step or tolerance, that keeps the error of `quantity` below `accuracy`.
 
-    `accuracy` is the largest absolute error of `quantity` over the run: radians for ``axis``, ``attitude`` and
-    ``theta``, the units of the scene for others. `horizon` is the scene's own by default. `results` is a folder with a
-    stored ``work_precision.nc``, and ``population.nc`` if it is there; without it every compiled method is tried.
-    Raises SymtopError for arguments that are out of range. It runs what it recommends, which takes from 0.1 s to half
-    a minute.
+    `accuracy` is the largest error of `quantity` over the run: radians for ``axis``, ``attitude`` and ``theta``, and
+    relative for others, energy and momenta by the scales of `symtop.errors`. `horizon` is the scene's own by default.
+    `results` is a folder with a stored ``work_precision.nc``, and ``population.nc`` if it is there; without it every
+    compiled method is tried. Raises SymtopError for arguments that are out of range. It runs what it recommends, which
+    takes from 0.1 s to half a minute.
     """
     scene = scenes.scene(scene)
     accuracy = positive("accuracy", accuracy)
-    if accuracy >= math.pi:
-        raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}")
     one_of("quantity", quantity, KNOWN_QUANTITIES)
+    if quantity in settings.ANGLES and accuracy >= math.pi:
+        raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}")
     horizon = scene.horizon if horizon is None else horizon_of(horizon)
     data = None if results is None else _stored(Path(results) / STORED_STUDY)
     limit = settings.judgeable(scene, quantity, horizon)
@@ -275,15 +275,17 @@ def _try(question: _Question, method: Integrator, guess: float | None, patience:
 def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
     """The trial run to the whole horizon with its setting corrected, or the reason why it fails there.
 
-    A trial that would need too many evaluations is returned as it is.
+    A trial that would need too many evaluations is not run so far; its setting is rounded all the same.
     """
     scene, accuracy, quantity, horizon = question
     short = trial.met
     if short.evaluations * horizon / short.horizon > settings.MOST_EVALUATIONS[short.integrator.implementation]:
-        return trial
-    met = settings.search(scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting)
-    if isinstance(met, str):
-        return f"Good enough over a short run but not to the end ({met[0].lower()}{met[1:]})"
+        met = settings.rounded(scene, short, accuracy * short.error / (trial.error or 1.0), quantity)
+        return trial._replace(met=met, error=trial.error * met.error / (short.error or 1.0))
+    best = settings.search(scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting)
+    if isinstance(best, str):
+        return f"Good enough over a short run but not to the end ({best[0].lower()}{best[1:]})"
+    met = settings.rounded(scene, best, MARGIN * accuracy, quantity)
     confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
     return _Trial(met, met.error, settings.seconds(scene, met, quantity, horizon), confidence)
 
@@ -303,11 +305,10 @@ def _advice(
     best = ranked[0]
     worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
-    step = best.met.integrator.fixed_step
+    step, tolerance = (best.met.setting, None) if best.met.integrator.fixed_step else (None, best.met.setting)
     return Advice(
-        scene.name, quantity, accuracy, horizon, best.met.integrator.name, best.met.setting if step else None,
-        None if step else best.met.setting, best.error, best.seconds, best.confidence,
-        reason=f"{best.words()} meets {goal}: {worth}; {source}.", runner_up="".join(runners),
+        scene.name, quantity, accuracy, horizon, best.met.integrator.name, step, tolerance, best.error, best.seconds,
+        best.confidence, f"{best.words()} meets {goal}: {worth}; {source}.", runner_up="".join(runners),
         closed_form=_without_steps(question, best.seconds), nearest=_on_nearest(near, best.met.integrator.name),
         fails=fails, **_lines(question, best.met),
     )  # fmt: skip
@@ -316,10 +317,10 @@ def _advice(
 def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
     """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
     scene, _, _, horizon = question
-    value, name = float(f"{met.setting:.5g}"), met.integrator.name
-    known, whole = scenes.scenes().get(scene.name) == scene, horizon == scene.horizon
+    value, name, whole = float(met.setting), met.integrator.name, horizon == scene.horizon
+    known = scenes.scenes().get(scene.name) == scene
     shown, control = f'"{name}"' if "[" in name else name, str(met.integrator.control)
-    until = "" if whole else f" --horizon {horizon:g}"
+    until = "" if whole else f" --horizon {horizon!r}"
     command = f"symtop run {scene.name} {shown} --{control.replace('_', '-')} {value!r}{until}"
     of, until = f'"{scene.name}"' if known else "scene", "" if whole else f", horizon={horizon!r}"
     python = f'symtop.simulate({of}, "{name}", {control}={value!r}{until})'

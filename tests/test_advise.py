@@ -85,6 +85,43 @@ def test_a_search_says_why_it_found_nothing(name, accuracy, patience, why):
     assert missed == why
 
 
+def test_an_accuracy_beyond_pi_is_one_of_what_is_no_angle(monkeypatch):
+    few(monkeypatch, 1)
+    advice = symtop.recommend("spheroid", accuracy=5.0, quantity="energy", horizon=20.0)
+    assert advice.integrator == "strang"
+    assert advice.expected_error < 5.0
+    for quantity in settings.ANGLES:
+        with pytest.raises(symtop.SymtopError, match="accuracy must be below pi"):
+            symtop.recommend("spheroid", accuracy=5.0, quantity=quantity, horizon=20.0)
+
+
+@pytest.mark.parametrize("horizon", [20.0, 12.3456789])
+def test_the_advised_lines_are_the_run_that_was_checked(horizon, monkeypatch):
+    """The same step and horizon to the last digit in the command, in Python and in the run whose error is told."""
+    few(monkeypatch, 1)
+    ran, real = [], settings.attempt
+    monkeypatch.setattr(settings, "attempt", lambda *given: ran.append(given) or real(*given))
+    advice = symtop.recommend("spheroid", accuracy=1e-3, horizon=horizon)
+    assert advice.confidence == "checked"
+    assert float(f"{advice.step_size:.5g}") == advice.step_size
+    _, words = advice.command.split(" strang ")
+    given = dict(zip((parts := words.split())[::2], map(float, parts[1::2]), strict=True))
+    assert given == {"--step-size": advice.step_size, "--horizon": horizon}
+    assert advice.python.endswith(f"step_size={advice.step_size!r}, horizon={horizon!r})")
+    error = {call[2]: real(*call).error for call in ran if call[3] == horizon}
+    assert error[advice.step_size] == advice.expected_error
+
+
+def test_a_rounded_setting_that_misses_the_accuracy_is_not_advised(monkeypatch):
+    scene, method = symtop.scene("spheroid"), symtop.integrator("strang")
+    met = settings.attempt(scene, method, 0.0123456789, 8.0, "axis")
+    assert settings.rounded(scene, met, 1.0, "axis").setting == 0.012345
+    assert settings.rounded(scene, met, 1e-12, "axis") is met
+    short = settings.attempt(scene, method, 0.01, 8.0, "axis")
+    monkeypatch.setattr(settings, "attempt", lambda *_: pytest.fail("it runs what it knows"))
+    assert settings.rounded(scene, short, 1.0, "axis") is short
+
+
 def few(monkeypatch, count):
     """Only the first of some cheap methods are candidates."""
     names = ("strang", "takahashi-imada", "srkn-6-4", "kahan-li-6", "gauss-6")[:count]

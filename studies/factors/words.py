@@ -44,7 +44,6 @@ EFFECTS = ["factor", "from", "to", "pairs", "times faster, median", "least", "mo
 SCIPY = ["scene", "nutations", "axis error", "SciPy", "solve_ivp", "simulate", "times", "SciPy", "its kernel",
          "own kernel", "times"]  # fmt: skip
 CHARTS_BESIDE = ("attitude", "angles")
-CHARTS_SHOWN = ("angles", "axis", "attitude")
 CHARTS = ["scene", "nutations", "axis error", "method", "angles", "axis", "attitude", "angles/axis", "attitude/axis"]
 FACTORIAL = [
     "scene", "nutations", "axis error", "method", "run", "language", "error reached", "force evaluations", "kernel",

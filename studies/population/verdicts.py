@@ -175,15 +175,14 @@ class Health(NamedTuple):
         return float(self.silent.sum() / self.wrong.sum()) if self.wrong.sum() else np.nan
 
 
-def health(data: xr.DataTree, name: str, horizon: str = "short", stratum: str = ALL) -> Health:
+def health(data: xr.DataTree, name: str, horizon: str = "short") -> Health:
     """Runs, wrong runs and silent failures of a row at the settings at which (nearly) all members were judged."""
     asked = data[horizon].to_dataset()[["runs", "wrong", "silent", "setting", "control"]]
     group = asked.isel(scene=0).sel(integrator=name)
     count = float(data["tops"]["known"].values.ravel()[: members(data, horizon)].sum())
     judged = group["runs"].transpose("level", "stratum").values
     there = judged.sum(axis=1) >= WHOLE * count
-    chosen = slice(None) if stratum == ALL else [strata(data).index(stratum)]
-    numbers = (group[key].transpose("level", "stratum").values[there][:, chosen] for key in ("runs", "wrong", "silent"))
+    numbers = (group[key].transpose("level", "stratum").values[there] for key in ("runs", "wrong", "silent"))
     fixed = str(group["control"].values) == "step_size"
     return Health(fixed, group["setting"].values[there], *(part.sum(axis=1) for part in numbers))
 

@@ -99,17 +99,17 @@ def quantity_sentence(data: xr.DataTree, quantity: str) -> str:
     )
 
 
-def strata_sentence(data: xr.DataTree, horizon: str = "short") -> str:
+def strata_sentence(data: xr.DataTree) -> str:
     """How many rows win somewhere, and the strata whose winner is another than that of all tops."""
     owners: Counter[str] = Counter()
     others: dict[tuple[str, str], list[str]] = {}
     for target in verdicts.targets(data):
-        taken, first = verdicts.best(data, Cell(horizon, "axis", target), UNIT)
+        taken, first = verdicts.best(data, Cell("short", "axis", target), UNIT)
         if first is None:
             continue
         overall = taken.names[first.row]
         for stratum in verdicts.strata(data):
-            part, won = verdicts.best(data, Cell(horizon, "axis", target, stratum), UNIT)
+            part, won = verdicts.best(data, Cell("short", "axis", target, stratum), UNIT)
             if won is not None:
                 owners[part.names[won.row]] += 1
                 if won.sure and part.names[won.row] != overall:
@@ -124,7 +124,7 @@ def strata_sentence(data: xr.DataTree, horizon: str = "short") -> str:
     )
     return (
         f"{len(owners)} rows win the {total} pairs of a kind of top and an axis error over "
-        f"{verdicts.nutations(data, horizon):g} nutations: {most}. {differ}"
+        f"{verdicts.nutations(data, 'short'):g} nutations: {most}. {differ}"
     )
 
 

@@ -34,6 +34,7 @@ from symtop.run.linear_stability import trace, with_momenta
 RUNS_AWAY = 4.0  # times the displacement; an island that a resonance has bent is at most three times as long as wide
 LOST = 0.1  # rad, axis error at which a run next to the separatrix has lost its accuracy
 LONGEST = 80.0  # 1/g, of a run next to the separatrix
+MOST, HALVINGS = 0.3, 4  # rad, the largest displacement tried; how often the gap above the last that survives is halved
 SEEN = 6.0  # 1/g, the time at which its early error is read
 
 
@@ -71,15 +72,14 @@ def survives(
 
 
 def surviving_displacements(
-    method: Integrator, scene: Scene, h: Sequence[float], steps: int, least: float = 1e-4, most: float = 0.3,
-    rounds: int = 4,
-) -> Array:  # fmt: skip
+    method: Integrator, scene: Scene, h: Sequence[float], steps: int, least: float = 1e-4
+) -> Array:
     """For each step h the largest displacement, rad, up to which all that are tried survive; 0 if not even `least`.
 
     It is measured from the fixed point of the method, which for a splitting is O(h^2) away from the true one. Where the
     method has none that four steps can find, nothing survives; where h is NaN there is nothing to measure.
     """
-    step, tried = np.asarray(h, float), np.geomspace(least, most, 12)
+    step, tried = np.asarray(h, float), np.geomspace(least, MOST, 12)
     centre = np.array([trace(method, scene, one).theta if math.isfinite(one) else math.nan for one in step.tolist()])
     there = np.flatnonzero(np.isfinite(centre))
     good, bad = np.where(np.isfinite(step), 0.0, math.nan), np.full(step.shape, math.nan)
@@ -89,7 +89,7 @@ def surviving_displacements(
         good[there] = np.where(first > 0, tried[np.maximum(first - 1, 0)], 0.0)
         bad[there] = np.append(tried, math.nan)[first]
     sought = np.flatnonzero((good > 0.0) & np.isfinite(bad))
-    for _ in range(rounds if sought.size else 0):
+    for _ in range(HALVINGS if sought.size else 0):
         middle = np.sqrt(good[sought] * bad[sought])
         stays = survives(method, scene, centre[sought], middle, step[sought], steps)
         good[sought], bad[sought] = np.where(stays, middle, good[sought]), np.where(stays, bad[sought], middle)

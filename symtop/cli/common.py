@@ -1,6 +1,8 @@
 """What the commands share: options, plug-ins, files to write, errors without a traceback, text that fits."""
 
 import errno
+import json
+import math
 import re
 import shutil
 import sys
@@ -13,7 +15,7 @@ from typing import Any, TextIO
 import click
 
 from symtop.base import cache
-from symtop.base.signals import told_apart
+from symtop.base.signals import INTERRUPTED, told_apart
 from symtop.base.validate import SymtopError, place
 
 LONGEST_NAME = 80  # characters of a file that are told
@@ -43,7 +45,7 @@ results_option = click.option(
 
 
 class Group(click.Group):
-    """Prints a SymtopError, or a file that cannot be used, as one sentence and exits with code 2.
+    """Prints a SymtopError, or a file that cannot be used, as one sentence and exits with code 2; 130 after Ctrl-C.
 
     Arguments are named as the options are.
     """
@@ -54,8 +56,11 @@ class Group(click.Group):
             with told_apart():
                 return super().invoke(ctx)
         except SymtopError as error:
-            warn(self._spoken(str(error)))
+            warn(self._spoken(str(error), self.commands.get(ctx.invoked_subcommand or "")))
             ctx.exit(2)
+        except KeyboardInterrupt:  # click's own answer is "Aborted!" and 1, which means that a case has failed
+            warn("interrupted")
+            ctx.exit(INTERRUPTED)
         except OSError as error:
             if error.errno in (errno.ENOSPC, errno.EDQUOT) and error.filename is None:
                 warn(f"cannot write what there is to say: {error.strerror}")
@@ -66,21 +71,23 @@ class Group(click.Group):
             warn(f"cannot use {name[:LONGEST_NAME]}{'...' if name[LONGEST_NAME:] else ''}: {error.strerror}")
             ctx.exit(2)
 
-    def _spoken(self, sentence: str) -> str:
+    def _spoken(self, sentence: str, command: click.Command | None) -> str:
         """A sentence about arguments as one about options, which ends with the command that lists what there is."""
         parameters = [option for command in self.commands.values() for option in command.params]
         options = {
             str(option.name): max(option.opts, key=len) for option in parameters if isinstance(option, click.Option)
         }
         sentence = re.sub(r"(?<![\w'-])(step_size|per_nutation)(?![\w'])", lambda m: options[m[1]], sentence)
-        argued = rf"(?<![\w'-])((?:give|or|not|see) |^)({'|'.join(options)})(?= must|\)|,| = |$)"
+        argued = rf"(?<![\w'-])((?:give|or|not|see) |^)({'|'.join(options)})(?= must|\)|,| = | or |$)"
         sentence = re.sub(argued, lambda match: match[1] + options[match[2]], sentence)
         unknown = re.match(r"(scene|integrator) '(.*)' is unknown; (did you mean )?", sentence)
         if unknown is None:
             return sentence
         kind, name, near = unknown.groups()
         if _is_of_the_other_kind(kind, name):
-            return f"{kind} {name!r} is unknown; it is the name of {OTHER[kind]}, and the scene comes first"
+            taken = {part.name for part in command.params if isinstance(part, click.Argument)} if command else set()
+            order = ", and the scene comes first" if taken >= {*OTHER} else ""
+            return f"{kind} {name!r} is unknown; it is the name of {OTHER[kind]}{order}"
         return f"{sentence} (symtop {kind}s lists all)" if near else sentence
 
 
@@ -111,6 +118,19 @@ def warn(sentence: str) -> None:
     click.echo(clear + fitted(f"symtop: {sentence}", sys.stderr), err=True)
 
 
+def as_text(content: Any) -> str:
+    """JSON of anything; a number that is not finite, of which JSON knows none, is null."""
+    return json.dumps(_finite(content), indent=1, allow_nan=False)
+
+
+def _finite(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {name: _finite(value) for name, value in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [_finite(value) for value in content]
+    return None if isinstance(content, float) and not math.isfinite(content) else content
+
+
 def say(sentence: str) -> None:
     """Print a sentence to the standard output."""
     click.echo(fitted(sentence, sys.stdout))
@@ -135,11 +155,16 @@ def figure_file(option: str, file: str | None) -> None:
 
 
 def standing(option: str, file: str | None) -> None:
-    """Refuse a file whose folder is not there or not to be written to: a result should have a place before a run."""
+    """Refuse a folder, and a file whose folder is not there or not to be written to.
+
+    A result should have a place before a run.
+    """
     if file is None:
         return
     if not (file and Path(file).absolute().parent.is_dir()):
         raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
+    if place(option, file).is_dir():
+        raise SymtopError(f"{option} must be a file, not the folder {file!r}")
     try:
         with tempfile.TemporaryFile(dir=place(option, file).absolute().parent):
             pass

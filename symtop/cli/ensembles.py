@@ -1,14 +1,13 @@
 """``symtop ensemble``: many random tops, one integrator."""
 
-import json
-import math
 import sys
 from collections import Counter
 from functools import partial
 
 import click
 
-from symtop.cli.common import figure_file, json_option, plugin_option, say, standing, table, warn
+from symtop.base.validate import whole
+from symtop.cli.common import as_text, figure_file, json_option, plugin_option, say, standing, table, warn
 from symtop.cli.completion import completing
 
 pairs = partial(zip, strict=True)
@@ -54,12 +53,13 @@ def ensemble(
 
     figure_file("--figure", figure)
     standing("--output", output)
+    count = whole("members", members, 1)  # which is n in Python
     with ticking("drawing tops"):
         from symtop.measure.spread import LEVELS, QUANTITIES, largest, member_errors, spread
         from symtop.run import ensemble as runs
         from symtop.run.population import population
 
-        tops = population(members, seed=seed, kind=kind)
+        tops = population(count, seed=seed, kind=kind)
     try:
         data = runs.ensemble(
             tops, integrator, step_size=step_size, per_nutation=per_nutation, tolerance=tolerance, horizon=horizon,
@@ -78,10 +78,8 @@ def ensemble(
         worst = {name: spread(largest(member_errors(few, shown, name))[:, None])[:, 0].tolist() for name in QUANTITIES}
     data.close()
     if as_json:
-        errors = {
-            name: {f"{q:g}": e if e < math.inf else None for q, e in pairs(LEVELS, worst[name])} for name in worst
-        }
-        click.echo(json.dumps({"outcomes": outcomes, "steps": steps, "largest_errors": errors}, indent=1))
+        errors = {name: {f"{q:g}": e for q, e in pairs(LEVELS, worst[name])} for name in worst}
+        click.echo(as_text({"outcomes": outcomes, "steps": steps, "largest_errors": errors}))
     else:
         said = ", ".join(f"{count} {OUTCOME.get(name, name)}" for name, count in outcomes.items())
         execution = data.attrs["execution"]

@@ -1,11 +1,10 @@
 """``symtop judge``: anybody's integrator against what it claims."""
 
-import json
 import sys
 
 import click
 
-from symtop.cli.common import json_option, plugin_option, standing, terminal_width
+from symtop.cli.common import as_text, json_option, plugin_option, standing, terminal_width
 from symtop.cli.completion import completing
 
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
@@ -72,7 +71,7 @@ def judge(
         adaptive=adaptive, quick=quick, tell=None if as_json else tell,
     )  # fmt: skip
     if as_json:
-        click.echo(json.dumps([finding.plain() for finding in ledger.findings], indent=1))
+        click.echo(as_text([finding.plain() for finding in ledger.findings]))
     else:
         click.echo(screen.ending(ledger.findings, ledger.implied))
     if output is not None:

@@ -1,7 +1,6 @@
 """``symtop integrators`` and ``symtop scenes``: the lists, and one entry in full."""
 
 import contextlib
-import json
 import math
 import textwrap
 from collections.abc import Callable
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from symtop.base.validate import SymtopError
-from symtop.cli.common import facts, json_option, plugin_option, table, terminal_width
+from symtop.cli.common import as_text, facts, json_option, plugin_option, table, terminal_width
 from symtop.cli.completion import completing
 from symtop.report import tables
 
@@ -27,7 +26,7 @@ def _show(records: list[Record], short: list[Record], chosen: Record | None, pag
           note: str, wide: bool, as_json: bool) -> None:  # fmt: skip
     """Print the chosen record as a page, or all of them as a table of the `short` ones; or all columns, or JSON."""
     if as_json:
-        click.echo(json.dumps(records if chosen is None else [chosen], indent=1))
+        click.echo(as_text(records if chosen is None else [chosen]))
     elif wide:
         click.echo(table(*tables.columns(records)))
     elif chosen is not None:

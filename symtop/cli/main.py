@@ -1,7 +1,7 @@
 """The command line: ``symtop integrators | scenes | run | long | ensemble | study | judge | report | ...``.
 
 Exit codes: 0 fine; 1 a case or a check failed; 2 bad input, or a place that cannot be written; 3 a run ended early by
-its outcome (its dataset was written); 130 and 143 a study was interrupted or terminated (what was computed is kept).
+its outcome (its dataset was written); 130 and 143 it was interrupted or terminated (what a study had computed is kept).
 A command imports heavy packages inside its function, so that ``symtop --help`` takes a tenth of a second.
 """
 

@@ -1,11 +1,10 @@
 """``symtop run``, ``long`` and ``claims``: one integrator on one scene, compared with the truth."""
 
-import json
 import sys
 
 import click
 
-from symtop.cli.common import figure_file, json_option, plugin_option, say, standing, table, warn
+from symtop.cli.common import as_text, figure_file, json_option, plugin_option, say, standing, table, warn
 from symtop.cli.completion import completing
 
 
@@ -72,7 +71,7 @@ def run(
     if as_json:
         names = ("outcome", "outcome_message", "reached_time", "steps", "force_evaluations")
         findings = {**{name: data.attrs[name] for name in names}, "judgement": verdict._asdict(), "errors": largest}
-        click.echo(json.dumps(findings, indent=1))
+        click.echo(as_text(findings))
     else:
         told = data.attrs
         say(f"{told['integrator']}[{told['chart']}] on {chosen.name}: {told['outcome_message']}")
@@ -112,7 +111,6 @@ def long(
     standing("--output", output)
     standing("--checkpoint", checkpoint)
     with ticking("loading"):
-        from symtop.base import datasets
         from symtop.base.validate import whole
         from symtop.model import scenes
         from symtop.run.long_run import PER_NUTATION, long_run
@@ -120,7 +118,7 @@ def long(
     h = scenes.scene(scene).nutation_period / PER_NUTATION if step_size is None else step_size
     count = whole("steps", steps, 1)
     try:
-        data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True)
+        data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True, output=output)
     except KeyboardInterrupt:
         warn("interrupted; the steps that were run are kept, and the same command resumes after them")
         sys.exit(130)
@@ -137,7 +135,6 @@ def long(
         ]  # fmt: skip
         click.echo(table(["change since the start", "least", "largest", "last window's mean"], rows))
     if output is not None:
-        datasets.write(data, output)
         click.echo(f"written to {output}")
     if data.attrs["outcome"] != "ok":
         sys.exit(3)
@@ -178,6 +175,6 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
         else:
             say("\n".join(ledger.sentences()))
     if as_json:
-        click.echo(json.dumps(entries, indent=1))
+        click.echo(as_text(entries))
     if refuted:
         sys.exit(1)

@@ -1,6 +1,5 @@
 """The command ``symtop study``: run several studies, show their status, or check them; ends with an exit code."""
 
-import json
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -11,7 +10,7 @@ import click
 from symtop.base.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
 from symtop.base.validate import SymtopError
 from symtop.cli import told
-from symtop.cli.common import warn
+from symtop.cli.common import as_text, warn
 from symtop.methods.registry import integrator
 from symtop.runner import check, run, scripts, settled, status, store
 from symtop.runner.pools import Workers
@@ -94,7 +93,7 @@ def show_status(studies: list[Study], results: Path, why: bool, as_json: bool, *
     """Show the state of every case, and with `why` the reason; 1 if some have failed."""
     states = {study.name: status.status(study, results, why=why, **grid) for study in studies}
     if as_json:
-        click.echo(json.dumps(states, indent=1))
+        click.echo(as_text(states))
     for name, rows in {} if as_json else states.items():
         counts = Counter(row["state"] for row in rows)
         click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in status.STATES if counts[state]))
@@ -143,7 +142,7 @@ def check_all(
         names = ", ".join(study.name for study in studies)
         raise SymtopError(f"no case of {names} is up to date in {results}; run it first")
     if as_json:
-        click.echo(json.dumps([entry._asdict() for entry in checks], indent=1))
+        click.echo(as_text([entry._asdict() for entry in checks]))
     for entry in [] if as_json else checks:
         click.echo(f"{entry.study}: {entry.compared} of {entry.stored} cases computed again, {entry.verdict()}")
         for difference in entry.differences:

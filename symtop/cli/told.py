@@ -1,6 +1,5 @@
 """What ``symtop study`` says of studies that were run, or of studies with which there was nothing to do."""
 
-import json
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import Any
 
 import click
 
-from symtop.cli.common import terminal_width
+from symtop.cli.common import as_text, terminal_width
 from symtop.report.sentences import counted
 
 MOST_TOLD = 3  # sentences of a study that has run
@@ -30,7 +29,7 @@ def study(findings: dict[str, Any], results: Path, *, as_json: bool) -> dict[str
 def end(summaries: Sequence[dict[str, Any]], results: Path, *, as_json: bool) -> None:
     """Say what to do next, or all summaries as JSON."""
     if as_json:
-        click.echo(json.dumps(summaries, indent=1))
+        click.echo(as_text(summaries))
     elif summaries:
         click.echo(f"next: symtop report --results {results}, one page of all findings")
 

@@ -1,18 +1,18 @@
 """``symtop recommend``, ``doctor`` and ``explore``."""
 
-import json
 import sys
 from pathlib import Path
 
 import click
 
-from symtop.cli.common import json_option, plugin_option, results_option, say
+from symtop.base.validate import SymtopError
+from symtop.cli.common import as_text, json_option, plugin_option, results_option, say
 from symtop.cli.completion import completing
 
 
 @click.command(short_help="Find the cheapest integrator for an accuracy.")
 @click.argument("scene", shell_complete=completing("scenes"))
-@click.option("--accuracy", type=float, help="The largest error you accept, for example 1e-6.")
+@click.option("--accuracy", type=float, help="The largest error you accept, for example 1e-6; rad of an angle.")
 @click.option("--i-use", "engine", help="A physics engine, for example mujoco: what its settings make of the scene.")
 @click.option("--step-size", type=float, help="Of the engine; 1/240 by default.")
 @click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
@@ -41,20 +41,20 @@ def recommend(
     with ticking("loading"):
         from symtop import advise
     if (accuracy is None) is (engine is None):
-        raise click.UsageError("say either --accuracy or --i-use")
+        raise SymtopError("recommend takes one of --accuracy, for example 1e-6, and --i-use")
     if engine is not None:
         from symtop.cli.engine_advice import STEP, i_use
 
         said = i_use(engine, scene, step_size=STEP if step_size is None else step_size, horizon=horizon)
-        click.echo(json.dumps(dataclasses.asdict(said), indent=1) if as_json else str(said))
+        click.echo(as_text(dataclasses.asdict(said)) if as_json else str(said))
         return
     if step_size is not None:
-        raise click.UsageError("--step-size belongs to --i-use; with --accuracy the step is what is found")
+        raise SymtopError("--step-size belongs to --i-use; with --accuracy the step is what is found")
     if results is None and (Path("results") / advise.STORED_STUDY).is_file():
         results = "results"
     with ticking("trying methods"):
         advice = advise.recommend(scene, accuracy=accuracy or 0.0, quantity=quantity, horizon=horizon, results=results)
-    click.echo(json.dumps(dataclasses.asdict(advice), indent=1)) if as_json else say(str(advice))
+    click.echo(as_text(dataclasses.asdict(advice))) if as_json else say(str(advice))
     if advice.integrator is None:
         sys.exit(1)
 
@@ -81,7 +81,7 @@ def doctor(results: str, warm: bool, as_json: bool) -> None:
             click.echo(f"  not run: {why}", err=True)
     findings = checks.examine(Path(results))
     if as_json:
-        click.echo(json.dumps([finding._asdict() for finding in findings], indent=1))
+        click.echo(as_text([finding._asdict() for finding in findings]))
     else:
         click.echo(checks.page(findings))
     if not all(finding.healthy for finding in findings):

@@ -71,16 +71,15 @@ def judge(
     one_of("chart", chart, CHARTS)
     if energy not in ENERGY_ERRORS:
         raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {energy!r}")
-    if form is None and is_trajectory(target):
-        return _states(
-            target, find_scene(scene), conserves or (), energy, tell, {order, symplectic, symmetric, explicit}
-        )
     claims = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
     request = Request(
         target, form, chart, adaptive, find_scene(scene), quick,
         claims | {"conserves": conserves, "energy_error": energy},
     )  # fmt: skip
-    claimed(request)  # claims that make no sense are refused before anything is loaded
+    made = claimed(request)  # claims that make no sense are refused before anything is loaded
+    if form is None and is_trajectory(target):
+        others = {order, symplectic, symmetric, explicit}
+        return _states(target, request.scene, made.conserves or frozenset(), energy, tell, others)
     findings: list[Finding] = []
     traces: dict[str, Any] = {}
     about = None

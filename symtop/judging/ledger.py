@@ -5,11 +5,14 @@ why). `value` is the number that a verdict rests on, `resolution` the least that
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+
+from symtop.base.validate import SymtopError, shown
 
 CLAIMS = (
     "order", "symplectic", "symmetric", "energy", "p_phi", "p_psi", "axis_length", "reported", "invariant", "explicit",
@@ -83,7 +86,14 @@ class Ledger:
         return [finding.claim for finding in self.findings if finding.verdict == "refuted"]
 
     def __getitem__(self, claim: str) -> Finding:
-        return next(finding for finding in self.findings if finding.claim == claim)
+        by_claim = {finding.claim: finding for finding in self.findings}
+        if claim not in by_claim:
+            raise SymtopError(f"claim {shown(claim)} is not in this ledger, which has {', '.join(by_claim)}")
+        return by_claim[claim]
+
+    def __iter__(self) -> Iterator[str]:
+        """The claims, so that ``in`` asks for one of them."""
+        return iter([finding.claim for finding in self.findings])
 
     def sentences(self) -> list[str]:
         """One sentence a verdict."""

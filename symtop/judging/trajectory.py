@@ -26,7 +26,7 @@ import xarray as xr
 from symtop.base import datasets
 from symtop.base.validate import SymtopError
 from symtop.judging.claims_long import KEPT, Constant
-from symtop.judging.ledger import Finding
+from symtop.judging.ledger import Finding, undecided
 from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import errors
 from symtop.measure.trajectory import completed
@@ -87,9 +87,9 @@ def _text(path: Path) -> dict[str, Any]:
 
 
 def findings(target: Any, scene: Scene, conserves: Collection[str] = (), energy: str | None = None) -> list[Finding]:
-    """What the samples say: a finding for each error and each constant that they show.
+    """What the samples say: a finding for each error and each constant that they show, or that is claimed.
 
-    Raises SymtopError for data that are no trajectory of a top.
+    What is claimed and not shown is undecided. Raises SymtopError for data that are no trajectory of a top.
     """
     given = read(target)
     momentum = given.pop("momentum", None)
@@ -97,12 +97,21 @@ def findings(target: Any, scene: Scene, conserves: Collection[str] = (), energy:
     time = apart["time"].values
     shown = [_error(name, time, apart) for name in ERRORS if name in apart]
     own = _from_states(scene, given, momentum)
-    for name in CONSTANTS:
+    for name in (*CONSTANTS, *sorted({*conserves} - {*CONSTANTS})):
         values = own.get(name, given.get(name))
+        declared = energy if name == "energy" and energy else "kept" if name in conserves else ""
         if values is not None:
-            declared = (energy or "") if name == "energy" and energy else "kept" if name in conserves else ""
             shown.append(_constant(name, declared, time, np.asarray(values, float), scene))
+        elif declared:
+            shown.append(undecided(name, declared, f"the trajectory shows no {name}{_remedy(name)}"))
     return shown
+
+
+def _remedy(name: str) -> str:
+    """What would show a constant, or why nothing can."""
+    if name in CONSTANTS:
+        return f"; it would with {name}, or with the angular momentum beside the axis"
+    return ", as its axes are scaled to length one" if name == "axis_length" else ""
 
 
 def _from_states(scene: Scene, given: Mapping[str, Any], momentum: Any) -> dict[str, np.ndarray]:

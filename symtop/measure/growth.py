@@ -25,7 +25,7 @@ from symtop.measure.order import Fit, power_law
 from symtop.measure.statistics import columns_fitted
 
 LAWS = {0.0: "bounded", 0.5: "random walk", 1.0: "linear", 1.5: "t^3/2", 2.0: "quadratic"}
-DRAWS = 2000
+DRAWS, SEED = 2000, 1937  # of the bootstrap
 BLOCKS = 50
 ROUNDED = 3e-13  # relative: the largest change that a million steps of rounding explain where sums are compensated
 WALK = 100.0  # times what rounding explains: a larger growth as t^1/2 is no walk of rounding
@@ -102,7 +102,7 @@ class Ensemble(NamedTuple):
     fit: Fit  # interval: half-width of the bootstrap's 95 %
 
 
-def ensemble_growth(steps: ArrayLike, drifts: ArrayLike, least: float, seed: int = 1937) -> Ensemble:
+def ensemble_growth(steps: ArrayLike, drifts: ArrayLike, least: float) -> Ensemble:
     """The exponent of the root mean square of `drifts` (members, windows) from `least` steps on."""
     n, values = np.asarray(steps, float), np.asarray(drifts, float)
     rms = np.sqrt(np.mean(values**2, axis=0))
@@ -110,7 +110,7 @@ def ensemble_growth(steps: ArrayLike, drifts: ArrayLike, least: float, seed: int
     fit = power_law(n, rms, used)
     if not math.isfinite(fit.slope):
         return Ensemble(rms, fit)
-    members = np.random.default_rng(seed).integers(len(values), size=(DRAWS, len(values)))
+    members = np.random.default_rng(SEED).integers(len(values), size=(DRAWS, len(values)))
     again = 0.5 * np.log(np.mean(values[members][..., fit.used] ** 2, axis=1))
     x = np.log(n[fit.used]) - np.log(n[fit.used]).mean()
     low, high = np.quantile(again @ x / (x @ x), (0.025, 0.975))

@@ -9,6 +9,7 @@ another meets it, and then along the line through both.
 
 import math
 from collections.abc import Callable
+from decimal import ROUND_DOWN, Context
 from typing import NamedTuple
 
 from symtop.measure.accuracy import error_row
@@ -221,6 +222,13 @@ def search(
 
     setting = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience, least=least)
     return setting if isinstance(setting, str) else tried[setting]
+
+
+def rounded(scene: Scene, met: Met, accuracy: float, quantity: str) -> Met:
+    """The same with a finer setting of five digits if a run with that meets the accuracy too, and else as it was."""
+    setting = float(Context(prec=5, rounding=ROUND_DOWN).create_decimal(repr(float(met.setting))))
+    again = met if setting == met.setting else attempt(scene, met.integrator, setting, met.horizon, quantity)
+    return again if again.error <= accuracy else met
 
 
 def seconds(scene: Scene, met: Met, quantity: str, horizon: float) -> float:

@@ -139,9 +139,7 @@ class Walk:
         return CAPPED if capped else "met" if met else self.stopped
 
 
-def work_table(
-    scene: Scene, method: Integrator, horizons: Sequence[float], budget: float, targets: Sequence[float] = TARGETS
-) -> xr.Dataset:
+def work_table(scene: Scene, method: Integrator, horizons: Sequence[float], budget: float) -> xr.Dataset:
     """Errors and work of every setting that was tried: dimensions ``horizon`` (whole numbers) and ``setting``.
 
     Horizons increase; the cost of a run is foreseen from the horizon before. Settings go from coarse to fine. Variables
@@ -149,7 +147,7 @@ def work_table(
     finer, ``reached(horizon, target)``, "met" or why not, and the method's ``control`` and ``nutation_width``.
     """
     width = nutation_width(scene)
-    asked = [target for target in targets if target < width] or [min(targets)]
+    asked = [target for target in TARGETS if target < width] or [min(TARGETS)]
     tables: list[list[Row]] = []
     stops: list[str] = []
     reached: list[list[str]] = []
@@ -171,12 +169,12 @@ def work_table(
         before = horizon if walk.rows else before
         tables.append([walk.rows[setting] for setting in sorted(walk.rows, reverse=True)])
         stops.append(walk.stopped)
-        reached.append([walk.reached(target) if target < width else TOO_WIDE for target in targets])
+        reached.append([walk.reached(target) if target < width else TOO_WIDE for target in TARGETS])
     return (
         _stack(tables, method.implementation)
         .assign(stopped=("horizon", stops), reached=(("horizon", "target"), reached))
         .assign(control=((), method.control or ""), nutation_width=((), width))
-        .assign_coords(target=list(targets))
+        .assign_coords(target=list(TARGETS))
     )
 
 
@@ -189,14 +187,9 @@ def _stack(tables: Sequence[Sequence[Row]], implementation: str) -> xr.Dataset:
     return xr.concat(filled, dim="horizon") if len(filled) > 1 else filled[0].expand_dims("horizon")
 
 
-def meeting(data: xr.Dataset, target: float, quantity: str = "axis") -> np.ndarray:
-    """Which runs reach a target."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray(data[quantity].values <= target)
-
-
-def least_work(data: xr.Dataset, target: float, quantity: str = "axis") -> np.ndarray:
+def least_work(data: xr.Dataset, target: float) -> np.ndarray:
     """Place along ``setting``, which comes last, of the run of least work that ended well and meets a target, or -1."""
     work = data["force_evaluations"].values
-    good = meeting(data, target, quantity) & (data["outcome"].values == "ok") & np.isfinite(work)
+    with np.errstate(invalid="ignore"):
+        good = (data["axis"].values <= target) & (data["outcome"].values == "ok") & np.isfinite(work)
     return np.where(good.any(axis=-1), np.argmin(np.where(good, work, np.inf), axis=-1), -1)

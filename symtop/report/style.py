@@ -269,16 +269,6 @@ def _written(figure: Any, path: Path, dpi: float) -> None:
         FigureCanvasAgg(figure).print_png(path, metadata=metadata)
 
 
-def least_text(figure: Any) -> tuple[float, str]:
-    """The smallest text of a figure in points, if the figure is printed `WIDTH` inches wide, and what it says."""
-    from matplotlib.text import Text
-
-    figure.draw_without_rendering()
-    texts = [one for one in figure.findobj(Text) if one.get_visible() and one.get_text().strip()]
-    sizes = ((one.get_fontsize() * WIDTH / figure.get_figwidth(), one.get_text()) for one in texts)
-    return min(sizes, default=(np.inf, ""))
-
-
 def number(value: float, digits: int = 2) -> str:
     """A number of a title as it is printed: ``10⁻⁶``, ``1.4 × 10⁻¹³``, ``0.012``, ``340``; no line breaks within it."""
     text = f"{value:.{digits}g}" if not 10.0**digits <= abs(value) < 1e4 else f"{value:.0f}"

@@ -5,7 +5,7 @@ Members are computed in pieces (`symtop.run.pieces`), on threads or on a cluster
 """
 
 import contextlib
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ from symtop.run.members import Members, for_each, read_members
 from symtop.run.pieces import SHOWN, Job
 from symtop.run.schedule import nutation_periods
 from symtop.run.simulation import MOST_SAMPLES, MOST_STEPS, MOST_SWINGS, chart_of
-from symtop.run.streamed import Stream
+from symtop.run.streamed import streaming
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,8 @@ def ensemble(
     `samples`: 0.25 kB a member for its nine numbers, its plan and their copies, beside the 0.13 of a population. The
     same call resumes one that was killed, to the same file, and the dataset reads from the file what it is asked for.
 
-    Raises SymtopError for arguments that make no sense, and for members that are no top or no start, by number.
+    Raises SymtopError for arguments that make no sense, for members that are no top or no start, by number, and for a
+    path to which another process is writing.
     """
     read, method = read_members(members), find_integrator(integrator)
     count, silent = whole("samples", samples, 2, MOST_SAMPLES), truth("quiet", quiet)
@@ -86,24 +87,25 @@ def ensemble(
         "title": f"{method.name} on {n} tops", "units": read.units, "integrator": method.name, "chart": chart,
         "implementation": method.implementation, "execution": job.execution,
     }  # fmt: skip
-    stream = None if path is None else Stream(place("path", path), job, read.labels, words)
-    rest = pieces if stream is None else stream.missing(pieces)
+
+    def compute(rest: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> None:
+        left = sum(piece.stop - piece.start for piece in rest)
+        with (
+            beating(
+                tqdm(total=n, initial=n - left, desc=words["title"], unit="top", disable=silent or None, leave=False)
+            ) as bar,
+            contextlib.closing(_computed(job, rest, workers, scheduler)) as parts,
+        ):
+            for piece, part in zip(rest, parts, strict=True):
+                keep(piece, part)
+                bar.update(piece.stop - piece.start)
+
+    if path is not None:
+        with streaming(place("path", path), job, read.labels, words) as stream:
+            compute(stream.missing(pieces), stream.keep)
+            return stream.finish(pieces)
     columns = dict[str, Any]()
-    done = sum(piece.stop - piece.start for piece in pieces) - sum(piece.stop - piece.start for piece in rest)
-    with (
-        beating(
-            tqdm(total=n, initial=done, desc=words["title"], unit="top", disable=silent or None, leave=False)
-        ) as bar,
-        contextlib.closing(_computed(job, rest, workers, scheduler)) as parts,
-    ):
-        for piece, part in zip(rest, parts, strict=True):
-            if stream is None:
-                _fill(columns, part, piece, n)
-            else:
-                stream.keep(piece, part)
-            bar.update(piece.stop - piece.start)
-    if stream is not None:
-        return stream.finish(pieces)
+    compute(pieces, lambda piece, part: _fill(columns, part, piece, n))
     return datasets.describe(as_dataset(columns, read.labels), **words)
 
 

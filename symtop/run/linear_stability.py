@@ -45,6 +45,7 @@ LONG = 120  # strides that a difference is followed which obeys no recurrence of
 MOST_STRIDE = {"compiled": 50, "python": 5}  # steps
 TILT = 1e-5  # rad, of the sleeping top
 STEPS = 4
+ROUNDS = 6  # of the search for a fixed point
 
 
 def few_steps(method: Integrator, chart: str, top: SymmetricTop, start: Angles, h: float, steps: int = STEPS) -> Run:
@@ -86,7 +87,7 @@ NO_TRACE = Trace(math.nan, math.nan, math.nan)
 _standing = functools.lru_cache(maxsize=256)(SymmetricTop.steady_theta)
 
 
-def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None, rounds: int = 6) -> Trace:
+def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) -> Trace:
     """The trace of the map of one step h at the method's fixed point next to the steady precession of these momenta.
 
     In the chart that shows the axis unless another is given.
@@ -94,7 +95,7 @@ def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None, 
     top, momenta = scene.top, scene.top.momenta(scene.start)
     chart = chart or method.chart_for("axis")
     theta, moved = _standing(top, momenta), math.inf
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         if not 1e-3 < theta < math.pi - 1e-3:
             return NO_TRACE
         start = with_momenta(top, theta + NUDGE, momenta)
@@ -202,13 +203,13 @@ def _root(delta: np.ndarray, left_over: float) -> float:
     return float(np.max(np.abs(np.roots([1.0, -t, -minus_d])))) if left < left_over else math.nan
 
 
-def sleep_margin(method: Integrator, spin: float, h: float, top: SymmetricTop | None = None) -> float:
+def sleep_margin(method: Integrator, spin: float, h: float) -> float:
     """Above zero while the method's upright top sleeps at this spin w3 and step, below when it falls; 1 at most.
 
     x (1 - x) 4 with x = t^2/4d: the two ways to end it, x = 1 (a pair of frequencies meets) and x = 0 (the step turns
     the top by half a turn), are both simple sign changes.
     """
-    body = top or SymmetricTop(1.0, 1.0, 1.0)
+    body = SymmetricTop(1.0, 1.0, 1.0)
     chart = method.chart_for("axis")
     p_psi = body.I3 * spin
     if chart == "angles":  # p_phi = p_psi: the axis would pass through the pole, and V is a parabola

@@ -117,16 +117,18 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
 def long_run(
     scene: "str | Scene", integrator: "str | Integrator", *, steps: int, step_size: float,
     checkpoint: "str | Path | bool" = False, compensated: bool = True, quiet: bool = False,
+    output: "str | Path | None" = None,
 ) -> xr.Dataset:  # fmt: skip
     """Run a fixed-step method for any number of steps and return what it did, window by window.
 
     Dimension ``window``; ``steps`` is chosen each ends. For each of energy, modified_energy, p_phi, p_psi (relative
     changes since the start) and theta (rad): ``NAME_least``, ``NAME_largest``, ``NAME_mean``. `checkpoint` is a file
     that is written as the run goes on and removed at its end, or True for one in symtop's cache: an interrupted run
-    resumes from it.
+    resumes from it. `output` is a netCDF file for what is returned: the checkpoint is removed once that is written.
     ``compensated=False`` sums increments plainly, to compare.
 
-    Raises SymtopError for a method without a compiled loop and for a checkpoint of another run.
+    Raises SymtopError for a method without a compiled loop, for a checkpoint of another run and for an output that
+    cannot be written.
     """
     chosen, method = find_scene(scene), find_integrator(integrator)
     count, h = whole("steps", steps, 1), positive("step_size", step_size)
@@ -137,23 +139,35 @@ def long_run(
     loop = solver.loop if compensated else solver.loop.plain()
     par, rule, state = solver.setup(chosen.top, chosen.start, h)
     book = _Book(checkpoint, _identity(chosen, method, h, count, compensated))
+    result = None if output is None else book.apart(place("output", output))
     at, rows = book.resumed(loop.begun(par, rule, state, h))
     ends, outcome, reached = windows(count), OK, at.k
     gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
-    with (
-        book.kept(),
-        beating(tqdm(total=count, initial=at.k, desc=f"{method.name} on {chosen.name}", unit="step", unit_scale=True,
-                     disable=quiet or None, leave=False)) as bar,
-    ):  # fmt: skip
-        while gauge is not None and len(rows) < len(ends) and outcome == OK:
-            done, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))
-            outcome, reached = done.outcome, after.k
-            if outcome == OK:
-                rows.append(summary(gauge(done.states, done.momenta)))
-                bar.update(after.k - at.k)
-                at = after
-                book.note(at, rows)
+    with book.kept():
+        with beating(tqdm(total=count, initial=at.k, desc=f"{method.name} on {chosen.name}", unit="step",
+                          unit_scale=True, disable=quiet or None, leave=False)) as bar:  # fmt: skip
+            while gauge is not None and len(rows) < len(ends) and outcome == OK:
+                done, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))
+                outcome, reached = done.outcome, after.k
+                if outcome == OK:
+                    rows.append(summary(gauge(done.states, done.momenta)))
+                    bar.update(after.k - at.k)
+                    at = after
+                    book.note(at, rows)
+        data = datasets.describe(
+            _windowed(rows, ends), title=f"{method.name} on {chosen.name}, {count} steps", units=chosen.units,
+            integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h,
+            compensated=str(compensated).lower(), outcome=OUTCOMES[outcome],
+            outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h), reached_time=reached * h,
+        )  # fmt: skip
+        if result is not None:
+            book.write(data, result)
     book.close()
+    return data
+
+
+def _windowed(rows: list[list[float]], ends: list[int]) -> xr.Dataset:
+    """What was seen in each window, and where it ends."""
     columns = np.array(rows).reshape(len(rows), len(QUANTITIES), 3)
     variables: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
     for i, name in enumerate(QUANTITIES):
@@ -161,12 +175,7 @@ def long_run(
         for m, part in enumerate(("least", "largest", "mean")):
             told = {"long_name": f"{words}, {part} over the window", "units": units}
             variables[f"{name}_{part}"] = ("window", columns[:, i, m], told)
-    return datasets.describe(
-        xr.Dataset(variables), title=f"{method.name} on {chosen.name}, {count} steps", units=chosen.units,
-        integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h,
-        compensated=str(compensated).lower(), outcome=OUTCOMES[outcome],
-        outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h), reached_time=reached * h,
-    )  # fmt: skip
+    return xr.Dataset(variables)
 
 
 def summary(values: dict[str, Array]) -> list[float]:
@@ -276,6 +285,22 @@ class _Book:
             except BaseException:
                 self.save()
                 raise
+
+    def apart(self, output: Path) -> Path:
+        """The file for the result, refused if it is a folder or the checkpoint, which is removed at the end."""
+        if output.is_dir():
+            raise SymtopError(f"output must be a file, not the folder {str(output)!r}")
+        if self.file is not None and output.absolute() == self.file.absolute():
+            raise SymtopError(f"output and checkpoint must be two files, not both {str(output)!r}")
+        return output
+
+    def write(self, data: xr.Dataset, output: Path) -> None:
+        """Write the result; if that fails, the checkpoint is what is left of the run, and the sentence says so."""
+        try:
+            datasets.write(data, output)
+        except SymtopError as error:
+            left = "" if self.file is None else f"; the steps are kept in {self.file}, and the same call goes on there"
+            raise SymtopError(f"{error}{left}") from error
 
     def close(self) -> None:
         """The run is done."""

@@ -3,11 +3,13 @@
 Each piece is kept in a file of its own, whole or absent, in the folder ``PATH.parts``. When all are there they are put
 together, one after another, into the netCDF file, which replaces `PATH` in one move; then the folder is removed. The
 bytes of the file do not hang on how often the work was interrupted. While it is put together it takes its size twice.
+One process at a time may do so: it holds the lock ``.PATH.lock``.
 """
 
 import contextlib
 import shutil
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ import xarray as xr
 
 from symtop.base import datasets
 from symtop.base.fingerprint import digest, file_reasons, hashed, packages
+from symtop.base.locks import locked
 from symtop.base.signals import ending_on_sigterm
 from symtop.base.validate import SymtopError
 from symtop.base.walk import Walk
@@ -26,14 +29,28 @@ from symtop.run.pieces import PIECE, PIECE_STEPS, Job
 IDENTITY = "identity"  # the file that says which ensemble a folder belongs to
 
 
+@contextlib.contextmanager
+def streaming(path: Path, job: Job, labels: dict[str, Any], words: dict[str, Any]) -> Iterator["Stream"]:
+    """The stream to a file, while nobody else has one; SymtopError if another process does."""
+    if path.is_dir():
+        raise SymtopError(f"cannot write {path}: it is a folder")
+    with locked(_folder(path), wait=False) as ours:
+        if not ours:
+            raise SymtopError(f"another process is writing {path}: wait until it has ended, or name another path")
+        yield Stream(path, job, labels, words)
+
+
+def _folder(path: Path) -> Path:
+    """Where the pieces of a file are."""
+    return path.with_name(f"{path.name}.parts")
+
+
 class Stream:
     """The file of an ensemble, and what is on disk of it so far."""
 
     def __init__(self, path: Path, job: Job, labels: dict[str, Any], words: dict[str, Any]) -> None:
         self.path, self.n, self.samples, self.labels, self.words = path, len(job.numbers), job.samples, labels, words
-        if path.is_dir():
-            raise SymtopError(f"cannot write {path}: it is a folder")
-        self.folder = path.with_name(f"{path.name}.parts")
+        self.folder = _folder(path)
         identity, told = _identity(job, labels), self.folder / IDENTITY
         if told.is_file() and told.read_text(encoding="utf-8") != identity:
             raise SymtopError(
@@ -81,6 +98,10 @@ class Stream:
         try:
             with path.open("rb") as file, np.load(file) as held:
                 return {name: held[name] for name in names or held.files}
+        except FileNotFoundError as error:
+            raise SymtopError(
+                f"{path} is not there any more, so somebody has removed it: run the same again, and it is computed"
+            ) from error
         except (OSError, ValueError, zipfile.BadZipFile) as error:
             raise SymtopError(f"{path} is damaged ({error}): remove it, and it is computed again") from error
 

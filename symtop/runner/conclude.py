@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from symtop.base import datasets
+from symtop.base import datasets, locks
 from symtop.base.validate import label
 from symtop.runner import depends, plugins, scripts, seen, store
 from symtop.runner.cases import Round
@@ -53,7 +53,7 @@ def code_of(study: Study, save: Save | None) -> str:
 def conclude(cases: Round, stamp: str, save: Save | None, *, quick: bool) -> dict[str, Any]:
     """Combine, draw, judge and write."""
     study, results = cases.study, cases.results
-    with store.locked(results / f"{study.name}.nc", wait=True):
+    with locks.locked(results / f"{study.name}.nc", wait=True):
         for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
             datasets.sweep(file)
         combined = cases.combined()

@@ -16,12 +16,10 @@ its grid, or remove single files, of which nothing depends on any. The lock is t
 with the process that holds it, however that ends.
 """
 
-import contextlib
 import json
 import math
-import os
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,26 +29,17 @@ import xarray as xr
 
 from symtop.base import datasets
 from symtop.base.fingerprint import LENGTH, Reasons
+from symtop.base.locks import locked
 from symtop.base.validate import SymtopError
 from symtop.model.scenes import scenes
 from symtop.runner import depends
 from symtop.runner.study import Case, Combined, Study
 
-try:
-    import fcntl
-except ImportError:  # no such locks here: two runs may then compute a case twice, and write the same file
-    fcntl = None  # type: ignore[assignment]
-
 SEED = 0  # of the order in which batches are timed; nothing else here is random
 
 
-def case_path(results: Path, study: Study, case: Case) -> Path:
-    """The file of a case; its name holds the digest of everything the numbers depend on."""
-    return case_paths(results, study, [case])[0]
-
-
 def case_paths(results: Path, study: Study, cases: Sequence[Case]) -> list[Path]:
-    """The files of many cases."""
+    """The files of cases; their names hold the digest of everything the numbers depend on."""
     folder = results / "cases" / study.name
     keys = [depends.settings_key(study, case)[:8] for case in cases]
     made_of = depends.digests(study, cases)
@@ -132,51 +121,6 @@ def save_failure(path: Path, case: Case, message: str, trace: str) -> None:
 def trace_path(path: Path) -> Path:
     """Where a worker that hangs in compiled code writes its traceback before it ends."""
     return path.with_name(f".{path.stem}.trace")
-
-
-def lock_path(path: Path) -> Path:
-    """The lock of a case, or of a study's dataset."""
-    return path.with_name(f".{path.stem}.lock")
-
-
-@contextlib.contextmanager
-def locked(path: Path, *, wait: bool) -> Iterator[bool]:
-    """Hold a file's lock, so that nobody else computes it; yields False if somebody else holds it and `wait` is false.
-
-    The lock's file is there while it is held, and afterwards if its holder was killed (see `was_begun`).
-    """
-    if fcntl is None:
-        yield True
-        return
-    lock = lock_path(path)
-    while True:
-        try:
-            lock.parent.mkdir(parents=True, exist_ok=True)
-            file = lock.open("a")
-        except OSError as error:
-            raise SymtopError(f"cannot write {lock}: {error.strerror or error}") from error
-        with file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-            except BlockingIOError:
-                yield False
-                return
-            if os.fstat(file.fileno()).st_nlink == 0:  # its holder removed it while we waited
-                continue
-            os.utime(file.fileno())  # since when it is held
-            try:
-                yield True
-            finally:
-                lock.unlink(missing_ok=True)
-            return
-
-
-def was_begun(path: Path) -> bool:
-    """Did somebody begin to compute a case, and end before it was done?"""
-    if fcntl is None or not lock_path(path).is_file():
-        return False
-    with locked(path, wait=False) as ours:
-        return ours
 
 
 def combine(cases: list[tuple[Case, xr.Dataset]]) -> Combined:

@@ -31,6 +31,7 @@ from symtop.runner import depends
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
+MOST_NAMED = 4  # cells that a message lists
 COUNTS = ("steps", "force_evaluations", "newton_iterations")
 
 
@@ -43,6 +44,13 @@ class _Cell(NamedTuple):
     horizon: float
     observe: str | None
     made_of: str
+
+
+class _Stored(NamedTuple):
+    """A cell of a file: the digest of what its numbers depend on, and its error table."""
+
+    made_of: str
+    table: xr.Dataset
 
 
 def sweep(
@@ -69,7 +77,9 @@ def sweep(
 
     Cells are computed on as many `threads` as there are cores. With a `path`, they are kept in that netCDF file as they
     are done: the same call resumes a sweep that was interrupted, runs again what has changed (a setting, a scene, the
-    source of a method), and ends in the same dataset. Raises SymtopError for arguments that make no sense.
+    source of a method) or raised an exception, and ends in the same dataset, which the file then holds. More scenes and
+    integrators may be asked for than are in the file, but not fewer. Raises SymtopError for arguments that make no
+    sense.
     """
     chosen = [find_scene(one) for one in _listed(scenes)]
     methods = [find_integrator(one) for one in _listed(integrators)]
@@ -85,8 +95,15 @@ def sweep(
     }
     asked = [_cell(one, method, given, horizon, observe) for one in chosen for method in methods]
     file = None if path is None else place("path", path)
-    done = {} if file is None else _stored(file)
-    rest = [cell for cell in asked if cell.made_of not in done]
+    stored = {} if file is None else _stored(file)
+    pairs = [(cell.scene.name, cell.method.name) for cell in asked]
+    if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:
+        raise SymtopError(
+            f"path {str(file)!r} holds what was not asked for, {_few(others)}: ask for these as well, or name another "
+            "path"
+        )
+    done = {one.made_of: one.table for one in stored.values()}
+    rest = [cell for cell in asked if cell.made_of not in done or _raised(done[cell.made_of])]
 
     def combined() -> xr.Dataset:
         size = max(len(cell.settings) for cell in asked)
@@ -116,7 +133,7 @@ def sweep(
                 datasets.write(combined(), file)
             raise
     data = combined()
-    if file is not None and rest:
+    if file is not None and (rest or pairs != [*stored]):  # in another order, the file would not be what is returned
         datasets.write(data, file)
     return data
 
@@ -217,23 +234,34 @@ def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
     return whole.assign(made_of=((), cell.made_of))
 
 
-def _stored(file: Path) -> dict[str, xr.Dataset]:
-    """The cells of an earlier sweep by their digests; SymtopError for a file that is no sweep's."""
+def _stored(file: Path) -> dict[tuple[str, str], _Stored]:
+    """The cells of an earlier sweep by scene and integrator; SymtopError for a file that is no sweep's."""
     if not file.exists():
         return {}
     data = datasets.read(file)
     if "made_of" not in data:
         raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")
     cells = {}
-    for s in range(data.sizes["scene"]):
-        for i in range(data.sizes["integrator"]):
+    for s, scene in enumerate(data["scene"].values.tolist()):
+        for i, name in enumerate(data["integrator"].values.tolist()):
             cell = data.isel(scene=s, integrator=i)
             digest = str(cell["made_of"].values)
             run = cell["outcome"].values != "not_run"
             if digest and run.any():
                 own = cell.drop_vars(["scene", "integrator", "made_of", "chart"], errors="ignore")
-                cells[digest] = own.isel(setting=np.flatnonzero(run))
+                cells[scene, name] = _Stored(digest, own.isel(setting=np.flatnonzero(run)))
     return cells
+
+
+def _raised(table: xr.Dataset) -> bool:
+    """Did a run raise an exception? It is tried again: the cause may have been of the moment."""
+    return bool((table["outcome"] == RAISED).any())
+
+
+def _few(names: list[str]) -> str:
+    """The first of some names, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more
 
 
 def _described(data: xr.Dataset) -> xr.Dataset:

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import xarray as xr
 from tqdm import tqdm
 
-from symtop.base import datasets
+from symtop.base import datasets, locks
 from symtop.base.signals import is_of_user
 from symtop.base.strangers import words_of
 from symtop.base.validate import SymtopError
@@ -69,7 +69,7 @@ def compute(task: Task, study: Study | None = None, *, wait: bool = False) -> Re
             f"the sources or dependencies of {case.integrator} on {case.scene} are not those that the study was "
             "started with; if a file was edited meanwhile, run the study again"
         )
-    with store.locked(path, wait=wait) as ours:
+    with locks.locked(path, wait=wait) as ours:
         if not ours:
             return Result("busy")
         if not task.fresh and store.load_case(path) is not None:

@@ -1,6 +1,8 @@
 """The command line: what it prints, its exit codes, and that it starts fast."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -10,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from symtop.base import datasets
+from symtop.base.validate import SymtopError
 from symtop.cli.main import main
 
 
@@ -117,6 +120,77 @@ def test_a_scene_and_an_integrator_that_changed_places(words, told):
     done = call("run", *words, "--step-size", "0.01")
     assert done.exit_code == 2
     assert told in done.output
+    assert ("the scene comes first" in done.output) is ("it is the name of" in told)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["integrators", "spheroid"], "integrator 'spheroid' is unknown; it is the name of a scene"),
+        (["scenes", "rk4"], "scene 'rk4' is unknown; it is the name of an integrator"),
+        (["recommend", "rk4", "--accuracy", "1"], "scene 'rk4' is unknown; it is the name of an integrator"),
+    ],
+)
+def test_a_command_of_one_name_says_nothing_of_an_order(words, told):
+    done = call(*words)
+    assert done.exit_code == 2
+    assert done.output == f"symtop: {told}\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "called"),
+    [
+        (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
+        (["recommend", "spheroid", "--accuracy", "1e-3"], "symtop.advise.recommend"),
+        (["claims", "strang", "--quick"], "symtop.judging.claims.judge"),
+    ],
+)
+def test_ctrl_c_is_neither_a_failed_case_nor_bad_input(words, called, monkeypatch):
+    for interrupt in (lambda *_, **__: os.kill(os.getpid(), signal.SIGINT), _raises):
+        monkeypatch.setattr(called, interrupt)
+        done = call(*words)
+        assert done.exit_code == (130 if interrupt is not _raises else 2)
+        assert done.output.splitlines()[-1] == ("symtop: of its own" if interrupt is _raises else "symtop: interrupted")
+
+
+def _raises(*_, **__):
+    raise SymtopError("of its own")
+
+
+def numbers(text):
+    """JSON as others read it: NaN and Infinity are no numbers."""
+    return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+
+
+def test_numbers_that_are_not_finite_are_null_in_json(tmp_path):
+    with pytest.raises(pytest.fail.Exception):
+        numbers("[NaN]")
+    done = call("recommend", "spheroid", "--accuracy", "1e-17", "--json")
+    assert done.exit_code == 1
+    assert numbers(done.stdout)["seconds"] is None
+    assert numbers(done.stdout)["accuracy"] == 1e-17
+    plugin = tmp_path / "endless.py"  # a top whose nutation never ends
+    plugin.write_text(
+        "import symtop\ntop = symtop.scene('spheroid').top\n"
+        "symtop.register_scene(symtop.Scene('endless', top, symtop.Angles(theta=0.0, psi_dot=0.1), 1.0))\n"
+    )
+    assert numbers(call("scenes", "--json", "--plugin", plugin).stdout)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["spheroid"], "symtop: recommend takes one of --accuracy, for example 1e-6, and --i-use\n"),
+        (["spheroid", "--accuracy", "1e-3", "--i-use", "mujoco"], "symtop: recommend takes one of --accuracy"),
+        (["spheroid", "--accuracy", "1e-3", "--step-size", "1"], "symtop: --step-size belongs to --i-use"),
+        (["spheroid", "--accuracy", "5"], "symtop: --accuracy must be below pi"),
+    ],
+)
+def test_recommend_refuses_in_one_sentence(words, says):
+    done = call("recommend", *words)
+    assert done.exit_code == 2
+    assert done.output.startswith(says)
+    assert done.output.count("\n") == 1
 
 
 def test_a_plugin_that_raises_is_named(tmp_path):

@@ -56,11 +56,13 @@ def test_members_that_fail_are_counted_and_drawn(tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "says"),
-    [(["strang", *STEPS, "--members", 0], "n must be"), (["strang"], "needs --step-size or --per-nutation"),
+    [(["strang", *STEPS, "--members", 0], "--members must be a whole number"),
+     (["strang"], "needs --step-size or --per-nutation"),
      (["strong", *STEPS], "did you mean strang"), (["strang", *STEPS, "--kind", "quick"], "kind"),
      (["strang", *STEPS, "--figure", "x.jpg"], "ends in .png"), (["strang", *STEPS, "--seed", -1], "seed"),
      (["strang", "--step-size", 0.1, *STEPS], "not both"), (["strang", *STEPS, "-o", "/proc/no/x.nc"], "in a folder"),
-     (["strang", "--step-size", 0.1], "no horizon of their own"), (["strang", *STEPS, "--threads", 0], "threads"),
+     (["strang", "--step-size", 0.1], "of their own: give --horizon or --nutations"),
+     (["strang", *STEPS, "--threads", 0], "threads"),
      (["midpoint[attitude]", *STEPS], "known: angles"), (["taylor", *STEPS, "--members", 3], "chooses its own steps")],
 )  # fmt: skip
 def test_bad_input_is_one_sentence_and_code_2(words, says):

@@ -67,6 +67,8 @@ NAMES = [
     "\x1b[31m",
 ]
 FILES = ["", "/", ".", "/dev/null/x.nc", "/proc/x.nc", "missing/../../x/y.nc", "a" * 300 + ".nc", "no/such/folder/x.nc"]
+TAKEN = ["taken.nc", "taken.png"]  # names of folders
+WRITTEN = [*FILES, *TAKEN]
 FOLDERS = ["/dev/null", "/dev/null/x", "/proc/x", "no-such", "own.py", "a" * 300]
 PLUGINS = [
     "",
@@ -91,7 +93,7 @@ BAD = {
     "--accuracy": [*NUMBERS, "1e300"], "--limit": NUMBERS,
     "--scene": NAMES, "--kind": NAMES, "--observe": NAMES, "--quantity": NAMES, "--i-use": NAMES, "--chart": NAMES,
     "--form": NAMES, "--energy": NAMES, "--only": NAMES, "--conserves": NAMES,
-    "--output": FILES, "--figure": FILES, "--card": FILES, "--badge": FILES, "--checkpoint": FILES,
+    "--output": WRITTEN, "--figure": WRITTEN, "--card": WRITTEN, "--badge": WRITTEN, "--checkpoint": WRITTEN,
     "--results": FOLDERS, "--plugin": PLUGINS, "--scheduler": ADDRESSES,
 }  # fmt: skip
 FINE = {
@@ -138,6 +140,8 @@ def folder(tmp_path_factory):
     (place / "own.txt").write_text("no Python\n")
     (place / "broken.py").write_text("def\n")
     (place / "leaves.py").write_text("raise SystemExit(0)\n")
+    for name in TAKEN:
+        (place / name).mkdir()
     return place
 
 

@@ -70,6 +70,42 @@ def test_reported_constants_do_not_hide_those_of_the_states(table):
     assert [one.claim for one in alone.findings] == ["axis_error", "theta_error", "p_psi"]
 
 
+def test_a_claim_that_the_samples_do_not_show_is_undecided_and_not_lost(table, tmp_path):
+    file, given = tmp_path / "run.csv", {"time": table[:, 0], "axis": table[:, 1:4]}
+    claims = ["p_phi", "axis_length"]
+    ledger = symtop.judge(given, conserves=claims, energy="bounded")
+    assert {one.claim: one.declared for one in ledger.findings if one.verdict == "undecided"} == {
+        "energy": "bounded", "p_phi": "kept", "axis_length": "kept",
+    }  # fmt: skip
+    assert "the trajectory shows no p_phi; it would with p_phi" in ledger["p_phi"].why
+    assert "p_psi" not in ledger  # nobody claims it
+    assert "Claims: 3 undecided." in str(ledger)
+    whole = symtop.judge(given | {"momentum": table[:, 4:]}, conserves=claims, energy="bounded")
+    assert (whole["p_phi"].verdict, whole["energy"].verdict) == ("confirmed", "refuted")
+    file.write_text(text(table[:, :4], "time,ex,ey,ez"), encoding="utf-8")
+    done = CliRunner().invoke(main, ["judge", str(file), "--conserves", "p_phi", "--energy", "kept"])
+    assert done.exit_code == 0  # nothing is refuted
+    assert "Claims: 2 undecided." in done.output
+    assert "the trajectory shows no energy" in " ".join(done.output.split())
+
+
+def test_an_unknown_claim_about_a_trajectory_is_refused(table, tmp_path):
+    (tmp_path / "run.csv").write_text(text(table), encoding="utf-8")
+    done = CliRunner().invoke(main, ["judge", str(tmp_path / "run.csv"), "--conserves", "p_phi,enrgy"])
+    assert done.exit_code == 2
+    assert "'enrgy' is unknown; did you mean energy" in done.output
+    with pytest.raises(symtop.SymtopError, match="conserves must be a set of names, not 'p_phi'"):
+        symtop.judge({"time": table[:, 0], "axis": table[:, 1:4]}, conserves="p_phi")
+
+
+def test_a_ledger_says_which_claims_it_has(table):
+    ledger = symtop.judge({"time": table[:, 0], "axis": table[:, 1:4]})
+    assert [ledger[claim].claim for claim in ledger] == ["axis_error", "theta_error"]
+    assert "axis_error" in ledger
+    with pytest.raises(symtop.SymtopError, match="claim 'order' is not in this ledger, which has axis_error, theta_"):
+        ledger["order"]
+
+
 def test_the_true_motion_keeps_everything():
     truth = symtop.reference(SPHEROID, np.linspace(0.0, 60.0, 801))
     names = ("axis", "quaternion", "energy", "p_phi", "p_psi")

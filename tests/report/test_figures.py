@@ -1,6 +1,7 @@
 """Every figure of every study can be read in print: letters, colours, lines and names; and the instruments of that."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -23,10 +24,18 @@ def saturation(color) -> float:
     return max(red, green, blue) - min(red, green, blue)
 
 
+def least_text(figure) -> tuple[float, str]:
+    """The smallest text of a figure in points, if the figure is printed `WIDTH` inches wide, and what it says."""
+    figure.draw_without_rendering()
+    texts = [one for one in figure.findobj(Text) if one.get_visible() and one.get_text().strip()]
+    sizes = ((one.get_fontsize() * style.WIDTH / figure.get_figwidth(), one.get_text()) for one in texts)
+    return min(sizes, default=(math.inf, ""))
+
+
 def faults(name, figure) -> list[str]:
     """What keeps a figure from being read: nothing, of a good one."""
     found = []
-    least, text = style.least_text(figure)
+    least, text = least_text(figure)
     if least < style.LEAST_TEXT - 1e-9:
         found.append(f"{text!r} has {least:.1f} points")
     if not figure.get_suptitle():

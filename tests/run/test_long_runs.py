@@ -170,6 +170,38 @@ def test_an_interrupt_keeps_every_finished_window(tmp_path, monkeypatch):
     assert resumed.identical(long_run(WHERE, "rk4", steps=50_000, step_size=H, quiet=True))
 
 
+def test_a_result_that_cannot_be_written_leaves_the_checkpoint(tmp_path, monkeypatch):
+    """The disk is full when the run is done: the same call writes what was computed, without a step."""
+    output, file, write = tmp_path / "windows.nc", tmp_path / "run.nc", longrun.datasets.write
+    asked = {"steps": 50_000, "step_size": H, "checkpoint": file, "output": output, "quiet": True}
+
+    def full(data, path):
+        if path == output:
+            raise SymtopError(f"cannot write {path}: No space left on device")
+        return write(data, path)
+
+    monkeypatch.setattr(longrun.datasets, "write", full)
+    with pytest.raises(SymtopError, match=r"No space left on device; the steps are kept in .*run.nc"):
+        long_run(WHERE, "rk4", **asked)
+    assert file.is_file()
+    monkeypatch.undo()
+    monkeypatch.setattr(longrun._Book, "note", lambda *_: pytest.fail("it steps"))
+    data = long_run(WHERE, "rk4", **asked)
+    assert not file.exists()
+    assert longrun.datasets.read(output).identical(data)
+    monkeypatch.undo()
+    assert data.identical(long_run(WHERE, "rk4", steps=50_000, step_size=H, quiet=True))
+
+
+def test_an_output_that_can_be_no_file_is_refused_before_a_step(tmp_path, monkeypatch):
+    monkeypatch.setattr(longrun._Book, "resumed", lambda *_: pytest.fail("it begins"))
+    asked = {"steps": 50_000, "step_size": H, "quiet": True}
+    with pytest.raises(SymtopError, match="output must be a file, not the folder"):
+        long_run(WHERE, "rk4", output=tmp_path, **asked)
+    with pytest.raises(SymtopError, match="output and checkpoint must be two files"):
+        long_run(WHERE, "rk4", output=tmp_path / "a.nc", checkpoint=tmp_path / "a.nc", **asked)
+
+
 def test_a_checkpoint_of_another_run_is_refused(tmp_path):
     file = tmp_path / "run.nc"
     book = longrun._Book(file, "another")

@@ -1,5 +1,7 @@
 """An ensemble that goes to a file is the one in memory, and one that was killed ends as the same file, to the byte."""
 
+import contextlib
+import errno
 import signal
 import subprocess
 import sys
@@ -10,6 +12,7 @@ import pytest
 import xarray as xr
 
 import symtop
+from symtop.base import locks
 from symtop.run import ensemble as ensembles, pieces, streamed
 
 SOME = symtop.population(60, seed=5)
@@ -102,6 +105,51 @@ def test_what_a_process_has_computed_before_does_not_make_it_another_ensemble(tm
             symtop.ensemble(SOME, name, path=tmp_path / f"{name}.nc", **asked)
             symtop.ensemble(SOME, name, **asked)
             symtop.simulate("spheroid", "rk4[axis]", step_size=0.1, guard=False)
+
+
+def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch):
+    """A second one on the same path is told so in a sentence; another path, and the same one later, are free."""
+    path, keep, told = tmp_path / "runs.nc", streamed.Stream.keep, []
+    second = f"import symtop; symtop.ensemble(symtop.population(2, seed=5), 'strang', path={str(path)!r}, **{ASKED})"
+
+    def disturbed(stream, piece, columns):
+        if piece.start == 7 and not told:
+            done = subprocess.run([sys.executable, "-c", second], capture_output=True, text=True, check=False)
+            told.append((done.returncode, done.stderr.splitlines()[-1]))
+            symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "other.nc", **ASKED).close()
+        keep(stream, piece, columns)
+
+    monkeypatch.setattr(streamed.Stream, "keep", disturbed)
+    with symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED) as data:
+        assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **ASKED))
+    assert [code for code, _ in told] == [1]
+    assert f"another process is writing {path}: wait until it has ended, or name another path" in told[0][1]
+    assert {file.name for file in tmp_path.iterdir()} == {"runs.nc", "other.nc"}
+
+
+def test_a_piece_that_was_removed_is_not_called_damaged(tmp_path, small_pieces, monkeypatch):
+    path, finish = tmp_path / "runs.nc", streamed.Stream.finish
+
+    def robbed(stream, some):
+        (tmp_path / "runs.nc.parts" / "7-14.npz").unlink()
+        return finish(stream, some)
+
+    monkeypatch.setattr(streamed.Stream, "finish", robbed)
+    with pytest.raises(symtop.SymtopError, match=r"7-14.npz is not there any more, so somebody has removed it"):
+        symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
+    monkeypatch.undo()
+    monkeypatch.setattr(pieces, "PIECE", 21 * 7)
+    with symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED) as data:
+        assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **ASKED))
+
+
+def test_a_file_system_without_locks_is_written_to(tmp_path, monkeypatch):
+    for number, fails in ((errno.ENOLCK, False), (errno.EIO, True)):
+        monkeypatch.setattr(
+            locks.fcntl, "flock", lambda *_, number=number: (_ for _ in ()).throw(OSError(number, "no"))
+        )
+        with pytest.raises(OSError, match="no") if fails else contextlib.nullcontext():
+            symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "runs.nc", **ASKED).close()
 
 
 def test_a_place_that_cannot_be_written_is_refused_before_any_step(tmp_path):

@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 
+from symtop.base import locks
 from symtop.base.validate import SymtopError
 from symtop.cli.main import main
 from symtop.runner import run as runner, store
@@ -260,7 +261,7 @@ def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
     others = [tmp_path / name for name in (".other.nc.x.part", "figures/.other-a.png.z.part.png")]
     for file in (*left, *others):
         file.touch()
-    with store.locked(tmp_path / "first.nc", wait=True):
+    with locks.locked(tmp_path / "first.nc", wait=True):
         store.tidy(tmp_path, study)
         assert all(file.is_file() for file in left)  # somebody writes them
     store.tidy(tmp_path, study)

@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 
-from symtop.base import compiled, datasets
+from symtop.base import compiled, datasets, locks
 from symtop.base.validate import SymtopError
 from symtop.cli.main import main
 from symtop.runner import run as runner, store, work
@@ -208,24 +208,24 @@ def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
     order = []
 
     def wait():
-        with store.locked(path, wait=True) as ours:
+        with locks.locked(path, wait=True) as ours:
             order.append(ours)
 
-    with store.locked(path, wait=False) as ours:
+    with locks.locked(path, wait=False) as ours:
         assert ours
-        with store.locked(path, wait=False) as second:
+        with locks.locked(path, wait=False) as second:
             assert not second
         waiting = threading.Thread(target=wait)
         waiting.start()
         time.sleep(0.1)
         assert order == []
-        assert not store.was_begun(path)  # it is being computed
+        assert not locks.was_begun(path)  # it is being computed
     waiting.join(5.0)
     assert order == [True]
     assert not list(tmp_path.iterdir())
-    store.lock_path(path).touch()  # what a killed process leaves
-    assert store.was_begun(path)
-    with store.locked(path, wait=False) as ours:
+    locks.lock_path(path).touch()  # what a killed process leaves
+    assert locks.was_begun(path)
+    with locks.locked(path, wait=False) as ours:
         assert ours
 
 
@@ -254,7 +254,7 @@ def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(t
     assert code == 0, output
     (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.nc")
     case.unlink()
-    for name in (store.trace_path(case), store.lock_path(case), case.with_name(f".{case.name}.x.part.nc")):
+    for name in (store.trace_path(case), locks.lock_path(case), case.with_name(f".{case.name}.x.part.nc")):
         name.touch()
     code, output = probe(tmp_path)
     assert "1 of 4 cases computed" in output
@@ -456,7 +456,7 @@ def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
     """Sources that changed under a running study end it: nothing else would do better."""
     study = runner.load(str(PROBE))
     case = study.cases(True)[0]
-    path = store.case_path(tmp_path, study, case)
+    [path] = store.case_paths(tmp_path, study, [case])
     task = work.Task(str(PROBE), case, str(path), (), 10.0)
     assert work.compute(task).state == "computed"
     assert work.compute(task).state == "found"
@@ -464,5 +464,5 @@ def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
     other = path.with_name(path.name.replace(store.digest_of(path), "0" * 20))
     with pytest.raises(SymtopError, match="not those that the study was started with"):
         work.compute(task._replace(path=str(other)))
-    with store.locked(path, wait=False):
+    with locks.locked(path, wait=False):
         assert work.compute(task).state == "busy"

@@ -95,6 +95,56 @@ def test_failures_are_rows():
     assert np.isnan(data["axis"].values[0, 0]).all()
 
 
+def test_a_file_with_other_cells_is_refused_and_left_as_it_is(tmp_path, monkeypatch):
+    """Fewer cells than the file holds, or others, would destroy what is there; more of them, in any order, do not."""
+    file, asked = tmp_path / "sweep.nc", {"step_size": [0.02], "horizon": 1.0, "quiet": True}
+    symtop.sweep("spheroid", ["rk4[axis]", "strang"], path=file, **asked)
+    before, table = file.read_bytes(), module._table
+    monkeypatch.setattr(module, "_table", lambda _: pytest.fail("it computes"))
+    for scene, names, left in (
+        ("spheroid", ["strang"], r"rk4\[axis\] on spheroid"),
+        ("spheroid", ["midpoint"], r"rk4\[axis\] on spheroid, strang on spheroid"),
+        ("goldstein", ["rk4[axis]", "strang"], r"rk4\[axis\] on spheroid, strang on spheroid"),
+    ):
+        with pytest.raises(symtop.SymtopError, match=f"holds what was not asked for, {left}: ask for these as well"):
+            symtop.sweep(scene, names, path=file, **asked)
+    assert file.read_bytes() == before
+    turned = symtop.sweep("spheroid", ["strang", "rk4[axis]"], path=file, **asked)
+    xr.testing.assert_identical(datasets.read(file).drop_attrs(), turned.drop_attrs())
+    monkeypatch.setattr(module, "_table", table)
+    more = symtop.sweep(["goldstein", "spheroid"], ["midpoint", "strang", "rk4[axis]"], path=file, **asked)
+    xr.testing.assert_identical(datasets.read(file).drop_attrs(), more.drop_attrs())
+    for name in ("strang", "rk4[axis]"):
+        one = {"scene": "spheroid", "integrator": name}
+        assert more["axis"].sel(one).values == turned["axis"].sel(one).values
+
+
+def test_a_cell_that_raised_is_tried_again_and_one_that_ended_early_is_not(tmp_path, monkeypatch):
+    file, disk, well = tmp_path / "sweep.nc", tmp_path / "disk", symtop.integrator("strang[axis]").solvers["axis"]
+    ran, table = [], module._table
+
+    def moody(top, start, plan):
+        if not disk.exists():  # a list of calls would be part of what the numbers depend on
+            disk.touch()
+            raise OSError("the disk is away")
+        return well(top, start, plan)
+
+    monkeypatch.setattr(module, "_table", lambda cell: ran.append(cell.method.name) or table(cell))
+    method = symtop.Integrator(name="moody", family="other", summary="raises once", solvers={"axis": moody})
+    for outcomes, again in (
+        (["raised", "ok"], ["stormer-verlet", "moody"]),
+        (["ok", "ok"], ["moody"]),
+        (["ok"] * 2, []),
+    ):
+        asked = {"step_size": [1.0, 0.02], "path": file, "threads": 1, "quiet": True}
+        data = symtop.sweep("spheroid", ["stormer-verlet", method], **asked)
+        assert data["outcome"].sel(integrator="moody").values[0].tolist() == outcomes
+        assert data["outcome"].sel(integrator="stormer-verlet").values[0].tolist() == ["left_chart", "ok"]
+        assert ran == again
+        ran.clear()
+        xr.testing.assert_identical(datasets.read(file).drop_attrs(), data.drop_attrs())
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
