@@ -9,6 +9,7 @@ from pathlib import Path
 
 LONGEST_PART = 255  # bytes of a name in a folder
 SHOWN = 80  # characters of a name that is told
+MAGIC = (b"\x89HDF", b"CDF")  # the first bytes of netCDF files
 
 
 class SymtopError(ValueError):
@@ -92,6 +93,18 @@ def place(name: str, value: object) -> Path:
         ):
             return path
     raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}")
+
+
+def spare(path: Path) -> None:
+    """Refuse to replace what is there and is no netCDF file: a script, a device, a folder; SymtopError."""
+    if path.is_dir():
+        raise SymtopError(f"cannot write {path}: it is a folder")
+    begun = b""
+    if path.is_file():
+        with path.open("rb") as file:
+            begun = file.read(4)
+    if path.exists() and not begun.startswith(MAGIC):
+        raise SymtopError(f"cannot write {path}: it is there, and no netCDF file; remove it or name another path")
 
 
 def row(name: str, values: object) -> list[float]:

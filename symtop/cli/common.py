@@ -16,7 +16,7 @@ import click
 
 from symtop.base import cache
 from symtop.base.signals import INTERRUPTED, told_apart
-from symtop.base.validate import SymtopError, place
+from symtop.base.validate import SymtopError, place, spare
 
 LONGEST_NAME = 80  # characters of a file that are told
 FIGURES = (".png", ".svg", ".pdf")
@@ -165,6 +165,8 @@ def standing(option: str, file: str | None) -> None:
         raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
     if place(option, file).is_dir():
         raise SymtopError(f"{option} must be a file, not the folder {file!r}")
+    if option == "--output":
+        spare(Path(file))
     try:
         with tempfile.TemporaryFile(dir=place(option, file).absolute().parent):
             pass

@@ -1,13 +1,13 @@
 """An ensemble that goes to a netCDF file piece by piece, and is resumed after it was killed.
 
-Each piece is kept in a file of its own, whole or absent, in the folder ``PATH.parts``. When all are there they are put
-together, one after another, into the netCDF file, which replaces `PATH` in one move; then the folder is removed. The
-bytes of the file do not hang on how often the work was interrupted. While it is put together it takes its size twice.
-One process at a time may do so: it holds the lock ``.PATH.lock``.
+Each piece is kept in a file of its own, whole or absent, in the folder ``PATH.parts``, beside a file that says which
+ensemble it is of. When all are there they are put together, one after another, into the netCDF file, which replaces
+`PATH` in one move; then they are removed, and what says whose they are last. The bytes of the file do not hang on how
+often the work was interrupted. While it is put together it takes its size twice. One process at a time may do so: it
+holds the lock ``.PATH.lock``. Nothing is removed or replaced that symtop did not write.
 """
 
 import contextlib
-import shutil
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,7 +21,7 @@ from symtop.base import datasets
 from symtop.base.fingerprint import digest, file_reasons, hashed, packages
 from symtop.base.locks import locked
 from symtop.base.signals import ending_on_sigterm
-from symtop.base.validate import SymtopError
+from symtop.base.validate import SymtopError, spare
 from symtop.base.walk import Walk
 from symtop.run.columns import as_dataset
 from symtop.run.pieces import PIECE, PIECE_STEPS, Job
@@ -32,8 +32,7 @@ IDENTITY = "identity"  # the file that says which ensemble a folder belongs to
 @contextlib.contextmanager
 def streaming(path: Path, job: Job, labels: dict[str, Any], words: dict[str, Any]) -> Iterator["Stream"]:
     """The stream to a file, while nobody else has one; SymtopError if another process does."""
-    if path.is_dir():
-        raise SymtopError(f"cannot write {path}: it is a folder")
+    spare(path)
     with locked(_folder(path), wait=False) as ours:
         if not ours:
             raise SymtopError(f"another process is writing {path}: wait until it has ended, or name another path")
@@ -52,6 +51,12 @@ class Stream:
         self.path, self.n, self.samples, self.labels, self.words = path, len(job.numbers), job.samples, labels, words
         self.folder = _folder(path)
         identity, told = _identity(job, labels), self.folder / IDENTITY
+        if self.folder.exists() and not told.is_file() and _holds(self.folder):
+            raise SymtopError(
+                f"{self.folder} is there and does not say which ensemble it is of: remove it or name another path than "
+                f"{path}"
+            )
+        datasets.sweep(path)
         if told.is_file() and told.read_text(encoding="utf-8") != identity:
             raise SymtopError(
                 f"{self.folder} holds the beginning of another ensemble, or of another version's; remove it or name "
@@ -71,7 +76,7 @@ class Stream:
 
     def finish(self, pieces: list[slice]) -> xr.Dataset:
         """Put the pieces together; the dataset reads from the file what it is asked for."""
-        with datasets.alone(), datasets.replacing(self.path) as partial:
+        with self._writing(), datasets.alone(), datasets.replacing(self.path) as partial:
             first = self._columns(pieces[0])
             times = first["time"][0]
             shared = all((self._columns(piece, "time")["time"] == times).all() for piece in pieces)
@@ -86,8 +91,22 @@ class Stream:
                         del columns["time"]
                     for name, values in columns.items():
                         file[name][piece] = values.astype(object) if values.dtype.kind == "U" else values
-        shutil.rmtree(self.folder)
+        for kept in (*(self._part(piece) for piece in pieces), self.folder / IDENTITY):
+            kept.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # something of somebody else's is in it
+            self.folder.rmdir()
         return xr.open_dataset(self.path, engine="netcdf4")
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        """The netCDF library has an error of its own for a disk that is full."""
+        try:
+            yield
+        except RuntimeError as error:
+            raise SymtopError(
+                f"cannot write {self.path}: {error}; is the disk full? What was computed is in {self.folder}, and the "
+                "same call goes on from there"
+            ) from error
 
     def _part(self, piece: slice) -> Path:
         return self.folder / f"{piece.start}-{piece.stop}.npz"
@@ -104,6 +123,11 @@ class Stream:
             ) from error
         except (OSError, ValueError, zipfile.BadZipFile) as error:
             raise SymtopError(f"{path} is damaged ({error}): remove it, and it is computed again") from error
+
+
+def _holds(folder: Path) -> bool:
+    """Is anything in a folder, or is it a file?"""
+    return not folder.is_dir() or any(folder.iterdir())
 
 
 def _lay_out(file: Any, pattern: xr.Dataset, n: int) -> None:

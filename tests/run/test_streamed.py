@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -141,6 +142,71 @@ def test_a_piece_that_was_removed_is_not_called_damaged(tmp_path, small_pieces, 
     monkeypatch.setattr(pieces, "PIECE", 21 * 7)
     with symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED) as data:
         assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **ASKED))
+
+
+def test_pieces_that_do_not_say_whose_they_are_belong_to_nobody(tmp_path, small_pieces, monkeypatch):
+    """Such as those of an ensemble that was ended while it removed them."""
+    path, asked = tmp_path / "runs.nc", {**ASKED, "path": tmp_path / "runs.nc"}
+    unlink = Path.unlink
+
+    def killed(file, **asked):
+        if file.name == "28-35.npz":
+            raise KeyboardInterrupt
+        unlink(file, **asked)
+
+    monkeypatch.setattr(Path, "unlink", killed)
+    with pytest.raises(KeyboardInterrupt):
+        symtop.ensemble(SOME, "strang[axis]", **asked)
+    monkeypatch.undo()
+    monkeypatch.setattr(pieces, "PIECE", 21 * 7)
+    others = symtop.population(60, seed=6)
+    with pytest.raises(symtop.SymtopError, match="holds the beginning of another ensemble"):
+        symtop.ensemble(others, "strang[axis]", **asked)
+    made = path.read_bytes()
+    symtop.ensemble(SOME, "strang[axis]", **asked).close()  # the same goes on, to the same file
+    assert path.read_bytes() == made
+    assert [file.name for file in tmp_path.iterdir()] == ["runs.nc"]
+    folder = tmp_path / "runs.nc.parts"
+    folder.mkdir()
+    (folder / "0-7.npz").write_bytes(b"somebody's")
+    with pytest.raises(symtop.SymtopError, match="does not say which ensemble it is of"):
+        symtop.ensemble(SOME, "strang[axis]", **asked)
+    assert (folder / "0-7.npz").read_bytes() == b"somebody's"
+    assert path.read_bytes() == made
+
+
+def test_nothing_is_replaced_that_is_no_netcdf_file(tmp_path, small_pieces):
+    path = tmp_path / "mine.py"
+    path.write_text("print(1)")
+    with pytest.raises(symtop.SymtopError, match="it is there, and no netCDF file"):
+        symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
+    assert path.read_text() == "print(1)"
+    assert [file.name for file in tmp_path.iterdir()] == ["mine.py"]
+    other = tmp_path / "runs.nc"
+    symtop.ensemble(SOME, "strang[axis]", path=other, **ASKED).close()
+    symtop.ensemble(SOME, "rk4[axis]", path=other, **ASKED).close()
+    with xr.open_dataset(other) as data:
+        assert data.attrs["integrator"] == "rk4[axis]"
+
+
+def test_what_a_killed_writer_left_is_swept_and_a_library_without_room_says_so(tmp_path, small_pieces, monkeypatch):
+    path, left = tmp_path / "runs.nc", tmp_path / ".runs.nc.abc.part"
+    left.write_bytes(b"half")
+    full = RuntimeError("NetCDF: HDF error")
+
+    def no_room(*_):
+        raise full
+
+    monkeypatch.setattr(streamed, "_lay_out", no_room)
+    with pytest.raises(symtop.SymtopError, match="is the disk full"):
+        symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
+    assert not left.exists()
+    assert {file.name for file in tmp_path.iterdir()} == {"runs.nc.parts"}
+    monkeypatch.undo()
+    monkeypatch.setattr(pieces, "PIECE", 21 * 7)
+    monkeypatch.setattr(pieces.Job, "columns", no_room)  # nothing is left to be computed
+    symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED).close()
+    assert path.exists()
 
 
 def test_a_file_system_without_locks_is_written_to(tmp_path, monkeypatch):
