@@ -86,7 +86,11 @@ class Watched(Executor):
         future: Future[Any] = Future()
         inner = self._client.submit(function, *args, pure=False, **kwargs)
         with self._lock:
-            self._waiting[future] = inner
+            gone = self._gone  # it may have gone since, and nobody looks any more for what is waited for
+            if not gone:
+                self._waiting[future] = inner
+        if gone:
+            raise SymtopError(gone)
         inner.add_done_callback(lambda done: self._done.put((future, done)))
         return future
 
@@ -134,8 +138,10 @@ class Watched(Executor):
             if not what:
                 last = time.monotonic()
             elif time.monotonic() - last > PATIENCE:
-                self._gone = self._told(what)
-                for future in list(self._waiting):
+                with self._lock:
+                    self._gone = self._told(what)
+                    waiting = list(self._waiting)
+                for future in waiting:
                     self._settle(future, None, SymtopError(self._gone))
                 return
 

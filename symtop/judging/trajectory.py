@@ -29,7 +29,7 @@ from symtop.judging.claims_long import KEPT, Constant
 from symtop.judging.ledger import Finding, undecided
 from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import errors
-from symtop.measure.trajectory import completed
+from symtop.measure.trajectory import completed, refuse_other_scene, sampled
 from symtop.model.scenes import Scene
 from symtop.model.view import space_energy
 
@@ -48,12 +48,10 @@ def is_trajectory(target: Any) -> bool:
 
 
 def read(target: Any) -> dict[str, Any]:
-    """Columns by name, of a file, a Dataset or a mapping; SymtopError for anything else."""
+    """Columns by name, of a text file, a Dataset or a mapping; SymtopError for anything else."""
     if not isinstance(target, (str, Path)):
         columns = {str(name): np.asarray(target[name]) for name in target if str(name) in (*VECTORS, *SCALARS)}
         return columns | {"time": np.asarray(target["time"])} if "time" in target else columns
-    if str(target).lower().endswith(".nc"):
-        return read(datasets.read(target))
     return _text(Path(target))
 
 
@@ -89,8 +87,14 @@ def _text(path: Path) -> dict[str, Any]:
 def findings(target: Any, scene: Scene, conserves: Collection[str] = (), energy: str | None = None) -> list[Finding]:
     """What the samples say: a finding for each error and each constant that they show, or that is claimed.
 
-    What is claimed and not shown is undecided. Raises SymtopError for data that are no trajectory of a top.
+    What is claimed and not shown is undecided. Raises SymtopError for data that are no trajectory of a top, or name
+    another top or start than the scene's.
     """
+    if isinstance(target, (str, Path)) and str(target).lower().endswith(".nc"):
+        target = datasets.read(target)
+    if isinstance(target, xr.Dataset):
+        refuse_other_scene(target, scene)
+        target = sampled(target)
     given = read(target)
     momentum = given.pop("momentum", None)
     apart = errors(given, scene)

@@ -20,7 +20,16 @@ from symtop.base import datasets
 from symtop.base.numbers import EPSILON
 from symtop.base.over_time import over_time
 from symtop.base.validate import SymtopWarning, one_of
-from symtop.measure.trajectory import CONSTANTS, checked, completed, doubts, refuse_other_order, scene_of
+from symtop.measure.trajectory import (
+    CONSTANTS,
+    checked,
+    completed,
+    doubts,
+    refuse_other_order,
+    refuse_other_scene,
+    sampled,
+    scene_of,
+)
 from symtop.model import charts
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.reference import PRECISIONS, reference
@@ -40,8 +49,9 @@ def errors(
 ) -> xr.Dataset:
     """The errors of a run, or of anybody's trajectory of a scene, at every sample, and how far they can be trusted.
 
-    `run` is a dataset of `simulate` (or one read back from its file), which holds its top and start. With a `scene`
-    (a Scene or a name) it is any Dataset or mapping with ``time`` (n,), elapsed since the start, increasing, and one of
+    `run` is a dataset of `simulate` (or one read back from its file), which holds its top and start; a `scene` (a Scene
+    or a name) must then be the same. A member of an `ensemble` needs its scene; samples without a time are left out.
+    With a `scene` it is also any Dataset or mapping with ``time`` (n,), elapsed since the start, increasing, and one of
 
         axis         (n, 3)  unit vectors along the top's axis in the space frame, z up
         quaternion   (n, 4)  w, x, y, z from body to space, either sign; the body's third axis is the top's
@@ -57,11 +67,14 @@ def errors(
 
     Warns (`SymtopWarning`) where a foreign trajectory starts elsewhere than the scene, goes on for a hundred of its
     horizons, or holds NaN.
-    Raises SymtopError for data that are no such trajectory, an unknown scene, and no scene where the data name none.
+    Raises SymtopError for data that are no such trajectory, an unknown scene, one of another top or start than the data
+    name, and no scene where they name none.
     """
     one_of("precision", precision, PRECISIONS)
     foreign = scene is not None and "integrator" not in getattr(run, "attrs", {})
+    run = sampled(run) if isinstance(run, xr.Dataset) else run
     chosen = scene_of(run) if scene is None else find_scene(scene)
+    refuse_other_scene(run, chosen)
     data = checked(run) if foreign or not isinstance(run, xr.Dataset) else run
     truth = reference(chosen, data["time"].values, precision)
     if foreign and "quaternion" in data:

@@ -45,6 +45,32 @@ def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
         ) from error
 
 
+def refuse_other_scene(run: xr.Dataset | Mapping[str, Any], scene: Scene) -> None:
+    """Refuse data that say of which top and start they are, if those are not the scene's."""
+    attributes = getattr(run, "attrs", {})
+    for name, own in (("top", scene.top), ("start", scene.start)):
+        try:
+            told = type(own)(**json.loads(attributes[name]))
+        except (KeyError, TypeError, ValueError):  # they do not say
+            continue
+        if told != own:
+            raise SymtopError(
+                f"scene must be that of the data, {attributes.get('scene', 'of another name')}, whose {name} is "
+                f"{attributes[name]}, not {scene.name}; drop_attrs() makes them a trajectory that is compared with any"
+            )
+
+
+def sampled(run: xr.Dataset) -> xr.Dataset:
+    """A run without the samples that it does not have: a member of an ensemble fills its row with times that are NaN.
+
+    Of other data times are left as they are, so that one that is no number is refused.
+    """
+    if "integrator" not in run.attrs or "time" not in run or run["time"].dims != ("time",):
+        return run
+    there = np.isfinite(_numbers("time", run["time"]))
+    return run if there.all() else run.isel(time=there)
+
+
 def checked(data: xr.Dataset | Mapping[str, Any]) -> xr.Dataset:
     """The known variables of a foreign trajectory over ``time``; an axis and a quaternion are scaled to length one.
 

@@ -63,7 +63,7 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         if quantity not in wrong:
             shows = ", ".join(str(shown) for shown in wrong.data_vars if shown in QUANTITIES)
             raise SymtopError(f"this run does not show the {quantity}; it shows {shows}")
-        ax.plot(times[1:], np.maximum(wrong[quantity].values[1:], LEAST), color=color, lw=1.2)
+        ax.plot(wrong["time"].values[1:], np.maximum(wrong[quantity].values[1:], LEAST), color=color, lw=1.2)
         if known:
             ax.plot(times, np.maximum(data[f"{quantity}_bound"].values, LEAST), color="0.6", lw=0.8, ls=":")
         ax.set(yscale="log", ylabel=QUANTITIES[quantity])

@@ -138,6 +138,27 @@ def test_a_command_of_one_name_says_nothing_of_an_order(words, told):
 
 
 @pytest.mark.parametrize(
+    ("words", "computes"),
+    [
+        (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
+        (["long", "spheroid", "strang", "--steps", "10"], "symtop.run.long_run.long_run"),
+        (
+            ["ensemble", "strang", "--members", "2", "--step-size", "0.1", "--horizon", "1"],
+            "symtop.run.ensemble.ensemble",
+        ),
+    ],
+)
+def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, tmp_path, monkeypatch):
+    assert call(*words, "--output", tmp_path / "a.nc").exit_code == 0
+    monkeypatch.setattr(computes, lambda *_, **__: pytest.fail("it computes"))
+    for option in ("--output", "--figure") if words[0] != "long" else ("--output",):
+        (tmp_path / f"{option}.png").mkdir()
+        done = call(*words, option, tmp_path / f"{option}.png")
+        assert done.exit_code == 2
+        assert f"{option} must be a file, not the folder" in done.output
+
+
+@pytest.mark.parametrize(
     ("words", "called"),
     [
         (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),

@@ -63,6 +63,42 @@ def test_a_run_of_a_scene_that_nobody_registered_is_compared_with_its_own_top():
     assert symtop.errors(run).identical(symtop.errors(run, scene))
 
 
+def test_a_run_is_compared_with_no_other_top_or_start_than_its_own():
+    run, spheroid = symtop.simulate("spheroid", "strang", step_size=0.01, guard=False), symtop.scene("spheroid")
+    start = symtop.Angles(spheroid.start.theta, psi_dot=1.0)
+    moved = symtop.Scene("moved", spheroid.top, start, spheroid.horizon)
+    longer = symtop.Scene("longer", spheroid.top, spheroid.start, 2.0 * spheroid.horizon)
+    assert symtop.errors(run, longer)["axis"].identical(symtop.errors(run)["axis"])
+    for other, name in (("goldstein", "top"), (moved, "start")):
+        with pytest.raises(symtop.SymtopError, match=f"scene must be that of the data, spheroid, whose {name} is"):
+            symtop.errors(run, other)
+        with pytest.raises(symtop.SymtopError, match="scene must be that of the data, spheroid"):
+            symtop.judge(run, scene=other)
+    with pytest.warns(symtop.SymtopWarning, match="on goldstein"):
+        assert float(symtop.errors(run.drop_attrs(), "goldstein")["axis"].max()) > 0.1
+    assert symtop.judge(run)["axis_error"].value == pytest.approx(float(symtop.errors(run)["axis"].max()))
+
+
+def test_a_member_of_fewer_steps_than_samples_has_the_errors_of_its_run():
+    runs = symtop.ensemble(["spheroid"] * 2, "strang", step_size=[0.1, 0.01], samples=101, quiet=True)
+    for k, h in enumerate((0.1, 0.01)):
+        member, alone = (
+            runs.isel(member=k),
+            symtop.simulate("spheroid", "strang", step_size=h, samples=101, guard=False),
+        )
+        assert bool(np.isnan(member["time"]).any()) is (k == 0)
+        wanted = symtop.errors(alone)
+        labelled = member.assign_attrs({name: alone.attrs[name] for name in ("scene", "top", "start", "horizon")})
+        for shown in (symtop.errors(member, "spheroid"), symtop.errors(labelled)):
+            for name in ("time", "axis", "attitude", "energy", "axis_bound"):
+                np.testing.assert_array_equal(shown[name].values, wanted[name].values)
+        assert symtop.judge(member)["axis_error"].value == pytest.approx(float(wanted["axis"].max()))
+    with pytest.raises(symtop.SymtopError, match="scene is missing"):
+        symtop.errors(runs.isel(member=0))
+    with pytest.raises(symtop.SymtopError, match="time must be finite"):  # a stranger's time that is no number
+        symtop.errors(runs.isel(member=0).drop_attrs(), "spheroid")
+
+
 def test_a_run_that_was_written_and_read_gives_the_same(tmp_path):
     run = symtop.simulate("spheroid", "strang", step_size=0.01)
     kept = datasets.read(datasets.write(run, tmp_path / "run.nc"))
