@@ -237,9 +237,12 @@ def _candidates(
     if not chosen:
         cause = f"none met it on {closest}, the nearest stored scene"
         return everyone, f"tried all {len(everyone)} compiled methods ({cause})"
-    if near is not None and served:
-        return chosen, f"tried the {len(chosen)} methods that served most of the {near.tops} nearest random tops"
-    return chosen, f"tried the {len(chosen)} methods that are cheapest on {closest}, the nearest stored scene"
+    nearby = [name for name in chosen if name in served]
+    others = f"{len(chosen) - len(nearby)} methods that are cheapest on {closest}, the nearest stored scene"
+    if near is not None and nearby:
+        said = f"tried the {len(nearby)} methods that served most of the {near.tops} nearest random tops"
+        return chosen, said if len(nearby) == len(chosen) else f"{said}, and {others}"
+    return chosen, f"tried the {others}"
 
 
 def _served(near: Near | None, usable: Sequence[str]) -> list[str]:
