@@ -222,8 +222,7 @@ def _candidates(
         return everyone, f"tried all {len(everyone)} compiled methods (the stored study holds no known scene)"
     numbers = regime(scene)
     closest = min(stored, key=lambda name: float(distances(regime(stored[name])[np.newaxis], numbers)[0]))
-    nutations = horizon / scene.nutation_period
-    column = int(np.argmin(np.abs(np.log(data["horizon"].values / max(nutations, 1e-3)))))
+    column = int(np.argmin(np.abs(np.log(data["horizon"].values / max(horizon / scene.nutation_period, 1e-3)))))
     cell = data.sel(scene=closest).isel(horizon=column)
     cheapest: dict[str, float | None] = {}
     stored_as = "axis" if quantity == "attitude" else quantity  # the study runs what shows the axis
@@ -235,14 +234,12 @@ def _candidates(
     served = _served(near, usable)
     chosen = {name: cheapest.get(name) for name in [*served, *cheapest][:CANDIDATES]}
     if not chosen:
-        cause = f"none met it on {closest}, the nearest stored scene"
-        return everyone, f"tried all {len(everyone)} compiled methods ({cause})"
-    nearby = [name for name in chosen if name in served]
-    others = f"{len(chosen) - len(nearby)} methods that are cheapest on {closest}, the nearest stored scene"
-    if near is not None and nearby:
-        said = f"tried the {len(nearby)} methods that served most of the {near.tops} nearest random tops"
-        return chosen, said if len(nearby) == len(chosen) else f"{said}, and {others}"
-    return chosen, f"tried the {others}"
+        return everyone, f"tried all {len(everyone)} compiled methods (none met it on {closest}, the nearest scene)"
+    count = sum(name in served for name in chosen)
+    words = [f"{count} methods that served the {near.tops} nearest random tops most often"] if near and count else []
+    if len(chosen) > count:
+        words.append(f"{len(chosen) - count} methods that are cheapest on {closest}, the nearest stored scene")
+    return chosen, f"tried the {' and '.join(words)}"
 
 
 def _served(near: Near | None, usable: Sequence[str]) -> list[str]:
