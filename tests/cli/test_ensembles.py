@@ -55,6 +55,16 @@ def test_members_that_fail_are_counted_and_drawn(tmp_path):
 
 
 @pytest.mark.parametrize(
+    "words", [("--members", 60, "--per-nutation", 2), ("--members", 1, "--per-nutation", 20)], ids=["coarse", "alone"]
+)
+def test_runs_of_few_steps_are_drawn(tmp_path, words):
+    done = call("strang", *words, "--nutations", 2, "--figure", tmp_path / "f.png")
+    assert done.exit_code == 0, done.output
+    assert "Warning" not in done.output
+    assert (tmp_path / "f.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
     ("words", "says"),
     [(["strang", *STEPS, "--members", 0], "n must be"), (["strang"], "needs --step-size or --per-nutation"),
      (["strong", *STEPS], "did you mean strang"), (["strang", *STEPS, "--kind", "quick"], "kind"),
