@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.base.validate import SymtopError
+from symtop.base.validate import SymtopError, at_home
 from symtop.measure.spread import LEVELS, QUANTITIES, at_places, member_errors, spread
 from symtop.report.style import LEAST_TEXT, headline, look, panels, save
 
@@ -31,7 +31,7 @@ def draw(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> Path:
     if ended < 1.0:
         sentence += ", and those that failed count as infinitely wrong, at the upper edge"
     headline(figure, sentence)
-    target = Path(path)
+    target = at_home(path)
     save(figure, target)
     return target
 

@@ -100,10 +100,8 @@ def check_formula(method: Integrator, words: str, step: object, tolerance: objec
     if not method.fixed_step and not method.adaptive:
         for name, value in ((words, step), ("tolerance", tolerance)):
             if value is not None:
-                raise SymtopError(
-                    f"{method.name} has nothing to tune and takes neither a step nor a tolerance: leave out {name} = "
-                    f"{shown(value)}"
-                )
+                neither = "give neither a step nor a tolerance"
+                raise SymtopError(f"{method.name} has nothing to tune: {neither}, not {name} = {shown(value)}")
 
 
 def make_plan(

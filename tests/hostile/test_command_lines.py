@@ -90,7 +90,7 @@ BAD = {
     "--per-nutation": NUMBERS, "--nutations": NUMBERS, "--budget": NUMBERS, "--steps": [*NUMBERS, "1e300"],
     "--accuracy": [*NUMBERS, "1e300"], "--limit": NUMBERS,
     "--scene": NAMES, "--kind": NAMES, "--observe": NAMES, "--quantity": NAMES, "--i-use": NAMES, "--chart": NAMES,
-    "--form": NAMES, "--energy": NAMES, "--only": NAMES, "--conserves": NAMES,
+    "--variables": NAMES, "--form": NAMES, "--energy": NAMES, "--only": NAMES, "--conserves": NAMES,
     "--output": FILES, "--figure": FILES, "--card": FILES, "--badge": FILES, "--checkpoint": FILES,
     "--results": FOLDERS, "--plugin": PLUGINS, "--scheduler": ADDRESSES,
 }  # fmt: skip

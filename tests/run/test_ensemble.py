@@ -436,9 +436,9 @@ def test_an_ensemble_for_a_cluster_is_refused_before_it_is_sent(tmp_path):
      ("strang[axis]", {"per_nutation": 0.3}, "per_nutation must be at least 0.5.* not 0.3 as of member 0"),
      ("strang[axis]", {"per_nutation": 20, "nutations": 1e308}, "nutations must be fewer"),
      ("exact", {"nutations": None, "horizon": 1e300}, r"horizon must be at most 1e\+100, not 1e\+300"),
-     ("exact", {"per_nutation": 5}, "takes neither a step nor a tolerance: leave out per_nutation = 5"),
-     ("exact", {"step_size": 0.1}, "leave out step_size = 0.1"),
-     ("exact", {"tolerance": 0.1}, "leave out tolerance = 0.1")],
+     ("exact", {"per_nutation": 5}, "nothing to tune: give neither a step nor a tolerance, not per_nutation = 5"),
+     ("exact", {"step_size": 0.1}, "not step_size = 0.1"),
+     ("exact", {"tolerance": 0.1}, "not tolerance = 0.1")],
 )  # fmt: skip
 def test_settings_are_named_as_they_were_given(name, changed, reason):
     with pytest.raises(symtop.SymtopError, match=reason):
@@ -457,3 +457,14 @@ def test_a_member_of_enormous_inertia_is_refused_without_a_warning():
 def test_members_in_another_dress_are_told_what_they_may_be(change):
     with pytest.raises(symtop.SymtopError, match=r"members must be an xarray.Dataset or a list of scenes, not a"):
         symtop.ensemble(change(SOME.drop_vars("stratum")), "strang[axis]", step_size=0.1, horizon=1.0)
+
+
+def test_a_path_may_begin_at_home(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    asked = {"per_nutation": 20, "nutations": 2, "quiet": True}
+    with symtop.ensemble(SOME, "strang[axis]", path="~/runs.nc", **asked) as data:
+        assert data.sizes["member"] == 36
+    symtop.sweep("spheroid", "strang", step_size=[0.1], horizon=0.5, path="~/sweep.nc", quiet=True)
+    symtop.sweep("spheroid", "strang", step_size=[0.1], horizon=0.5, path="~nobody-of-this-name", quiet=True)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["runs.nc", "sweep.nc", "~nobody-of-this-name"]

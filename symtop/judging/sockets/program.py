@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.base.validate import SymtopError
+from symtop.base.validate import SymtopError, at_home
 from symtop.judging.pulse import pulse
 from symtop.judging.sockets.socket import March, label_of
 from symtop.methods.formulations import FORMULATIONS
@@ -42,6 +42,7 @@ class Program:
 
     def __init__(self, command: str, chart: str) -> None:
         self.words, self.chart, self.form = shlex.split(command), chart, FORMULATIONS[chart]
+        self.words[:1] = [str(at_home(word)) if word.startswith("~") else word for word in self.words[:1]]
         if not self.words or shutil.which(self.words[0]) is None:
             raise SymtopError(f"a program must be a command that can be run, not {command!r}")
         self.name = label_of(Path(self.words[0]).name)
