@@ -12,10 +12,29 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from queue import SimpleQueue
 from typing import Any
 
-from symtop.base.validate import SymtopError
+from symtop.base.validate import SymtopError, shown
 
 PATIENCE = 10  # seconds to wait for a scheduler's answer, or for a worker when there is none
+ABSENT = "scheduler needs the package distributed: pip install 'symtop[distributed]'"
 LOOKS = 2.0  # seconds between two looks at a scheduler
+
+
+def check_sent(address: object, work: object, name: str) -> None:
+    """Refuse an address that is no text, and work of a method, `name`, that cannot be sent to other processes."""
+    if not isinstance(address, str) or not address:
+        must = "the address of a dask scheduler, such as 'tcp://host:8786'"
+        raise SymtopError(f"scheduler must be {must}, not {shown(address)}")
+    try:
+        from distributed.protocol import pickle
+    except ImportError:
+        raise SymtopError(ABSENT) from None
+    try:
+        pickle.dumps(work)
+    except Exception:  # noqa: BLE001  (what cannot be sent says so in many ways)
+        raise SymtopError(
+            f"{name} cannot be sent to other processes: register it (symtop.register) in a plug-in file, or leave out "
+            f"the scheduler"
+        ) from None
 
 
 def connect(address: str) -> Any:
@@ -23,7 +42,7 @@ def connect(address: str) -> Any:
     try:
         import distributed
     except ImportError:
-        raise SymtopError("scheduler needs the package distributed: pip install 'symtop[distributed]'") from None
+        raise SymtopError(ABSENT) from None
     for name in ("client", "batched"):  # what they log of a lost scheduler is told here
         logging.getLogger(f"distributed.{name}").setLevel(logging.CRITICAL)
     client, failure = None, ""

@@ -6,13 +6,13 @@ from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 
-from symtop.base.validate import SymtopError
+from symtop.base.validate import SymtopError, at_home
 
 
 def python_file(path: str | Path, wanted: str) -> Path:
     """A file by its path; SymtopError with the sentence `wanted` if it is not there."""
     try:
-        file = Path(path).resolve()
+        file = at_home(path).resolve()
         if file.is_file():
             return file
     except (OSError, ValueError):  # a name that is too long, or holds a null character

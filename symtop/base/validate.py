@@ -83,9 +83,9 @@ def truth(name: str, value: object) -> bool:
 
 
 def place(name: str, value: object) -> Path:
-    """Return a file's name as a path; refuse what can name none. Nothing is looked for on the disk."""
+    """Return a file's name as a path, ``~`` the user's folder; refuse what can name none. No disk is looked at."""
     if isinstance(value, (str, os.PathLike)):
-        path = Path(value)
+        path = at_home(value)
         if (
             path.name
             and "\0" not in str(path)
@@ -105,6 +105,14 @@ def spare(path: Path) -> None:
             begun = file.read(4)
     if path.exists() and not begun.startswith(MAGIC):
         raise SymtopError(f"cannot write {path}: it is there, and no netCDF file; remove it or name another path")
+
+
+def at_home(path: str | os.PathLike[str]) -> Path:
+    """A path in which a first ``~`` is the user's folder, as a shell reads it; as it stands if nobody has that name."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        return Path(path)
 
 
 def row(name: str, values: object) -> list[float]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from symtop import __version__
+from symtop.cli.common import File
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,7 +23,7 @@ PACKAGE = f"""\
 
 
 @click.command(short_help="BibTeX of the package and of what a dataset used.")
-@click.argument("files", nargs=-1, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("files", nargs=-1, type=File(exists=True, dir_okay=False, path_type=Path))
 def cite(files: tuple[Path, ...]) -> None:
     """Print BibTeX of symtop and of the sources of the integrators in the datasets FILES (netCDF).
 

@@ -1,5 +1,6 @@
 """What the commands share: options, plug-ins, files to write, errors without a traceback, text that fits."""
 
+import contextlib
 import errno
 import json
 import math
@@ -8,7 +9,8 @@ import shutil
 import sys
 import tempfile
 import textwrap
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -16,7 +18,7 @@ import click
 
 from symtop.base import cache
 from symtop.base.signals import INTERRUPTED, told_apart
-from symtop.base.validate import SymtopError, place, spare
+from symtop.base.validate import SymtopError, SymtopWarning, at_home, place, spare
 
 LONGEST_NAME = 80  # characters of a file that are told
 FIGURES = (".png", ".svg", ".pdf")
@@ -33,13 +35,22 @@ def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]
                 warn(f"{Path(file).name} registers no integrator and no scene (symtop.register, symtop.register_scene)")
 
 
+class File(click.Path):
+    """A path in which ``~`` is the user's folder also after ``--option=``, where a shell leaves it."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path, expanded before it is looked at."""
+        home = isinstance(value, str) and value.startswith("~")
+        return super().convert(str(at_home(value)) if home else value, param, ctx)
+
+
 plugin_option = click.option(
     "--plugin", multiple=True, metavar="FILE", callback=_load_plugins, expose_value=False, is_eager=True,
     help="A Python file that registers integrators or scenes.",
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 results_option = click.option(
-    "--results", type=click.Path(file_okay=False), default="results", show_default=True,
+    "--results", type=File(file_okay=False), default="results", show_default=True,
     help="The folder of the datasets, figures and findings.",
 )  # fmt: skip
 
@@ -131,6 +142,23 @@ def _finite(content: Any) -> Any:
     return None if isinstance(content, float) and not math.isfinite(content) else content
 
 
+@contextlib.contextmanager
+def telling() -> Iterator[None]:
+    """What symtop warns of meanwhile is told as the commands tell it, and not as Python shows the warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", SymtopWarning)
+        others = warnings.showwarning
+
+        def tell(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+            if issubclass(category, SymtopWarning):
+                warn(str(message))
+            else:
+                others(message, category, *rest, **more)
+
+        warnings.showwarning = tell
+        yield
+
+
 def say(sentence: str) -> None:
     """Print a sentence to the standard output."""
     click.echo(fitted(sentence, sys.stdout))
@@ -149,9 +177,23 @@ def fitted(text: str, stream: TextIO | None) -> str:
 
 def figure_file(option: str, file: str | None) -> None:
     """Refuse the name of a figure that has no known ending, or no folder to stand in."""
-    if file is not None and Path(file).suffix.lower() not in FIGURES:
-        raise SymtopError(f"{option} must be a file that ends in {' or '.join(FIGURES)}, not {file!r}")
+    ending_in(option, file, FIGURES)
     standing(option, file)
+
+
+def ending_in(option: str, file: str | None, endings: Sequence[str]) -> None:
+    """Refuse the name of a file that does not say what is written into it."""
+    if file is not None and Path(file).suffix.lower() not in endings:
+        raise SymtopError(f"{option} must be a file that ends in {' or '.join(endings)}, not {file!r}")
+
+
+def apart(**files: str | None) -> None:
+    """Refuse two outputs of one command, by their options' names, that are the same file: one would replace another."""
+    seen = dict[Path, str]()
+    for option, file in files.items():
+        other = option if file is None else seen.setdefault(Path(file).resolve(), option)
+        if other != option:
+            raise SymtopError(f"--{other} and --{option} must be two files, not both {file!r}")
 
 
 def standing(option: str, file: str | None) -> None:

@@ -4,10 +4,12 @@ import sys
 
 import click
 
-from symtop.cli.common import as_text, json_option, plugin_option, standing, terminal_width
+from symtop.cli.common import File, apart, as_text, ending_in, json_option, plugin_option, standing, terminal_width
 from symtop.cli.completion import completing
 
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
+
+PAGES, BADGES = (".html", ".htm"), (".svg",)
 
 
 @click.command(short_help="Judge an integrator of your own.")
@@ -23,9 +25,9 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 @click.option("--energy", type=click.Choice(["kept", "bounded"]), help="Claim what becomes of the energy.")
 @click.option("--adaptive", is_flag=True, help="Judge a class of SciPy's at a tolerance, not at fixed steps.")
 @click.option("--quick", is_flag=True, help="Ten seconds at most: shorter runs.")
-@click.option("--output", type=click.Path(dir_okay=False), help="Write the findings to this netCDF file.")
-@click.option("--card", type=click.Path(dir_okay=False), help="Write a page with two figures and the ledger (HTML).")
-@click.option("--badge", type=click.Path(dir_okay=False), help="Write a badge for a README (SVG).")
+@click.option("--output", type=File(dir_okay=False), help="Write the findings to this netCDF file.")
+@click.option("--card", type=File(dir_okay=False), help="Write a page with two figures and the ledger (HTML).")
+@click.option("--badge", type=File(dir_okay=False), help="Write a badge for a README (SVG).")
 @plugin_option
 @json_option
 def judge(
@@ -62,8 +64,11 @@ def judge(
         if shown:
             click.echo(shown)
 
+    ending_in("--card", card, PAGES)
+    ending_in("--badge", badge, BADGES)
     for option, file in (("--output", output), ("--card", card), ("--badge", badge)):
         standing(option, file)
+    apart(output=output, card=card, badge=badge)
     width = terminal_width()
     ledger = judged(
         target, form=form, chart=chart, scene=scene, order=order, symplectic=symplectic, symmetric=symmetric,

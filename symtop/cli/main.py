@@ -16,7 +16,7 @@ import click
 from symtop import __version__
 from symtop.base.validate import SymtopError, positive
 from symtop.cli import cite, ensembles, judge, lists, runs, tools
-from symtop.cli.common import PLUGINS, Group, json_option, plugin_option, results_option, tell_of_compiling, warn
+from symtop.cli.common import PLUGINS, File, Group, json_option, plugin_option, results_option, tell_of_compiling, warn
 from symtop.cli.completion import completing
 
 
@@ -137,7 +137,7 @@ def report(results: str, embed: bool) -> None:
 
 
 @main.command(short_help="Bundle all results for a repository of data.")
-@click.option("--output", type=click.Path(dir_okay=False), help="The zip to write; in the results folder by default.")
+@click.option("--output", type=File(dir_okay=False), help="The zip to write; in the results folder by default.")
 @results_option
 @plugin_option
 def archive(results: str, output: str | None) -> None:

@@ -4,7 +4,7 @@ import sys
 
 import click
 
-from symtop.cli.common import as_text, figure_file, json_option, plugin_option, say, standing, table, warn
+from symtop.cli.common import File, apart, as_text, figure_file, json_option, plugin_option, say, standing, table, warn
 from symtop.cli.completion import completing
 
 
@@ -18,8 +18,8 @@ from symtop.cli.completion import completing
 @click.option("--observe", help="nutation, axis or attitude; by default what the scene names and the method shows.")
 @click.option("--budget", type=float, help="Most steps, or force evaluations of an adaptive method.")
 @click.option("--guard/--no-guard", default=True, help="Warn before the run if a large error is expected.")
-@click.option("--output", type=click.Path(), help="Write the run to this netCDF file.")
-@click.option("--figure", type=click.Path(), help="Draw the run and its errors: .png, .svg or .pdf.")
+@click.option("--output", type=File(), help="Write the run to this netCDF file.")
+@click.option("--figure", type=File(), help="Draw the run and its errors: .png, .svg or .pdf.")
 @plugin_option
 @json_option
 def run(
@@ -40,6 +40,7 @@ def run(
 
     figure_file("--figure", figure)
     standing("--output", output)
+    apart(output=output, figure=figure)
     with ticking("running"):  # the packages are loaded under the clock, too
         from symtop.base import datasets
         from symtop.measure.errors import QUANTITIES, errors_against
@@ -74,7 +75,9 @@ def run(
         click.echo(as_text(findings))
     else:
         told = data.attrs
-        say(f"{told['integrator']}[{told['chart']}] on {chosen.name}: {told['outcome_message']}")
+        method = told["integrator"]
+        row = method if method.endswith("]") else f"{method}[{told['chart']}]"
+        say(f"{row} on {chosen.name}: {told['outcome_message']}")
         say("{steps} steps, {force_evaluations} force evaluations".format(**told))
         if data.attrs["outcome"] == "ok":
             say(f"judged against the truth: {verdict.words()}")
@@ -92,8 +95,8 @@ def run(
 @click.argument("integrator", shell_complete=completing("integrators"))
 @click.option("--steps", type=float, default=1e9, show_default=True, help="Number of steps.")
 @click.option("--step-size", type=float, help="Step; a thousandth of a nutation period by default.")
-@click.option("--checkpoint", type=click.Path(dir_okay=False), help="File to resume from; symtop's own by default.")
-@click.option("--output", type=click.Path(), help="Write the windows to this netCDF file.")
+@click.option("--checkpoint", type=File(dir_okay=False), help="File to resume from; symtop's own by default.")
+@click.option("--output", type=File(), help="Write the windows to this netCDF file.")
 @plugin_option
 def long(
     scene: str, integrator: str, steps: float, step_size: float | None, checkpoint: str | None, output: str | None

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from symtop.base.validate import SymtopError
-from symtop.cli.common import as_text, json_option, plugin_option, results_option, say
+from symtop.cli.common import File, as_text, json_option, plugin_option, results_option, say
 from symtop.cli.completion import completing
 
 
@@ -17,7 +17,7 @@ from symtop.cli.completion import completing
 @click.option("--step-size", type=float, help="Of the engine; 1/240 by default.")
 @click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
-@click.option("--results", type=click.Path(file_okay=False), help="Folder of a stored study; results by default.")
+@click.option("--results", type=File(file_okay=False), help="Folder of a stored study; results by default.")
 @plugin_option
 @json_option
 def recommend(
@@ -41,7 +41,8 @@ def recommend(
     with ticking("loading"):
         from symtop import advise
     if (accuracy is None) is (engine is None):
-        raise SymtopError("recommend takes one of --accuracy, for example 1e-6, and --i-use")
+        both = "" if accuracy is None else ", not both"
+        raise SymtopError(f"recommend takes one of --accuracy, for example 1e-6, and --i-use{both}")
     if engine is not None:
         from symtop.cli.engine_advice import STEP, i_use
 

@@ -44,6 +44,9 @@ def calls(stepper: Stepper, scene: Scene) -> Finding:
     names = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
     other = Angles(*(getattr(start, name) * (1.0 - ELSEWHERE) for name in names))
     first = once(start, h)
+    if not np.isfinite(first).all():
+        what = "NaN" if np.isnan(first).any() else "infinity"
+        return Finding("calls", A_FUNCTION, f"returns {what}", "refuted", f"a step of h = {h:.3g} returns {what}")
     again, third = once(start, h), once(start, h)
     count, differs = (0, 0.0) if stepper.own_loop else _repeated(lambda: once(start, h), third)
     once(other, h)
@@ -53,6 +56,7 @@ def calls(stepper: Stepper, scene: Scene) -> Finding:
     twice, later = _apart(again, third), max(_apart(first, again), _apart(first, after), _apart(again, after))
     if twice > SAME:
         why = f"two calls with the same arguments differ by {twice:.1e}"
+        why = why if np.isfinite(twice) else "of calls with the same arguments one returns NaN and another does not"
         return Finding("calls", A_FUNCTION, "not repeatable", "refuted", why, twice, SAME)
     if later > SAME:
         why = f"it keeps something between calls: after a step elsewhere the same call differs by {later:.1e}"
@@ -95,6 +99,8 @@ def _steps_missed(stepper: Stepper, scene: Scene, h: float) -> tuple[float, str]
         return stepper.march(scene.top, par, y.copy(), h, np.array([steps])).states[0]
 
     a_step = float(np.max(np.abs(run(start, 1) - start)))
+    if a_step == 0.0:  # it stands still, which is not to count wrongly
+        return 0.0, ""
     worst, why = 0.0, ""
     for first, second in PARTS:
         gap = float(np.max(np.abs(run(start, first + second) - run(run(start, first), second)))) / a_step

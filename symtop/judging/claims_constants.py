@@ -108,7 +108,7 @@ def _kept(method: Integrator, run: long.LongRun, claim: str) -> Finding:
 
 def _constant(claim: str, declared: str, run: long.LongRun, constant: long.Constant) -> Finding:
     kind, changed, verdict = constant.kind, constant.changed, "undecided"
-    measured = f"{kind}, {changed.largest:.0e}".replace("0e+00", "0") if kind != "unknown" else ""
+    measured = f"{kind}, {changed.largest:.0e}".replace("0e+00", "0") if kind != "unknown" and run.steps else ""
     why = f"largest relative change {changed.largest:.1e} in {_span(run)}, {constant.a_step:.0e} in one step at most"
     if kind not in ("kept", "unknown"):
         why += f", growth exponent {changed.exponent:.2f} +- {changed.exponent_interval:.2f}"

@@ -7,6 +7,7 @@ them refutes it, and confirmed if the slope confirms it, or the series where a s
 """
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -78,7 +79,10 @@ def _by_steps(
     if method.exact_steps:
         return exactness(method, scene, quick=quick)
     series = series_of(method, scene, quick=quick) if method.fixed_step else None
-    fitted = measured_order(method, scene, quick=quick, finest=finest)
+    fitted, claim = measured_order(method, scene, quick=quick, finest=finest), method.order
+    if series is not None and _steps_are_those_of_another_order(fitted, series, method):
+        method = replace(method, order=max(series.order, 1))
+        fitted = measured_order(method, scene, quick=quick, finest=finest)
     traces["step_size"], traces["error"], traces["fitted"] = settings_shown(fitted, SHOWN)
     main = fitted.fits[fitted.observed]
     measured = str(main) if math.isfinite(main.slope) else ""
@@ -90,7 +94,17 @@ def _by_steps(
             why = f"as its step goes to zero it goes to a motion that is wrong by {wrong:.1e} ({slopes})"
             verdict = "refuted" if declared else "measured"
             return Finding("order", declared, f"wrong limit, {wrong:.0e}", verdict, why, wrong, TRUE_LIMIT)
-    return weighed(method.order, fitted, series, slopes)
+    return weighed(claim, fitted, series, slopes)
+
+
+def _steps_are_those_of_another_order(fitted: Order, series: ChartSeries, method: Integrator) -> bool:
+    """Was no slope found with the steps of a declared order, beyond the one that a term of a step shows?
+
+    A method of high order is tried at long steps, whose errors fall as no power where the order is low, and the limit
+    of its runs is extrapolated by a power that they do not have: it looks wrong.
+    """
+    judged = math.isfinite(fitted.fits[fitted.observed].slope)
+    return not judged and series.series.seen and series.order < (method.order or 0)
 
 
 def weighed(claim: int | None, fitted: Order, series: ChartSeries | None, slopes: str) -> Finding:

@@ -24,7 +24,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.base import datasets
-from symtop.base.validate import SymtopError
+from symtop.base.validate import SymtopError, at_home
 from symtop.judging.claims_long import KEPT, Constant
 from symtop.judging.ledger import Finding, undecided
 from symtop.measure.conservation import CONSTANTS, constant_of
@@ -52,7 +52,9 @@ def read(target: Any) -> dict[str, Any]:
     if not isinstance(target, (str, Path)):
         columns = {str(name): np.asarray(target[name]) for name in target if str(name) in (*VECTORS, *SCALARS)}
         return columns | {"time": np.asarray(target["time"])} if "time" in target else columns
-    return _text(Path(target))
+    if str(target).lower().endswith(".nc"):
+        return read(datasets.read(at_home(target)))
+    return _text(at_home(target))
 
 
 def _text(path: Path) -> dict[str, Any]:

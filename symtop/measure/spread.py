@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 QUANTITIES = {"axis": "angle between axes (rad)", "energy": "energy error / (E0 - min V)"}
 LEVELS = (0.01, 0.1, 0.5, 0.9, 0.99)
+ROUNDED = 1e-9  # of a horizon: a sample that is later than a place by less than this is there
 BLOCK = 1 << 20  # samples that are compared at a time
 
 
@@ -29,6 +30,9 @@ def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array
     n, samples = data.sizes["member"], data.sizes["time"]
     if members.sizes.get("member") != n:
         raise SymtopError(f"members must be the {n} of the ensemble, not {members.sizes.get('member')}")
+    labels = [given.indexes["member"] for given in (members, data) if "member" in given.indexes]
+    if len(labels) == 2 and [*map(str, labels[0])] != [*map(str, labels[1])]:
+        raise SymtopError("members must be those of the ensemble in their order, and their labels are others")
     if quantity not in data:
         raise SymtopError(f"the ensemble was asked for without the variable {quantity}")
     errors, stride = np.empty((n, samples)), max(1, BLOCK // samples)
@@ -51,6 +55,29 @@ def _errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
             errors = np.abs(values - values[:, :1]) / unit[:, None]
     known = np.isfinite(truth).all(axis=2) if quantity == "axis" else True
     return np.where(asked & known, np.where(np.isfinite(errors), errors, np.inf), np.nan)
+
+
+def at_places(data: xr.Dataset, errors: Array) -> tuple[Array, Array]:
+    """Errors of members at places that are the same for all: shares (places,) of their horizons and errors (n, places).
+
+    Where all members have all samples, sample k of each lies within half an interval between samples of the same share
+    (and within half a step; dithered samples are so far apart), and the place is the mean of these shares. Where runs
+    had fewer steps than samples, the places are those of as many even ones as the longest run has samples at which each
+    member has made a step, and each has there the error of its latest sample at or before the place: its error as it
+    was known by then. A failed run, which has samples to the end, stays infinitely wrong.
+    """
+    times = np.broadcast_to(data["time"].values, errors.shape)
+    with np.errstate(invalid="ignore"):
+        shares = times / data["horizon"].values[:, None]
+    counts = np.isfinite(shares).sum(axis=1)
+    if (counts == errors.shape[1]).all():
+        return shares.mean(axis=0), errors
+    places = np.linspace(0.0, 1.0, int(counts.max()))
+    places = places[places + ROUNDED >= shares[:, 1].max()] + ROUNDED  # at a start no method is wrong
+    latest = np.empty((len(errors), places.size))
+    for i, count in enumerate(counts):
+        latest[i] = errors[i, np.searchsorted(shares[i, :count], places, side="right") - 1]
+    return places - ROUNDED, latest
 
 
 def spread(errors: Array, levels: tuple[float, ...] = LEVELS) -> Array:

@@ -7,6 +7,7 @@ that need 40 digits follow one by one, 15 milliseconds each.
 """
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -134,19 +135,22 @@ class ClosedForms:
         return fill(self.constants, rows if rows.flags.writeable else rows.copy(), view)
 
 
-def checked(numbers: ArrayLike) -> Array:
-    """The rows as compiled code takes them; SymtopError for the first that is no top or no start."""
+def checked(numbers: ArrayLike, names: Any = None) -> Array:
+    """The rows as compiled code takes them; SymtopError for the first that is no top or no start, by its name."""
     rows = real_numbers("numbers", numbers)
     rows = rows if rows.flags.writeable else rows.copy()  # compiled code takes no other
     if rows.ndim != 2 or rows.shape[1] != len(NUMBERS):
         raise SymtopError(f"numbers must have the shape (n, 9), with {', '.join(NUMBERS)}, not {rows.shape}")
     inertia, theta = rows[:, :2], rows[:, 3]
     good = ((rows <= LARGEST) & (rows >= -LARGEST)).all(axis=1) & (inertia >= 1.0 / LARGEST).all(axis=1)
-    good &= (rows[:, 1] <= 2.0 * rows[:, 0]) & (theta >= 0.0) & (theta <= np.pi)
+    with np.errstate(over="ignore"):  # of rows that are refused anyway
+        fits = rows[:, 1] <= 2.0 * rows[:, 0]
+    good &= fits & (theta >= 0.0) & (theta <= np.pi)
     for member in np.flatnonzero(~good).tolist():
         row = rows[member].tolist()
         try:
             SymmetricTop(*row[:3]), Angles(*row[3:])
         except SymtopError as error:
-            raise SymtopError(f"member {member}: {error}") from None
+            called = member if names is None else names[member]
+            raise SymtopError(f"member {called}: {error}") from None
     return rows

@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from symtop.base import datasets
-from symtop.base.validate import SymtopError
+from symtop.base.validate import SymtopError, at_home
 from symtop.judging.judge_step import Judged
 from symtop.judging.ledger import Finding, spoken
 from symtop.judging.screen import described
@@ -152,7 +152,7 @@ def write_badge(ledger: Judged, path: str | Path) -> Path:
 
 
 def _written(text: str, path: str | Path) -> Path:
-    target = Path(path)
+    target = at_home(path)
     with datasets.replacing(target, target.suffix) as partial:
         partial.write_text(text, encoding="utf-8")
     return target

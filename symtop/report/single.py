@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from symtop.base.validate import at_home
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES
 from symtop.model.scenes import Scene
@@ -48,7 +49,7 @@ def draw(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Dataset, p
         for axis in axes[:, 0]:
             axis.axvline(run.attrs["reached_time"], color=VERMILLION, ls="--", label="stopped here")
     legend_below(figure, axes)
-    target = Path(path)
+    target = at_home(path)
     save(figure, target)
     return target
 

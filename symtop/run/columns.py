@@ -2,9 +2,17 @@
 
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from symtop.base.over_time import PARTS
+
+
+def same_times(times: Any, row: Any) -> bool:
+    """Are these times of members (n, samples) all that row? NaN is what both have beyond runs of few steps."""
+    if (times == row).all():
+        return True
+    return bool(np.isnan(row).any() and np.array_equal(times, np.broadcast_to(row, times.shape), equal_nan=True))
 
 
 def as_dataset(columns: dict[str, Any], labels: dict[str, Any], *, shared: bool | None = None) -> xr.Dataset:
@@ -14,7 +22,7 @@ def as_dataset(columns: dict[str, Any], labels: dict[str, Any], *, shared: bool 
     """
     times = columns["time"]
     if shared is None:
-        shared = bool((times == times[0]).all())
+        shared = same_times(times, times[0])
     parts = [name for name, held in (("component", "axis"), ("part", "quaternion")) if held in columns]
     ends = {"axis": "component", "quaternion": "part"}
     variables = {

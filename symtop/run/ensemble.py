@@ -5,6 +5,7 @@ Members are computed in pieces (`symtop.run.pieces`), on threads or on a cluster
 """
 
 import contextlib
+import warnings
 from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,15 +18,16 @@ from tqdm import tqdm
 from symtop.base import cluster, datasets
 from symtop.base.progress import beating
 from symtop.base.threads import MOST_THREADS, cores, in_order, in_threads
-from symtop.base.validate import SymtopError, place, positive, truth, whole
+from symtop.base.validate import SymtopError, SymtopWarning, place, positive, shown, truth, whole
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.registry import Integrator, integrator as find_integrator
+from symtop.model.motion_samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.columns import as_dataset
-from symtop.run.members import Members, for_each, read_members
-from symtop.run.pieces import SHOWN, Job
+from symtop.run.members import Members, called, for_each, read_members
+from symtop.run.pieces import RAISED, SHOWN, Job
 from symtop.run.schedule import nutation_periods
-from symtop.run.simulation import MOST_SAMPLES, MOST_STEPS, MOST_SWINGS, chart_of
+from symtop.run.simulation import MOST_SAMPLES, MOST_STEPS, MOST_SWINGS, chart_of, check_formula
 from symtop.run.streamed import streaming
 
 Array = NDArray[np.float64]
@@ -57,11 +59,14 @@ def ensemble(
     ``outcome``, ``steps``, ``force_evaluations``, ``newton_iterations``, ``reached_time``, ``step_size``, ``horizon``,
     ``dithered``. ``time`` is a row where all members are sampled at the same times, and otherwise an array over
     ``member`` and ``time``; ``data.isel(member=i)`` has a row either way. A member of fewer steps than `samples` shows
-    every step, and the rest of its row is NaN.
+    every step, and the rest of its row is NaN. Labels of members, a coordinate ``member``, are kept, and what is given
+    for each as a DataArray with such labels is taken by label.
 
     A member that fails fails alone: its samples are NaN from there, ``outcome`` says why. One that starts on a pole has
-    left the angles chart at once. `observe` picks the chart as in `simulate` (default: what the scenes are watched for,
-    the axis of a dataset). `budget` is that of one member. There is no guard.
+    left the angles chart at once, and one on which somebody's solver raises an exception has "raised": a warning
+    (`SymtopWarning`), and the attribute ``raised`` of a dataset in memory, tells the first such exception. If all
+    members raise, SymtopError does. `observe` picks the chart as in `simulate` (default: what the scenes are watched
+    for, the axis of a dataset). `budget` is that of one member. There is no guard.
 
     Work is done on as many `threads` as there are cores, or by the workers of the dask cluster at the address
     `scheduler`. The attribute ``execution`` says how members were run: in "lanes", 32 side by side, where the method
@@ -76,20 +81,22 @@ def ensemble(
     count, silent = whole("samples", samples, 2, MOST_SAMPLES), truth("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
     chart = chart_of(method, read.observes, observe)
-    shown = _shown(variables, chart)
+    names = _shown(variables, chart)
     if path is None:
-        _check_memory(len(read.numbers), count, shown)
+        _check_memory(len(read.numbers), count, names)
     limit = None if budget is None else positive("budget", budget)
     asked = _Asked(step_size, per_nutation, tolerance, horizon, nutations)
-    job = _job(read, method, chart, asked, count, limit, shown)
+    job = _job(read, method, chart, asked, count, limit, names)
+    if scheduler is not None:
+        cluster.check_sent(scheduler, job.part(slice(0, 1)), method.name)
     n, pieces = len(read.numbers), list(job.pieces())
     words = {
         "title": f"{method.name} on {n} tops", "units": read.units, "integrator": method.name, "chart": chart,
         "implementation": method.implementation, "execution": job.execution,
     }  # fmt: skip
 
-    def compute(rest: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> None:
-        left = sum(piece.stop - piece.start for piece in rest)
+    def compute(rest: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> _Raised:
+        left, raised = sum(piece.stop - piece.start for piece in rest), _Raised(0, "")
         with (
             beating(
                 tqdm(total=n, initial=n - left, desc=words["title"], unit="top", disable=silent or None, leave=False)
@@ -97,16 +104,28 @@ def ensemble(
             contextlib.closing(_computed(job, rest, workers, scheduler)) as parts,
         ):
             for piece, part in zip(rest, parts, strict=True):
+                raised = raised.and_of(part)
                 keep(piece, part)
                 bar.update(piece.stop - piece.start)
+        return raised
 
-    if path is not None:
+    if path is None:
+        columns = dict[str, Any]()
+        raised = compute(pieces, lambda piece, part: _fill(columns, part, piece, n))
+        raised.refuse(n)
+        said = {RAISED: raised.first} if raised.members else {}
+        data = datasets.describe(as_dataset(columns, read.labels), **words, **said)
+    else:
         with streaming(place("path", path), job, read.labels, words) as stream:
-            compute(stream.missing(pieces), stream.keep)
-            return stream.finish(pieces)
-    columns = dict[str, Any]()
-    compute(pieces, lambda piece, part: _fill(columns, part, piece, n))
-    return datasets.describe(as_dataset(columns, read.labels), **words)
+            raised = compute(stream.missing(pieces), stream.keep)
+            if raised.members == n:
+                stream.forget(pieces)  # there is nothing to resume
+            raised.refuse(n)
+            data = stream.finish(pieces)
+    if raised.members:
+        sentence = f"{raised.members} of {n} members raised an exception, the first: {raised.first}"
+        warnings.warn(sentence, SymtopWarning, stacklevel=2)
+    return data
 
 
 def _computed(
@@ -119,6 +138,23 @@ def _computed(
     else:
         with cluster.connected(scheduler) as client, cluster.Watched(client) as pool:
             yield from in_order(pool, Job.columns, parts, cluster.width(client))
+
+
+class _Raised(NamedTuple):
+    """How many members a solver raised an exception on, and what the first of them was told."""
+
+    members: int
+    first: str
+
+    def and_of(self, part: dict[str, Any]) -> "_Raised":
+        """With those of a piece, whose sentence is taken out of it."""
+        said = part.pop(RAISED, "")
+        return _Raised(self.members + int((part["outcome"] == RAISED).sum()), self.first or said) if said else self
+
+    def refuse(self, n: int) -> None:
+        """SymtopError if that are all n."""
+        if self.members == n:
+            raise SymtopError(self.first)
 
 
 def _fill(columns: dict[str, Any], part: dict[str, Any], piece: slice, n: int) -> None:
@@ -172,13 +208,14 @@ class _Asked(NamedTuple):
             ("step_size", None),
         )
         if method.fixed_step and self.tolerance is not None:
-            raise SymtopError(f"{method.name} has a fixed step: give step_size, not tolerance = {self.tolerance!r}")
+            raise SymtopError(
+                f"{method.name} has a fixed step: give step_size, not tolerance = {shown(self.tolerance)}"
+            )
         if method.fixed_step and step is None:
             raise SymtopError(f"{method.name} has a fixed step and needs step_size or per_nutation")
+        check_formula(method, words, step, self.tolerance)
         if not method.fixed_step and step is not None:
-            raise SymtopError(f"{method.name} chooses its own steps: give tolerance, not {words} = {step!r}")
-        if method.control is None and self.tolerance is not None:
-            raise SymtopError(f"{method.name} has nothing to tune: leave tolerance out, not {self.tolerance!r}")
+            raise SymtopError(f"{method.name} chooses its own steps: give tolerance, not {words} = {shown(step)}")
 
 
 def _job(
@@ -188,60 +225,88 @@ def _job(
     """What is asked of an integrator, checked."""
     asked.check(method)
     n, numbers, horizon = len(members.numbers), members.numbers, members.horizon
-    counted = asked.per_nutation is not None or asked.nutations is not None
-    period = _periods(numbers) if counted else None
+    names = members.names
+    period = None
+    if asked.per_nutation is not None or asked.nutations is not None:
+        period = _periods(numbers, names)
     if period is not None and asked.nutations is not None:
-        horizon = for_each("nutations", asked.nutations, n) * period
+        with np.errstate(over="ignore"):  # an infinite horizon is refused below
+            horizon = for_each("nutations", asked.nutations, n, names) * period
     elif asked.horizon is not None:
-        horizon = for_each("horizon", asked.horizon, n)
+        horizon = for_each("horizon", asked.horizon, n, names)
     if horizon is None:
         raise SymtopError("these members have no horizon of their own: give horizon or nutations")
     horizon_of(float(horizon.min()))
+    _check_ends(horizon, asked, names)
     steps = bounds = None
     if period is not None and asked.per_nutation is not None:
-        steps = _steps(period / for_each("per_nutation", asked.per_nutation, n), horizon, budget or MOST_STEPS)
+        counted = for_each("per_nutation", asked.per_nutation, n, names)
+        steps = _steps(_parts(period, counted, horizon, names), horizon, budget or MOST_STEPS, names)
     elif method.fixed_step:
-        steps = _steps(for_each("step_size", asked.step_size, n), horizon, budget or MOST_STEPS)
+        steps = _steps(for_each("step_size", asked.step_size, n, names), horizon, budget or MOST_STEPS, names)
     elif method.adaptive:
         period = nutation_periods(numbers) if period is None else period
-        bounds = _tolerances(method, asked.tolerance, numbers, horizon, period)
-    return Job(method, chart, numbers, horizon, steps, bounds, samples, budget, shown, period)
+        bounds = _tolerances(method, asked.tolerance, members, horizon, period)
+    return Job(method, chart, numbers, horizon, steps, bounds, samples, budget, shown, period, names)
 
 
-def _periods(numbers: Array) -> Array:
+def _check_ends(horizon: Array, asked: "_Asked", names: Any) -> None:
+    """Refuse a horizon beyond the times that the closed form takes."""
+    for i in np.flatnonzero(horizon > LONGEST_TIME)[:1]:
+        if asked.nutations is not None:
+            raise SymtopError(
+                f"nutations must be fewer: they take {called(names, i)} beyond a time of {LONGEST_TIME:g}"
+            )
+        raise SymtopError(f"horizon must be at most {LONGEST_TIME:g}, not {horizon[i]!s} as of {called(names, i)}")
+
+
+def _periods(numbers: Array, names: Any) -> Array:
     """Nutation periods; SymtopError for a member that has none."""
     period = nutation_periods(numbers)
     endless = np.flatnonzero(~np.isfinite(period))
     if endless.size:
         raise SymtopError(
-            f"per_nutation and nutations count nutation periods, and that of member {endless[0]} is endless"
+            f"per_nutation and nutations count nutation periods, and that of {called(names, endless[0])} is endless"
         )
     return period
 
 
-def _steps(step: Array, horizon: Array, most: float) -> NDArray[np.int64]:
+def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
+    """A step of each member, of which its nutation period has so many."""
+    with np.errstate(over="ignore"):  # a step that is infinite is longer than the horizon, too
+        step: Array = period / counted
+    for i in np.flatnonzero(step > horizon)[:1]:
+        least = f"{period[i] / horizon[i]:.4g}, a step within the horizon"
+        raise SymtopError(f"per_nutation must be at least {least}, not {counted[i]:.4g} as of {called(names, i)}")
+    return step
+
+
+def _steps(step: Array, horizon: Array, most: float, names: Any) -> NDArray[np.int64]:
     """Whole steps of each member, as `simulation.make_plan` counts and refuses them."""
     with np.errstate(over="ignore"):
         ratio = horizon / step
     for i in np.flatnonzero(step > horizon)[:1]:
-        raise SymtopError(f"step_size must be at most the horizon, not {step[i]!s} of {horizon[i]!s} as of member {i}")
+        raise SymtopError(
+            f"step_size must be at most the horizon, not {step[i]!s} of {horizon[i]!s} as of {called(names, i)}"
+        )
     for i in np.flatnonzero(ratio > most)[:1]:
-        raise SymtopError(f"member {i} asks for {ratio[i]:.3g} steps; the limit is {most:.3g} (see budget)")
+        raise SymtopError(f"{called(names, i)} asks for {ratio[i]:.3g} steps; the limit is {most:.3g} (see budget)")
     return np.maximum(1, np.rint(ratio)).astype(np.int64)
 
 
-def _tolerances(method: Integrator, tolerance: object, numbers: Array, horizon: Array, period: Array) -> Array:
+def _tolerances(method: Integrator, tolerance: object, members: Members, horizon: Array, period: Array) -> Array:
     """Tolerance of each member; a horizon that `simulation.make_plan` would refuse is refused."""
+    numbers, names = members.numbers, members.names
     pendulum = np.sqrt(np.abs(numbers[:, 2]) / numbers[:, 0]) / (2.0 * np.pi)
     swings = horizon * np.maximum(1.0 / period, pendulum)
     for i in np.flatnonzero(swings > MOST_SWINGS)[:1]:
         raise SymtopError(
-            f"the horizon of member {i} is {swings[i]:.3g} swings of the top; an adaptive method may take "
+            f"the horizon of {called(names, i)} is {swings[i]:.3g} swings of the top; an adaptive method may take "
             f"{MOST_SWINGS:.3g}"
         )
     if np.ndim(tolerance) == 0:  # type: ignore[arg-type]
         return np.broadcast_to(method.check_tolerance(tolerance), len(numbers))
-    row = for_each("tolerance", tolerance, len(numbers))
+    row = for_each("tolerance", tolerance, len(numbers), names)
     for value in (row.min(), row.max()):
         method.check_tolerance(float(value))
     return row

@@ -35,6 +35,8 @@ PIECE = 65_536  # values of one column in a piece: half a megabyte, which stays 
 PIECE_STEPS = 5_000_000  # in a piece: a hundredth of a second in lanes, to a second
 SHARES, LEAST_STEPS = 16, 200_000  # threads share even a small ensemble, in pieces of a millisecond or more
 UNKNOWN_STEPS = 1000  # what a member counts for that chooses its steps, or makes none
+RAISED = "raised"  # outcome of a member on which a solver raised an exception
+ENDS = (*OUTCOMES, RAISED)
 IN_LANES = "lanes"
 IN_TURN = "compiled, one after another"
 IN_PYTHON = "one call of Python for each"
@@ -72,6 +74,7 @@ class _Runs(NamedTuple):
     newton_iterations: Any
     outcome: Any
     reached: Array
+    raised: str = ""  # what the first solver said that raised an exception
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,7 @@ class Job:
     budget: float | None
     shown: tuple[str, ...]  # of `SHOWN`
     period: Array | None = None  # of nutation, where it is known
+    names: Any = None  # what members are called (n,), where they have labels
     first: int = 0  # number of the first member
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -129,22 +133,22 @@ class Job:
 
     def part(self, members: slice) -> "Job":
         """The same for some members."""
-        arrays = ("numbers", "horizon", "steps", "tolerance", "period")
+        arrays = ("numbers", "horizon", "steps", "tolerance", "period", "names")
         cut = {name: values[members] for name in arrays if (values := getattr(self, name)) is not None}
         return replace(self, first=self.first + members.start, **cut)
 
     def columns(self) -> dict[str, Any]:
-        """The runs: ``time``, what they show, and what is `TOLD` of each member."""
+        """The runs: ``time``, what they show, what is `TOLD` of each member, and what the first said that `RAISED`."""
         period = nutation_periods(self.numbers) if self.period is None else self.period
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
             runs = _whole(self._runs(plan), plan)
             columns = self._observables(runs, plan.times)
         told = dict(zip(TOLD, (
-            np.array(OUTCOMES)[runs.outcome], runs.steps, runs.force_evaluations, runs.newton_iterations, runs.reached,
+            np.array(ENDS)[runs.outcome], runs.steps, runs.force_evaluations, runs.newton_iterations, runs.reached,
             plan.step_size, self.horizon, plan.dithered,
         ), strict=True))  # fmt: skip
-        return {"time": plan.times, **columns, **told}
+        return {"time": plan.times, **columns, **told} | ({RAISED: runs.raised} if runs.raised else {})
 
     def _runs(self, plan: Schedule) -> _Runs:
         """The states of the members, by the quickest way there is."""
@@ -165,8 +169,8 @@ class Job:
     def _in_turn(self, plan: Schedule) -> _Runs:
         """The same by one call of a solver for each member.
 
-        A member fails alone if it starts on a pole, where the angles chart ends, and if its numbers leave the range of
-        the arithmetic that a solver in Python does (`ArithmeticError`); any other error of a solver ends the ensemble.
+        A member fails alone if it starts on a pole, where the angles chart ends, if its numbers leave the range of the
+        arithmetic that a solver in Python does (`ArithmeticError`), and if the solver raises anything else.
         """
         n = len(plan.counts)
         states = np.full((n, self.samples, charts.DIMENSIONS[self.chart]), np.nan)
@@ -182,11 +186,13 @@ class Job:
                 continue
             one = self._plan(i, plan)
             try:
-                run = solve(self.method, self.chart, top, start, one, f" on member {self.first + i}")
+                name = self.first + i if self.names is None else self.names[i]
+                run = solve(self.method, self.chart, top, start, one, f" on member {name}")
             except SymtopError as error:
-                if not isinstance(error.__cause__, (ArithmeticError, np.linalg.LinAlgError)):
-                    raise
-                runs.outcome[i] = NOT_FINITE
+                arithmetic = isinstance(error.__cause__, (ArithmeticError, np.linalg.LinAlgError))
+                runs.outcome[i] = NOT_FINITE if arithmetic else ENDS.index(RAISED)
+                if not (arithmetic or runs.raised):
+                    runs = runs._replace(raised=str(error))
                 continue
             runs.states[i, : one.times.size] = run.states
             runs.momenta[i, : one.times.size] = np.stack([run.p_phi, run.p_psi], axis=-1)

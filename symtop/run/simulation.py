@@ -95,6 +95,15 @@ def likely_step(scene: Scene, method: Integrator, horizon: float, accuracy: floa
     return min(0.2 * scene.time_scale(horizon) * math.pow(accuracy, 1.0 / power), horizon)
 
 
+def check_formula(method: Integrator, words: str, step: object, tolerance: object) -> None:
+    """Refuse a step (`words` is what it is called) and a tolerance for a formula, which has nothing to tune."""
+    if not method.fixed_step and not method.adaptive:
+        for name, value in ((words, step), ("tolerance", tolerance)):
+            if value is not None:
+                neither = "give neither a step nor a tolerance"
+                raise SymtopError(f"{method.name} has nothing to tune: {neither}, not {name} = {shown(value)}")
+
+
 def make_plan(
     scene: Scene, method: Integrator, step_size: object = None, tolerance: object = None, *, horizon: float,
     samples: int, budget: float | None = None,
@@ -118,10 +127,9 @@ def make_plan(
         steps = max(1, round(horizon / step))
         _, marks, dithered = sample_times(horizon, samples, period, steps)
         return Plan.steps(horizon / steps, marks, horizon), dithered
+    check_formula(method, "step_size", step_size, tolerance)
     if step_size is not None:
         raise SymtopError(f"{method.name} chooses its own steps: give tolerance, not step_size = {shown(step_size)}")
-    if not method.adaptive and tolerance is not None:
-        raise SymtopError(f"{method.name} has nothing to tune: leave tolerance out, not {shown(tolerance)}")
     bound = method.check_tolerance(tolerance) if method.adaptive else math.nan
     swings = horizon * max(1.0 / period, math.sqrt(abs(scene.top.mgl) / scene.top.I1) / (2.0 * math.pi))
     if method.adaptive and swings > MOST_SWINGS:

@@ -91,11 +91,15 @@ class Stream:
                         del columns["time"]
                     for name, values in columns.items():
                         file[name][piece] = values.astype(object) if values.dtype.kind == "U" else values
+        self.forget(pieces)
+        return xr.open_dataset(self.path, engine="netcdf4")
+
+    def forget(self, pieces: list[slice]) -> None:
+        """Remove the pieces, what says whose they are last."""
         for kept in (*(self._part(piece) for piece in pieces), self.folder / IDENTITY):
             kept.unlink(missing_ok=True)
         with contextlib.suppress(OSError):  # something of somebody else's is in it
             self.folder.rmdir()
-        return xr.open_dataset(self.path, engine="netcdf4")
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[None]:

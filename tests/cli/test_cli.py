@@ -353,3 +353,24 @@ def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_doe
     assert done.returncode == 3
     done = ending(code="'a text'")
     assert (done.returncode, done.stderr) == (1, "a text\n")
+
+
+def test_a_row_is_named_once_and_a_file_written_once(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ["run", "spheroid", "--step-size", "0.1", "--horizon", "1", "--no-guard"]
+    for name, row in (("rk4[axis]", "rk4[axis]"), ("rk4", "rk4[angles]")):
+        done = CliRunner().invoke(main, [*words, name])
+        assert done.output.startswith(f"{row} on spheroid: reached")
+    done = CliRunner().invoke(main, [*words, "rk4", "--output", "a.png", "--figure", "./a.png"])
+    assert (done.exit_code, list(tmp_path.iterdir())) == (2, [])
+    assert "--output and --figure must be two files" in done.output
+    done = CliRunner().invoke(main, ["run", "spheroid", "exact", "--step-size", "0.1"])
+    assert "give neither a step nor a tolerance, not --step-size = 0.1" in done.output
+
+
+def test_what_recommend_needs_is_one_of_two():
+    for words, told in (([], "say either"), (["--accuracy", "1e-6", "--i-use", "mujoco"], "not both")):
+        done = CliRunner().invoke(main, ["recommend", "spheroid", *words])
+        assert done.exit_code == 2
+        assert told in done.output
+        assert ("not both" in done.output) == (told == "not both")

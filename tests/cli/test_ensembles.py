@@ -1,5 +1,6 @@
 """`symtop ensemble`: what it writes, draws and prints, and what it refuses."""
 
+import importlib
 import json
 
 import numpy as np
@@ -55,6 +56,16 @@ def test_members_that_fail_are_counted_and_drawn(tmp_path):
 
 
 @pytest.mark.parametrize(
+    "words", [("--members", 60, "--per-nutation", 2), ("--members", 1, "--per-nutation", 20)], ids=["coarse", "alone"]
+)
+def test_runs_of_few_steps_are_drawn(tmp_path, words):
+    done = call("strang", *words, "--nutations", 2, "--figure", tmp_path / "f.png")
+    assert done.exit_code == 0, done.output
+    assert "Warning" not in done.output
+    assert (tmp_path / "f.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
     ("words", "says"),
     [(["strang", *STEPS, "--members", 0], "--members must be a whole number"),
      (["strang"], "needs --step-size or --per-nutation"),
@@ -63,6 +74,14 @@ def test_members_that_fail_are_counted_and_drawn(tmp_path):
      (["strang", "--step-size", 0.1, *STEPS], "not both"), (["strang", *STEPS, "-o", "/proc/no/x.nc"], "in a folder"),
      (["strang", "--step-size", 0.1], "of their own: give --horizon or --nutations"),
      (["strang", *STEPS, "--threads", 0], "threads"),
+     (["strang", *STEPS, "--figure", "a.png", "-o", "./a.png"], "--output and --figure must be two files"),
+     (["strang", "--per-nutation", 0.2, "--nutations", 2], "--per-nutation must be at least 0.5"),
+     (["exact", *STEPS], "exact has nothing to tune: give neither a step nor a tolerance, not --per-nutation = 30"),
+     (["exact", "--horizon", 1, "--tolerance", 0.1], "give neither a step nor a tolerance, not --tolerance = 0.1"),
+     (["exact", "--horizon", 1e300], "--horizon must be at most 1e+100"),
+     (["strang", *STEPS, "--budget", 10], "member 0 asks for 60 steps; the limit is 10 (see --budget)"),
+     (["strang", *STEPS, "--variables", "theta,spin"], "not 'spin'"),
+     (["strang", *STEPS, "--variables", "theta", "--figure", "a.png"], "needs axis or energy among --variables"),
      (["midpoint[attitude]", *STEPS], "known: angles"), (["taylor", *STEPS, "--members", 3], "chooses its own steps")],
 )  # fmt: skip
 def test_bad_input_is_one_sentence_and_code_2(words, says):
@@ -70,3 +89,46 @@ def test_bad_input_is_one_sentence_and_code_2(words, says):
     assert done.exit_code == 2, done.output
     assert says in done.output
     assert "Traceback" not in done.output
+
+
+def test_a_few_variables_are_kept_and_compared_and_a_budget_is_one(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    words = ("--members", 5, "strang", *STEPS, "--variables", "theta,energy", "--budget", 60, "--output=~/few.nc")
+    done = call(*words, "--figure", tmp_path / "few.png")
+    assert done.exit_code == 0, done.output
+    assert "energy error" in done.output
+    assert "angle between axes" not in done.output
+    with xr.open_dataset(tmp_path / "few.nc") as data:
+        assert [name for name in data if "time" in data[name].dims] == ["theta", "energy"]
+    done = call("--members", 5, "strang", *STEPS, "--variables", "theta")
+    assert done.exit_code == 0, done.output
+    assert "largest error" not in done.output
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [("strang", "32 tops at a time"), ("rk45-compiled", "one top after another in compiled code"),
+     ("rk45", "one top after another, each by a call of Python")],
+)  # fmt: skip
+def test_how_tops_were_computed_is_said_in_words(name, told):
+    setting = ("--per-nutation", 30) if name == "strang" else ("--tolerance", 1e-3)
+    assert f"steps, computed {told}" in call(name, "--members", 2, *setting, "--nutations", 1).output
+
+
+def test_members_that_raise_are_told_in_one_sentence(tmp_path, monkeypatch):
+    registry = importlib.import_module("symtop.methods.registry")
+    monkeypatch.setattr(registry, "_registry", registry.integrators())
+    plugin = tmp_path / "raises_for_some.py"
+    plugin.write_text(
+        "import symtop\n"
+        "def solve(top, start, plan):\n"
+        "    if start.theta > 1.5:\n        raise TypeError('too far')\n"
+        "    return symtop.integrator('rk4[axis]').solvers['axis'](top, start, plan)\n"
+        "symtop.register(symtop.Integrator(\n"
+        "    name='raises-for-some', family='other', summary='', solvers={'axis': solve}))\n"
+    )
+    done = call("--plugin", plugin, "--members", 20, "raises-for-some", *STEPS)
+    assert done.exit_code == 0, done.output
+    assert "raised an exception, the first: integrator raises-for-some on member" in done.output
+    assert "failed: TypeError: too far" in done.output
+    assert "SymtopWarning" not in done.output

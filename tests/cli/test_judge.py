@@ -61,3 +61,25 @@ def test_bad_input_to_the_command(mine, arguments, words):
     assert code == 2
     assert output.startswith("symtop: ")
     assert words in output
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [(("--card", "x.txt"), "--card must be a file that ends in .html or .htm, not 'x.txt'"),
+     (("--badge", "x.png"), "--badge must be a file that ends in .svg, not 'x.png'"),
+     (("--card", "x.html", "--output", "./x.html"), "--output and --card must be two files")],
+)  # fmt: skip
+def test_files_that_cannot_hold_what_is_written_are_refused_at_once(mine, words, told, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    code, output = judge(mine, "--quick", *words)
+    assert code == 2
+    assert output.startswith(f"symtop: {told}")
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_target_may_be_at_home(mine, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    code, output = judge("~/mine.py", "--quick", "--card=~/card.html", "--badge", "~/badge.svg")
+    assert code == 0, output
+    assert {"card.html", "badge.svg"} <= {file.name for file in tmp_path.iterdir()}

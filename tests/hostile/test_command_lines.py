@@ -92,7 +92,7 @@ BAD = {
     "--per-nutation": NUMBERS, "--nutations": NUMBERS, "--budget": NUMBERS, "--steps": [*NUMBERS, "1e300"],
     "--accuracy": [*NUMBERS, "1e300"], "--limit": NUMBERS,
     "--scene": NAMES, "--kind": NAMES, "--observe": NAMES, "--quantity": NAMES, "--i-use": NAMES, "--chart": NAMES,
-    "--form": NAMES, "--energy": NAMES, "--only": NAMES, "--conserves": NAMES,
+    "--variables": NAMES, "--form": NAMES, "--energy": NAMES, "--only": NAMES, "--conserves": NAMES,
     "--output": WRITTEN, "--figure": WRITTEN, "--card": WRITTEN, "--badge": WRITTEN, "--checkpoint": WRITTEN,
     "--results": FOLDERS, "--plugin": PLUGINS, "--scheduler": ADDRESSES,
 }  # fmt: skip

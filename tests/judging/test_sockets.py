@@ -252,6 +252,45 @@ def returns_nothing(f, t, y, h):
     y += h * f(t, y)
 
 
+@pytest.mark.parametrize("claimed", [3, 10, 12, 1000])
+def test_the_order_that_is_there_is_found_whatever_is_claimed(claimed):
+    """Long steps, as a method of order 10 may take, show no slope of one of order 2."""
+    finding = symtop.judge(midpoint, order=claimed, quick=True)["order"]
+    assert (finding.verdict, finding.declared) == ("refuted", str(claimed))
+    assert finding.value == pytest.approx(2.0, abs=0.02)
+    assert "another power of the step" in finding.why
+
+
+def test_a_motion_that_is_wrong_is_told_so_whatever_is_claimed():
+    def slow(f, t, y, h):
+        return midpoint(f, t, y, 0.999 * h)
+
+    for claimed in (2, 12):
+        finding = symtop.judge(slow, order=claimed, quick=True)["order"]
+        assert finding.measured.startswith("wrong limit")
+        assert finding.value == pytest.approx(2e-3, rel=0.2)
+
+
+def test_a_step_that_returns_nan_is_told_so():
+    for value, words in ((np.nan, "returns NaN"), (np.inf, "returns infinity")):
+        ledger = symtop.judge(lambda f, t, y, h, value=value: y + value, quick=True)
+        assert (ledger["calls"].measured, ledger["calls"].verdict) == (words, "refuted")
+        assert "differ" not in ledger["calls"].why
+        assert ledger["energy"].measured == ""
+        assert "nothing could be measured" in str(ledger)
+    assert symtop.judge(midpoint, quick=True)["calls"].verdict == "measured"
+
+
+def test_a_program_that_gives_back_its_line_cannot_be_judged(tmp_path):
+    """Its numbers are as many as two states have; a program that gives back the state stands still."""
+    with pytest.raises(symtop.SymtopError, match="cat must write the start that it was given as the first"):
+        symtop.judge("/bin/cat", form="program", quick=True)
+    still = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): print(*numbers[6:12])"
+    ledger = symtop.judge(program(tmp_path, still), form="program", quick=True)
+    assert ledger["order"].measured.startswith("wrong limit")
+    assert ledger["calls"].verdict == "measured"
+
+
 @pytest.fixture
 def impatient(monkeypatch):
     monkeypatch.setattr("symtop.judging.pulse.QUICK_PATIENCE", 0.5)

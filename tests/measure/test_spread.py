@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.measure.spread import LEVELS, largest, member_errors, spread
+from symtop.measure.spread import LEVELS, at_places, largest, member_errors, spread
 
 SOME = symtop.population(30, seed=7)
 ASKED = {"per_nutation": 30, "nutations": 2, "samples": 41, "quiet": True}
@@ -53,6 +53,41 @@ def test_samples_that_a_run_has_not_are_no_errors():
     np.testing.assert_array_equal(spread(errors, (0.0, 0.5, 1.0)), [[0.0, 1.0, 5.0], [0.0, 2.0, 5.0], [0.0, 3.0, 5.0]])
     assert np.isnan(spread(np.full((2, 1), np.nan))).all()
     assert largest(errors).tolist() == [1.0, 5.0, 2.0]
+
+
+def test_errors_at_a_place_are_those_of_the_same_time():
+    """Runs of 4, 5 and 40 steps: at each place the latest sample of each, from where all of them have stepped."""
+    some = SOME.isel(member=slice(3))
+    data = symtop.ensemble(some, "strang[axis]", per_nutation=[4, 5, 40], nutations=1, samples=101, quiet=True)
+    errors = member_errors(some, data, "axis")
+    places, latest = at_places(data, errors)
+    np.testing.assert_allclose(places, np.arange(10, 41) / 40.0, atol=1e-12)
+    assert np.isfinite(latest).all()
+    np.testing.assert_array_equal(latest[2], errors[2, 10:41])
+    for i, steps in enumerate((4, 5)):
+        ranks = np.floor(places * steps + 1e-6).astype(int)
+        np.testing.assert_array_equal(latest[i], errors[i, ranks])
+    assert not np.array_equal(latest[0], errors[0, 10:41])  # as samples of the same index would be
+
+
+def test_runs_that_have_all_samples_are_compared_by_their_index():
+    data = symtop.ensemble(SOME, "strang[axis]", **ASKED)
+    errors = member_errors(SOME, data, "axis")
+    places, same = at_places(data, errors)
+    assert same is errors
+    np.testing.assert_allclose(places, np.arange(41) / 40.0, atol=0.013)  # half an interval
+    short = symtop.ensemble(SOME, "strang[axis]", **ASKED | {"per_nutation": 2, "nutations": 2})
+    places, few = at_places(short, member_errors(SOME, short, "axis"))
+    np.testing.assert_allclose(places, [0.25, 0.5, 0.75, 1.0], atol=1e-12)
+    np.testing.assert_array_equal(few, member_errors(SOME, short, "axis")[:, 1:5])
+
+
+def test_members_of_other_labels_are_refused():
+    one, other = (SOME.assign_coords(member=labels) for labels in (range(30), range(30, 60)))
+    data = symtop.ensemble(one, "strang[axis]", **ASKED)
+    assert np.array_equal(member_errors(SOME, data, "axis"), member_errors(one, data, "axis"))
+    with pytest.raises(symtop.SymtopError, match="their labels are others"):
+        member_errors(other, data, "axis")
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
-"""plot() of the errors of a run, and of a trajectory that no integrator here has made."""
+"""plot() of the errors of a run, and of a trajectory that no integrator here has made, and of ensembles."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -34,3 +35,40 @@ def test_a_trajectory_of_no_integrator_is_drawn_too(run):
 def test_what_has_no_time_is_refused():
     with pytest.raises(SymtopError, match="must have the dimension time"):
         symtop.plot(symtop.reference("goldstein", [1.0]).isel(time=0, drop=True))
+
+
+@pytest.mark.parametrize("n", [1, 40])
+@pytest.mark.parametrize("per_nutation", [1, 2, 20])
+def test_an_ensemble_of_short_runs_is_drawn_over_time(n, per_nutation):
+    tops = symtop.population(n, seed=3)
+    runs = symtop.ensemble(tops, "strang", per_nutation=per_nutation, nutations=1, quiet=True)
+    ax = symtop.plot(runs, members=tops)
+    times = ax.get_lines()[0].get_xdata()
+    assert times.size == per_nutation
+    ax.figure.canvas.draw()
+    plt.close(ax.figure)
+
+
+def test_runs_of_different_lengths_are_drawn_forwards():
+    tops = symtop.population(40, seed=3)
+    runs = symtop.ensemble(tops, "strang", per_nutation=[2] * 20 + [100] * 20, nutations=2, samples=50, quiet=True)
+    ax = symtop.plot(runs, members=tops)
+    times = ax.get_lines()[0].get_xdata()
+    assert (np.diff(times) > 0.0).all()
+    assert times[0] == pytest.approx(0.25, abs=0.03)  # not before all have made a step
+    assert times[-1] == pytest.approx(1.0)
+    plt.close(ax.figure)
+
+
+@pytest.mark.parametrize(("quantity", "most"), [("axis", np.pi), ("energy", 1e3)])
+def test_failed_runs_are_named_and_angles_end_at_pi(quantity, most):
+    tops = symtop.population(60, seed=0)
+    for name, fail in (("stormer-verlet", True), ("strang", False)):
+        runs = symtop.ensemble(tops, name, per_nutation=30, nutations=2, quiet=True)
+        ax = symtop.plot(runs, members=tops, quantity=quantity)
+        said = [text.get_text() for text in ax.texts]
+        assert said == ["1 %", "10 %", "median", *(f"{level} %{': failed' * fail}" for level in (90, 99))]
+        drawn = np.concatenate([band.get_paths()[0].vertices[:, 1] for band in ax.collections])
+        assert drawn.max() <= most
+        assert (drawn.max() == most) == fail
+        plt.close(ax.figure)

@@ -293,23 +293,179 @@ def test_variables_are_those_of_all_and_need_no_closed_form(monkeypatch):
         symtop.ensemble(SOME, "strang[attitude]", variables=("phi",), **asked)
 
 
-def test_numbers_that_leave_the_range_fail_alone_and_other_errors_end_the_ensemble():
+def raising(error, *bad):
+    """A method that raises an error on some members."""
     rk4 = symtop.integrator("rk4[axis]")
 
     def solve(top, start, plan):
-        if start.theta == SOME.theta[3]:
-            raise (ZeroDivisionError if plan.horizon < 5.0 else TypeError)("a reason")
+        if start.theta in SOME.theta.values[[*bad]]:
+            raise error("a reason")
         return rk4.solvers["axis"](top, start, plan)
 
-    python = dataclasses.replace(rk4, name="rk4-python[axis]", solvers={"axis": solve})
+    return dataclasses.replace(rk4, name="rk4-python[axis]", solvers={"axis": solve})
+
+
+def test_numbers_that_leave_the_range_fail_alone():
     asked = {"step_size": 0.1, "horizon": 2.0, "quiet": True}
-    one, other = (symtop.ensemble(SOME, method, **asked) for method in (rk4, python))
+    one, other = (symtop.ensemble(SOME, method, **asked) for method in ("rk4[axis]", raising(ZeroDivisionError, 3)))
     rest = np.arange(36) != 3
     xr.testing.assert_identical(one.isel(member=rest).drop_attrs(), other.isel(member=rest).drop_attrs())
     assert (other.outcome[3], other.reached_time[3]) == ("not_finite", 0.0)
     assert np.isnan(other.theta[3]).all()
-    with pytest.raises(symtop.SymtopError, match=r"rk4-python.* on member 3 failed: TypeError: a reason"):
-        symtop.ensemble(SOME, python, **asked | {"horizon": 6.0})
+    assert "raised" not in other.attrs
+
+
+@pytest.mark.parametrize("path", [None, "runs.nc"])
+def test_a_member_on_which_a_solver_raises_is_lost_alone_and_told(path, tmp_path, monkeypatch):
+    monkeypatch.setattr(pieces, "PIECE", 21 * 5)
+    more = {} if path is None else {"path": tmp_path / path}
+    asked = {"step_size": 0.1, "horizon": 2.0, "samples": 21, "quiet": True, **more}
+    one = symtop.ensemble(SOME, "rk4[axis]", **asked).load()
+    one.close()
+    labelled = SOME.assign_coords(member=[f"m{i}" for i in range(36)])
+    for members, name in ((SOME, "3"), (labelled, "m3")):
+        first = rf"rk4-python\[axis\] on member {name} failed: TypeError: a reason"
+        with pytest.warns(symtop.SymtopWarning, match=f"2 of 36 members raised an exception, the first: .*{first}"):
+            other = symtop.ensemble(members, raising(TypeError, 3, 30), **asked).load()
+        other.close()
+        assert ("raised" in other.attrs) == (path is None)
+        assert np.flatnonzero(other.outcome == "raised").tolist() == [3, 30]
+        assert np.isnan(other.theta[3]).all()
+        rest = ~np.isin(np.arange(36), [3, 30])
+        bare = other.drop_vars("member", errors="ignore")
+        xr.testing.assert_identical(one.isel(member=rest).drop_attrs(), bare.isel(member=rest).drop_attrs())
+
+
+def test_a_solver_that_raises_on_every_member_is_refused_and_leaves_nothing(tmp_path):
+    every = raising(TypeError, *range(36))
+    for more in ({}, {"path": tmp_path / "runs.nc"}):
+        with pytest.raises(symtop.SymtopError, match=r"on member 0 failed: TypeError: a reason"):
+            symtop.ensemble(SOME, every, step_size=0.1, horizon=2.0, quiet=True, **more)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("thetadot", "theta_dot"), ("dphi_dt", "phi_dot"), ("psi_rate", "psi_dot"), ("Phi", "phi"), ("theta0", "theta"),
+     ("phi_dto", "phi_dot")],
+)  # fmt: skip
+def test_a_misspelled_variable_of_members_is_refused(name, meant):
+    asked = {"per_nutation": 20, "nutations": 2, "quiet": True}
+    for members in (SOME.rename({meant: name}), SOME.assign({name: 1.0}), SOME.assign_coords({name: SOME.theta})):
+        if meant == "theta" and meant not in members:
+            continue  # it is needed, and its lack is told
+        with pytest.raises(symtop.SymtopError, match=rf"members have no variable '{name}'; did you mean {meant}\?"):
+            symtop.ensemble(members, "strang[axis]", **asked)
+
+
+def test_members_may_have_labels_of_any_other_name():
+    asked = {"per_nutation": 20, "nutations": 2, "quiet": True}
+    names = ("period", "weight", "phase", "p_phi", "theta_max", "group", "steps")
+    members = SOME.assign(dict.fromkeys(names, SOME.I1)).assign(curve=("place", [1.0, 2.0]))
+    plain = symtop.ensemble(SOME, "strang[axis]", **asked)
+    assert symtop.ensemble(members, "strang[axis]", **asked).identical(plain)
+
+
+def test_rows_are_taken_by_label_and_labels_are_kept():
+    counts, asked = np.linspace(10.0, 45.0, 36), {"nutations": 2, "quiet": True}
+    plain = symtop.ensemble(SOME, "strang[axis]", per_nutation=counts, **asked)
+    for labels in ([f"m{i}" for i in range(36)], list(range(100, 136))):
+        members = SOME.assign_coords(member=labels)
+        row = xr.DataArray(counts, {"member": labels}, "member")
+        for given in (row, row[::-1], counts):
+            data = symtop.ensemble(members, "strang[axis]", per_nutation=given, **asked)
+            assert data.member.values.tolist() == labels
+            assert data.drop_vars("member").identical(plain)
+    reverse = symtop.ensemble(SOME, "strang[axis]", per_nutation=counts[::-1], **asked)
+    assert not reverse.identical(plain)
+
+
+@pytest.mark.parametrize("name", ["step_size", "per_nutation", "horizon", "nutations"])
+def test_rows_of_others_are_refused(name):
+    labels = [f"m{i}" for i in range(36)]
+    members, values = SOME.assign_coords(member=labels), np.full(36, 5.0)
+    rest = {"step_size": 0.1} if name in ("horizon", "nutations") else {"horizon": 9.0}
+    for row, reason in (
+        (xr.DataArray(values, {"member": range(36)}, "member"), "the labels of the 36 members"),
+        (xr.DataArray(values, {"member": ["m0"] * 36}, "member"), "the labels of the 36 members"),
+        (xr.DataArray(values, dims="time"), "a row over member, not over time"),
+        (np.ma.masked_array(values, [True] + [False] * 35), "without a mask"),
+        (xr.DataArray(-values, {"member": labels}, "member"), f"{name} of member m0 must be above zero"),
+    ):
+        with pytest.raises(symtop.SymtopError, match=reason):
+            symtop.ensemble(members, "strang[axis]", quiet=True, **rest, **{name: row})
+
+
+def test_tolerances_are_taken_by_label():
+    some = SOME.isel(member=slice(3)).assign_coords(member=["a", "b", "c"])
+    row = xr.DataArray([1e-4, 1e-6, 1e-8], {"member": ["a", "b", "c"]}, "member")
+    one, other = (
+        symtop.ensemble(some, "rk45-compiled[axis]", nutations=2, tolerance=given, quiet=True)
+        for given in (row, row[[2, 0, 1]])
+    )
+    assert one.identical(other)
+    assert one.steps[0] < one.steps[2]
+
+
+def test_times_that_all_share_are_one_row_where_runs_are_short():
+    members = xr.Dataset({"I1": 2.0, "I3": 1.0, "mgl": 2.0, "theta": ("member", [0.3, 0.8, 1.2])})
+    asked = {"step_size": 0.5, "horizon": 2.0, "samples": 9, "quiet": True}
+    data = symtop.ensemble(members, "strang[axis]", **asked)
+    assert data["time"].dims == ("time",)
+    np.testing.assert_array_equal(data["time"], [0.0, 0.5, 1.0, 1.5, 2.0, *[np.nan] * 4])
+    other = symtop.ensemble(members, "strang[axis]", **asked | {"step_size": [0.5, 0.5, 0.4]})
+    assert other["time"].dims == ("member", "time")
+
+
+def test_an_ensemble_for_a_cluster_is_refused_before_it_is_sent(tmp_path):
+    asked = {"step_size": 0.1, "horizon": 2.0, "quiet": True, "path": tmp_path / "runs.nc"}
+    with pytest.raises(symtop.SymtopError, match=r"scheduler must be the address of a dask scheduler.* not 5"):
+        symtop.ensemble(SOME, "strang", scheduler=5, **asked)
+    own = symtop.composition("own-split", [0.5, 0.5], [0.25, 0.5, 0.25])
+    with pytest.raises(symtop.SymtopError, match=r"own-split.* cannot be sent to other processes: register it"):
+        symtop.ensemble(SOME, own, scheduler="tcp://127.0.0.1:1", **asked)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize(
+    ("name", "changed", "reason"),
+    [("strang[axis]", {"per_nutation": 1e-320}, "per_nutation must be at least 0.5, a step within the horizon, not"),
+     ("strang[axis]", {"per_nutation": 0.3}, "per_nutation must be at least 0.5.* not 0.3 as of member 0"),
+     ("strang[axis]", {"per_nutation": 20, "nutations": 1e308}, "nutations must be fewer"),
+     ("exact", {"nutations": None, "horizon": 1e300}, r"horizon must be at most 1e\+100, not 1e\+300"),
+     ("exact", {"per_nutation": 5}, "nothing to tune: give neither a step nor a tolerance, not per_nutation = 5"),
+     ("exact", {"step_size": 0.1}, "not step_size = 0.1"),
+     ("exact", {"tolerance": 0.1}, "not tolerance = 0.1")],
+)  # fmt: skip
+def test_settings_are_named_as_they_were_given(name, changed, reason):
+    with pytest.raises(symtop.SymtopError, match=reason):
+        symtop.ensemble(SOME, name, quiet=True, **{"nutations": 2, **changed})
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_member_of_enormous_inertia_is_refused_without_a_warning():
+    members = SOME.copy(deep=True)
+    members.I1[2] = members.I3[2] = 1e308
+    with pytest.raises(symtop.SymtopError, match="member 2: I1 must be between"):
+        symtop.ensemble(members, "strang[axis]", per_nutation=20, nutations=2, quiet=True)
+
+
+@pytest.mark.parametrize("change", [dict, xr.Dataset.to_dataframe, xr.Dataset.to_dataarray])
+def test_members_in_another_dress_are_told_what_they_may_be(change):
+    with pytest.raises(symtop.SymtopError, match=r"members must be an xarray.Dataset or a list of scenes, not a"):
+        symtop.ensemble(change(SOME.drop_vars("stratum")), "strang[axis]", step_size=0.1, horizon=1.0)
+
+
+def test_a_path_may_begin_at_home(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    asked = {"per_nutation": 20, "nutations": 2, "quiet": True}
+    with symtop.ensemble(SOME, "strang[axis]", path="~/runs.nc", **asked) as data:
+        assert data.sizes["member"] == 36
+    symtop.sweep("spheroid", "strang", step_size=[0.1], horizon=0.5, path="~/sweep.nc", quiet=True)
+    symtop.sweep("spheroid", "strang", step_size=[0.1], horizon=0.5, path="~nobody-of-this-name", quiet=True)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["runs.nc", "sweep.nc", "~nobody-of-this-name"]
 
 
 def test_a_fast_top_has_as_many_swings_as_simulate_says():

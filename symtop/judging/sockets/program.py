@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.base.validate import SymtopError
+from symtop.base.validate import SymtopError, at_home
 from symtop.judging.pulse import pulse
 from symtop.judging.sockets.socket import March, label_of
 from symtop.methods.formulations import FORMULATIONS
@@ -29,6 +29,7 @@ from symtop.methods.registry import Solver
 from symtop.model.top import SymmetricTop
 
 WORDS = 100  # characters of what a program says when it fails
+SHORT = 1e-3  # relative: digits that a program may leave out
 SLACK = 5.0  # times the seconds that earlier runs make one expect
 
 
@@ -41,6 +42,7 @@ class Program:
 
     def __init__(self, command: str, chart: str) -> None:
         self.words, self.chart, self.form = shlex.split(command), chart, FORMULATIONS[chart]
+        self.words[:1] = [str(at_home(word)) if word.startswith("~") else word for word in self.words[:1]]
         if not self.words or shutil.which(self.words[0]) is None:
             raise SymtopError(f"a program must be a command that can be run, not {command!r}")
         self.name = label_of(Path(self.words[0]).name)
@@ -54,6 +56,11 @@ class Program:
         rows = last // stride + 1
         answer = self._answer(" ".join(map(repr, numbers)) + "\n", h, last)
         states = _states(answer, rows, y.size, self.name)
+        if not _begins(states[0], y):
+            raise SymtopError(
+                f"{self.name} must write the start that it was given as the first of its states, not "
+                f"{', '.join(f'{value:.4g}' for value in states[0])}"
+            )
         return March(states[marks // stride], 0)
 
     def _answer(self, line: str, h: float, steps: int) -> bytes:
@@ -98,6 +105,12 @@ def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
             f"{rows * size} in all, not {values.size}"
         )
     return values.reshape(rows, size)
+
+
+def _begins(state: Array, start: Array) -> bool:
+    """Is a state the start, but for rounding, the sign of a quaternion and whole turns?"""
+    turns = np.stack([state - start, state + start, np.sin(0.5 * (state - start))])  # any of them shows that it is
+    return bool((np.abs(turns).min(axis=0) <= SHORT * np.abs(start).max()).all()) or not np.isfinite(state).all()
 
 
 def _is_text(answer: bytes) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.base.validate import SymtopError
+from symtop.base.validate import SymtopError, at_home
 from symtop.judging.pulse import pulse
 from symtop.judging.sockets.socket import March, label_of
 from symtop.methods.formulations import FORMULATIONS
@@ -35,7 +35,7 @@ class SharedObject:
     own_loop = True
 
     def __init__(self, path: str | Path, chart: str, symbol: str = "step") -> None:
-        self.path, self.chart, self.form = Path(path).resolve(), chart, FORMULATIONS[chart]
+        self.path, self.chart, self.form = at_home(path).resolve(), chart, FORMULATIONS[chart]
         self.name = label_of(f"{self.path.stem}-{symbol}" if symbol != "step" else self.path.stem)
         if not self.path.is_file():
             raise SymtopError(f"a shared object must be a file that is there, not {str(path)!r}")
