@@ -369,7 +369,7 @@ def test_a_row_is_named_once_and_a_file_written_once(tmp_path, monkeypatch):
 
 
 def test_what_recommend_needs_is_one_of_two():
-    for words, told in (([], "say either"), (["--accuracy", "1e-6", "--i-use", "mujoco"], "not both")):
+    for words, told in (([], "one of --accuracy"), (["--accuracy", "1e-6", "--i-use", "mujoco"], "not both")):
         done = CliRunner().invoke(main, ["recommend", "spheroid", *words])
         assert done.exit_code == 2
         assert told in done.output
