@@ -96,8 +96,8 @@ def run(
 @click.argument("integrator", shell_complete=completing("integrators"))
 @click.option("--steps", type=float, default=1e9, show_default=True, help="Number of steps.")
 @click.option("--step-size", type=float, help="Step; a thousandth of a nutation period by default.")
-@click.option("--checkpoint", type=File(dir_okay=False), help="File to resume from; symtop's own by default.")
-@click.option("--output", type=File(), help="Write the windows to this netCDF file.")
+@click.option("--checkpoint", type=click.Path(dir_okay=False), help="File to resume from; symtop's own by default.")
+@click.option("--output", type=click.Path(), help="Write the windows to this netCDF file.")
 @plugin_option
 def long(
     scene: str, integrator: str, steps: float, step_size: float | None, checkpoint: str | None, output: str | None
