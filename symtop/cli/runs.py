@@ -95,7 +95,7 @@ def run(
 @click.argument("integrator", shell_complete=completing("integrators"))
 @click.option("--steps", type=float, default=1e9, show_default=True, help="Number of steps.")
 @click.option("--step-size", type=float, help="Step; a thousandth of a nutation period by default.")
-@click.option("--checkpoint", type=File(dir_okay=False), help="File to resume from; symtop's own by default.")
+@click.option("--checkpoint", type=File(), help="File to resume from; symtop's own by default.")
 @click.option("--output", type=File(), help="Write the windows to this netCDF file.")
 @plugin_option
 def long(
@@ -111,6 +111,7 @@ def long(
     """
     from symtop.base.progress import ticking
 
+    apart(output=output, checkpoint=checkpoint)
     standing("--output", output)
     standing("--checkpoint", checkpoint)
     with ticking("loading"):

@@ -23,7 +23,7 @@ from symtop.base.locks import locked
 from symtop.base.signals import ending_on_sigterm
 from symtop.base.validate import SymtopError, spare
 from symtop.base.walk import Walk
-from symtop.run.columns import as_dataset
+from symtop.run.columns import as_dataset, same_times
 from symtop.run.pieces import PIECE, PIECE_STEPS, Job
 
 IDENTITY = "identity"  # the file that says which ensemble a folder belongs to
@@ -79,7 +79,7 @@ class Stream:
         with self._writing(), datasets.alone(), datasets.replacing(self.path) as partial:
             first = self._columns(pieces[0])
             times = first["time"][0]
-            shared = all((self._columns(piece, "time")["time"] == times).all() for piece in pieces)
+            shared = all(same_times(self._columns(piece, "time")["time"], times) for piece in pieces)
             size = pieces[0].stop
             labels = {name: values[:size] for name, values in self.labels.items()}
             pattern = datasets.describe(as_dataset(first, labels, shared=shared), **self.words)

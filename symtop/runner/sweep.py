@@ -142,6 +142,11 @@ def _listed(things: Any) -> list[Any]:
     """One thing, or several, as a list."""
     if isinstance(things, (str, Scene, Integrator)) or not isinstance(things, Iterable):
         return [things]
+    if hasattr(things, "keys"):  # a dataset, a table or a dict, which goes through its names
+        raise SymtopError(
+            f"scenes and integrators must be names, objects or lists of them, not a {type(things).__name__}; for a "
+            "dataset of tops there is ensemble"
+        )
     try:
         return list(things)
     except TypeError:  # an array without dimensions
@@ -171,7 +176,8 @@ def _cell(
     until = scene.horizon if horizon is None else positive("horizon", horizon)
     if method.fixed_step:
         if ("step_size" in given) is ("per_nutation" in given):
-            raise SymtopError(f"{method.name} has a fixed step: give step_size or per_nutation")
+            both = ", not both" if "step_size" in given else ""
+            raise SymtopError(f"{method.name} has a fixed step: give step_size or per_nutation{both}")
         settings = given.get("step_size") or [scene.time_scale(until) / count for count in given["per_nutation"]]
     elif method.adaptive:
         if "tolerance" not in given:

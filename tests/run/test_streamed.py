@@ -52,6 +52,14 @@ def test_times_that_all_share_are_a_row_in_the_file_as_well(tmp_path, small_piec
         assert data.load().identical(symtop.ensemble(scenes, "strang", **asked))
 
 
+def test_times_of_runs_of_few_steps_are_a_row_in_the_file_as_well(tmp_path, small_pieces):
+    asked = {"step_size": 0.25, "samples": 21, "quiet": True}
+    wanted = symtop.ensemble(["spheroid"] * 40, "strang", horizon=2.0, **asked)
+    assert wanted["time"].dims == ("time",)
+    with symtop.ensemble(["spheroid"] * 40, "strang", horizon=2.0, path=tmp_path / "runs.nc", **asked) as data:
+        assert data.load().identical(wanted)
+
+
 @pytest.mark.parametrize("threads", [1, 3])
 def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_path, small_pieces, monkeypatch, threads):
     calm, path = tmp_path / "calm.nc", tmp_path / "runs.nc"

@@ -208,3 +208,11 @@ def test_the_chart_of_each_run_is_said(data):
     for (scene, name), chart in zip([(s, n) for s in ("spheroid", "grazing") for n in ("rk4", "strang")],
                                     charts.values.ravel(), strict=True):  # fmt: skip
         assert symtop.simulate(scene, name, step_size=0.01, horizon=0.5, guard=False).attrs["chart"] == chart
+
+
+def test_both_kinds_of_step_and_a_dataset_of_tops_are_refused():
+    with pytest.raises(symtop.SymtopError, match="give step_size or per_nutation, not both"):
+        symtop.sweep("spheroid", "strang", step_size=0.1, per_nutation=20)
+    for tops in (symtop.population(3, seed=1), {"I1": [1.0]}):
+        with pytest.raises(symtop.SymtopError, match="for a dataset of tops there is ensemble"):
+            symtop.sweep(tops, "strang", step_size=0.1)
