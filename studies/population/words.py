@@ -186,10 +186,9 @@ def guard_sentence(data: xr.DataTree) -> str:
         )
     whole = " and ".join(percent(verdicts.repeated(data, horizon)) for horizon in verdicts.horizons(data))
     return (
-        f"The guard tries a method on a piece of a run before it. Asked about the {GUARDED_LEVELS} coarsest settings "
-        f"of each row, it warned {', '.join(said)}. Wrong is more than {WRONG:g} rad off, right less than {EXPECTED:g} "
-        "rad, at which it warns; the others are not counted, nor are runs that the piece covers whole "
-        f"({whole} of the wrong ones)."
+        f"The guard tries a method on a piece of a run before it. At the {GUARDED_LEVELS} coarsest settings of each "
+        f"row it warned {', '.join(said)}. Wrong is over {WRONG:g} rad off, right less than {EXPECTED:g} rad. Runs "
+        f"that the piece covers whole are left out, {whole} of the wrong ones."
     )
 
 
