@@ -101,8 +101,11 @@ def spare(path: Path) -> None:
         raise SymtopError(f"cannot write {path}: it is a folder")
     begun = b""
     if path.is_file():
-        with path.open("rb") as file:
-            begun = file.read(4)
+        try:
+            with path.open("rb") as file:
+                begun = file.read(4)
+        except OSError as error:
+            raise SymtopError(f"cannot write {path}: {error.strerror or error}") from error
     if path.exists() and not begun.startswith(MAGIC):
         raise SymtopError(f"cannot write {path}: it is there, and no netCDF file; remove it or name another path")
 

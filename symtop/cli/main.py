@@ -89,8 +89,8 @@ def study(
         return
     from symtop.cli import study as command
 
-    shared: Any = {"studies": command.choose(names, every=every, only=chosen), "results": folder, "as_json": as_json}
-    shared |= {"quick": quick, "full": full}
+    studies = command.choose(names, every=every, only=chosen, quick=quick)
+    shared: Any = {"studies": studies, "results": folder, "as_json": as_json, "quick": quick, "full": full}
     if status:
         sys.exit(command.show_status(why=why, **shared))
     task = partial(command.check_all, everything=fresh) if check else partial(command.run_all, fresh=fresh, limit=limit,

@@ -19,15 +19,31 @@ from symtop.runner.study import Study
 MOST_NAMED = 8  # integrators and scenes in a line of the status
 
 
-def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = ()) -> list[Study]:
-    """The studies of those names, each once, or all of them; of some integrators alone if `only` names them."""
+def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick: bool = False) -> list[Study]:
+    """The studies of those names, each once, or all of them; of some integrators alone if `only` names them.
+
+    Of several studies those that have no case of these integrators are told of and left out.
+    """
     chosen = scripts.names() if every else list(dict.fromkeys(names))
     if not chosen:
         raise SymtopError(f"name a study or use --all; known: {', '.join(scripts.names())}")
     for name in only:
         integrator(name)  # refused with the nearest names if there is none
     studies = [scripts.load(name) for name in chosen]
-    return [study.only(only) for study in studies] if only else studies
+    if not only:
+        return studies
+    narrowed = [study.only(only) for study in studies]
+    without = dict[str, SymtopError]()
+    for study in narrowed:
+        try:
+            study.grid(quick=quick)
+        except SymtopError as error:
+            without[study.name] = error
+    if len(without) == len(narrowed):
+        raise next(iter(without.values()))
+    for reason in without.values():
+        warn(f"{reason}; it is left out")
+    return [study for study in narrowed if study.name not in without]
 
 
 def conduct(task: Callable[[Workers], int], jobs: int | None, scheduler: str | None) -> int:

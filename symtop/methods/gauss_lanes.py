@@ -13,7 +13,7 @@ import numpy as np
 
 from symtop.base.compiled import register_jitable, set_item
 from symtop.base.vectors import wide_vectors
-from symtop.methods.lanes import Lanes, W, column, put
+from symtop.methods.lanes import Lanes, W, column, none_left, put
 from symtop.methods.loop import accumulate
 
 Row = tuple[float, ...]
@@ -143,10 +143,7 @@ def swept(  # noqa: C901  (the loops of one step, read in one piece)
             largest = bound(effort)
             for j in range(W):
                 judge(block, j, largest)
-            live = 0
-            for j in range(W):
-                live += block[live_at * W + j] != 0.0
-            if live == 0:
+            if none_left(block, live_at):
                 break
         for j in range(W):
             finish(block, j)

@@ -65,6 +65,16 @@ def put(array: Any, first: int, j: int, values: Any) -> None:
         array[(first + i) * W + j] = values[i]
 
 
+@register_jitable
+def none_left(block: Any, live: int) -> bool:
+    """Has number `live` of every lane become 0, so that an iteration over the block has ended?"""
+    wide_vectors()
+    left = 0
+    for j in range(W):
+        left += block[live * W + j] != 0.0
+    return left == 0
+
+
 def _no_numbers(rule: Any) -> int:
     return 0
 

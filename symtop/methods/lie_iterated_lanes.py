@@ -12,7 +12,7 @@ from typing import Any
 
 from symtop.base.compiled import register_jitable
 from symtop.base.vectors import wide_vectors
-from symtop.methods.lanes import Lanes, W, put
+from symtop.methods.lanes import Lanes, W, none_left, put
 from symtop.methods.lie_lanes import CARRY, FLAG, WORK, begin, entered, give_up, left, stepped
 from symtop.methods.lie_loop import SPUN
 from symtop.methods.one_loop_lanes import reading
@@ -84,10 +84,7 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
         for _ in range(most // 2):
             for j in range(W):
                 passed(block, table, row, j)
-            live = 0
-            for j in range(W):
-                live += block[live_at * W + j] != 0.0
-            if live == 0:
+            if none_left(block, live_at):
                 break
         for j in range(W):
             closed(block, table, row, j)

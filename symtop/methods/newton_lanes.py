@@ -15,7 +15,7 @@ import numpy as np
 
 from symtop.base.compiled import register_jitable
 from symtop.base.vectors import wide_vectors
-from symtop.methods.lanes import Lanes, W, column, put
+from symtop.methods.lanes import Lanes, W, column, none_left, put
 from symtop.methods.loop import accumulate
 from symtop.methods.newton import settled
 from symtop.methods.outcomes import OK
@@ -94,10 +94,7 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
         for _ in range(most):
             for j in range(W):
                 attempt(block, table, j)
-            live = 0
-            for j in range(W):
-                live += block[live_at * W + j] != 0.0
-            if live == 0:
+            if none_left(block, live_at):
                 break
         for j in range(W):
             finish(block, table, j)

@@ -24,10 +24,11 @@ from symtop.methods.registry import Integrator, integrator as find_integrator
 from symtop.model.motion_samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.columns import as_dataset
+from symtop.run.guard import MOST_STEPS
 from symtop.run.members import Members, called, for_each, read_members
 from symtop.run.pieces import RAISED, SHOWN, Job
 from symtop.run.schedule import nutation_periods
-from symtop.run.simulation import MOST_SAMPLES, MOST_STEPS, MOST_SWINGS, chart_of, check_formula
+from symtop.run.simulation import MOST_SAMPLES, MOST_SWINGS, chart_of, check_formula
 from symtop.run.streamed import streaming
 
 Array = NDArray[np.float64]

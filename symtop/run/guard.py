@@ -20,8 +20,6 @@ and `simulate` dithers samples that would fall on the same phases.
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from symtop.base.numbers import EPSILON
 from symtop.methods.outcomes import sentence
 from symtop.methods.plan import Plan, Run
@@ -42,6 +40,7 @@ NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a res
 COARSE = 1.0  # rad of precession in a step
 PRECESSED = 0.1  # the same, of a step that is tried past a pole
 TRIES, LESS = 8, 0.6  # steps that are tried, each at most so much of the one before
+MOST_STEPS = 20_000_000_000  # of a run: ten minutes of the fastest kernel
 
 
 class Trouble(NamedTuple):
@@ -64,20 +63,24 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, done: Run 
     trouble = _trouble(scene, method, chart, plan, expected)
     if trouble is None:
         return ""
-    remedy = "" if math.isnan(trouble.step) else f"; {_remedy(scene, method, chart, plan, trouble.step)}"
-    return f"{method.name} on {scene.name}: {trouble.reason}{remedy}{trouble.otherwise if remedy else ''}"
+    remedy = "" if math.isnan(trouble.step) else f"; {_remedy(scene, method, chart, plan, trouble)}"
+    return f"{method.name} on {scene.name}: {trouble.reason}{remedy}"
 
 
-def _remedy(scene: Scene, method: Integrator, chart: str, plan: Plan, step: float) -> str:
+def _remedy(scene: Scene, method: Integrator, chart: str, plan: Plan, trouble: Trouble) -> str:
     """A step of two digits of which nothing is expected to go wrong: the first try, or the next smaller ones."""
+    step, word, others = trouble.step, "try", f", or {trouble.otherwise}" if trouble.otherwise else ""
     for _ in range(TRIES):
+        if not plan.horizon / step <= MOST_STEPS:
+            return f"take {trouble.otherwise or 'another method'}: more than {MOST_STEPS:.0e} steps would be needed"
         step = float(f"{step:.2g}")
-        tried = plan._replace(step_size=step, marks=np.array([max(1, round(plan.horizon / step))]))
+        tried = plan._replace(step_size=step)  # a forecast looks at the step and the horizon
         expected = forecast(scene, method, chart, tried)
         if expected.outcome == "ok" and _trouble(scene, method, chart, tried, expected) is None:
-            return f"take a step of about {step:.2g}"
+            word = "take"
+            break
         step = min(LESS * step, _smaller(method, tried, expected))
-    return f"try a step of about {step:.2g}"
+    return f"{word} a step of about {step:.2g}{others}"
 
 
 def _trouble(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
@@ -163,7 +166,7 @@ def _coarse(
         return Trouble(
             f"{size}: the axis passes the {marks.pole} pole at {marks.gap:.2g} rad and precesses there by "
             f"{expected.passage:.2g} rad in a step", PRECESSED / marks.rate,
-            ", or an integrator whose chart has no poles, such as strang",
+            "an integrator whose chart has no poles, such as strang",
         )  # fmt: skip
     if expected.steps_per_nutation < 2.0:
         return Trouble(

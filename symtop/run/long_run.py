@@ -37,7 +37,7 @@ from symtop.methods.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.view import View
 from symtop.run import modified_energy as modified
-from symtop.run.simulation import MOST_STEPS
+from symtop.run.guard import MOST_STEPS
 
 Array = np.ndarray
 Gauge = Callable[..., dict[str, Array]]  # states and momenta of samples -> quantities

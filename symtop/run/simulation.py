@@ -28,9 +28,8 @@ from symtop.model.scenes import OBSERVABLES, Scene, closed_form, horizon_of, sce
 from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import View
 from symtop.run.forecast import repeats
-from symtop.run.guard import warning
+from symtop.run.guard import MOST_STEPS, warning
 
-MOST_STEPS = 20_000_000_000  # ten minutes of the fastest kernel
 MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
 WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
 USUAL = 1e-3  # rad, the accuracy of a step that is proposed where none was given

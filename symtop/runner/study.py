@@ -151,7 +151,8 @@ class Study:
 
         def first(quick: bool) -> list[Case]:
             kept = asked(self.cases(quick))
-            if all({*case.integrators} <= {REFERENCE} for case in kept) and REFERENCE not in names:
+            alone = all({*case.integrators} <= {REFERENCE} for case in kept)
+            if not kept or (alone and REFERENCE not in names):
                 raise SymtopError(f"study {self.name} has no case of {', '.join(names)}")
             return kept
 

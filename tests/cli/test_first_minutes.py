@@ -81,6 +81,13 @@ def test_one_method_alone_takes_part_in_a_study(axis_only, tmp_path):
     nothing = call("study", "truth", "--quick", "--only", "on-the-axis", "--plugin", axis_only)
     assert nothing.exit_code == 2
     assert "study truth has no case of on-the-axis" in nothing.stderr
+    for name in ("on-the-axis", "on-the-axis,exact"):  # exact is the closed form, which stays where others are measured
+        words = ["--quick", "--only", name, "--status", "--results", tmp_path, "--plugin", axis_only]
+        several = call("study", "truth", "convergence", *words)
+        assert "study truth has no case of on-the-axis" in several.stderr
+        assert several.stderr.rstrip().endswith("it is left out")
+        assert several.exit_code == 0
+        assert several.stdout.startswith("convergence: ")
 
 
 def test_the_status_counts():

@@ -5,16 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from symtop.measure.timing import timings
-from symtop.methods import loop as loops
 from symtop.methods.coefficients import SUZUKI_4
 from symtop.methods.generalised_alpha import generalised_alpha
 from symtop.methods.lanes import W
 from symtop.methods.lie_runge_kutta import LieTable, lie_runge_kutta
 from symtop.methods.lie_variational import EULER_POINCARE, Variational, lie_variational
-from symtop.methods.many import Many, in_turn
 from symtop.methods.outcomes import OUTCOMES
-from tests.methods.test_lanes import FAR, SOLVERS, assert_runs_alone, left_alone, members
+from tests.methods.test_lanes import FAR, SOLVERS, assert_runs_alone, left_alone, members, times_faster
 from tests.methods.test_newton_lanes import spread
 
 EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
@@ -149,10 +146,4 @@ def test_lanes_are_faster_than_members_one_after_another(name, times):
     numbers, h, marks = spread(128, 500)
     solver = SOLVERS[f"{name}[axis]"]
     assert left_alone(solver, numbers, h, marks).size == 0
-    whole = solver._whole
-    done = Many.begun(128, 2, whole.size)
-    together, alone = timings(
-        [lambda: whole.blocks().run(np.arange(128), numbers, whole.table, h, marks, done, loops.BLOCK),
-         lambda: in_turn(whole.alone[0], np.arange(128), numbers, whole.rule, h, marks, done)], batches=25, batch=0.005,
-    )  # fmt: skip
-    assert alone.best > times * together.best
+    assert times_faster(solver, numbers, h, marks) > times

@@ -3,16 +3,13 @@
 import numpy as np
 import pytest
 
-from symtop.measure.timing import timings
-from symtop.methods import loop as loops
 from symtop.methods.discrete_lagrangian import discrete_lagrangian
 from symtop.methods.lanes import W
-from symtop.methods.many import Many, in_turn
 from symtop.methods.outcomes import OUTCOMES
 from symtop.methods.unreduced import built_in as unreduced
 from symtop.model.scenes import scene
 from symtop.model.top import flat
-from tests.methods.test_lanes import SOLVERS, assert_runs_alone, left_alone, members
+from tests.methods.test_lanes import SOLVERS, assert_runs_alone, left_alone, members, times_faster
 
 IMPLICIT = ("midpoint[angles]", "trapezoidal[angles]", "simpson-linear[angles]", "galerkin-simpson[angles]")
 
@@ -92,10 +89,4 @@ def test_lanes_are_faster_than_members_one_after_another(name, times):
     """So many times in any case: what LLVM does not turn into vectors gains nothing (`make bench` measures)."""
     numbers, h, marks = spread(128, 500)
     assert left_alone(SOLVERS[name], numbers, h, marks).size == 0
-    whole = SOLVERS[name]._whole
-    done = Many.begun(128, 2, whole.size)
-    together, alone = timings(
-        [lambda: whole.blocks().run(np.arange(128), numbers, whole.table, h, marks, done, loops.BLOCK),
-         lambda: in_turn(whole.alone[0], np.arange(128), numbers, whole.rule, h, marks, done)], batches=25, batch=0.005,
-    )  # fmt: skip
-    assert alone.best > times * together.best
+    assert times_faster(SOLVERS[name], numbers, h, marks) > times

@@ -206,19 +206,19 @@ def test_a_remedy_is_a_remedy(scene, name, control, horizon):
 
 def advised(draw, methods):
     """A random run of a scene that the guard warns of, with a step: axis errors of the run and of the one advised."""
-    where, row = symtop.scene(draw.choice(REMEDIED)), symtop.integrator(draw.choice(methods))
-    chart, period = row.charts()[0], where.nutation_period
+    on, row = symtop.scene(draw.choice(REMEDIED)), symtop.integrator(draw.choice(methods))
+    chart, period = row.charts()[0], on.nutation_period
     step, horizon = period * math.exp(draw.uniform(math.log(0.004), math.log(0.7))), period * draw.uniform(2.0, 40.0)
-    plan, _ = make_plan(where, row, step, horizon=horizon, samples=201)
-    advice = re.search(r"take a step of about ([\d.e-]+)", guard.warning(where, row, chart, plan))
+    plan, _ = make_plan(on, row, step, horizon=horizon, samples=201)
+    advice = re.search(r"take a step of about ([\d.e-]+)", guard.warning(on, row, chart, plan))
     if advice is None:
         return None
     errors = []
     for tried in (step, float(advice[1])):
-        plan, _ = make_plan(where, row, tried, horizon=horizon, samples=201)
-        run = row.solvers[chart](where.top, where.start, plan)
+        plan, _ = make_plan(on, row, tried, horizon=horizon, samples=201)
+        run = row.solvers[chart](on.top, on.start, plan)
         with np.errstate(all="ignore"):  # a run may have blown up
-            error = charts.axis_distance(axes(chart, run.states), closed_form(where).axis(plan.times))
+            error = charts.axis_distance(axes(chart, run.states), closed_form(on).axis(plan.times))
         errors.append(float(error.max()) if run.outcome == "ok" else math.inf)
     return errors
 
@@ -235,6 +235,15 @@ def test_the_step_that_is_advised_works_whatever_the_cause():
     assert np.mean(after > EXPECTED) <= 0.02
     assert after.max() < 2.0 * EXPECTED
     assert np.mean(before > EXPECTED) > 0.9  # the warnings were right, too
+
+
+def test_no_step_is_advised_that_a_run_may_not_have():
+    """Past a pole at 1e-12 rad a step that follows the axis is 1e-13: more steps than `simulate` takes."""
+    for gap, steps in ((1e-4, True), (1e-12, False)):
+        sentence = said(grazing(gap), "stormer-verlet", step_size=0.02)
+        assert ("take a step of about" in sentence) is steps
+        assert "an integrator whose chart has no poles, such as strang" in sentence
+    assert "more than 2e+10 steps would be needed" in sentence
 
 
 @pytest.mark.slow
