@@ -4,7 +4,7 @@ Its rows are methods in one chart, every method in each chart that shows the axi
 where it has one of the axis alone: that costs more for the same axis, as the `reduction` study measures.
 
 Two rounds. First every row walks down to each target on every scene and over both horizons, all runs kept
-(`measure/work.py`). Then the rows of each scene are timed against each other, alone on the machine
+(`measure/work.py`). Then the rows of each scene are timed against each other
 (`timing_rounds.py`). `tables.py` lists the variables; `measure/ranking.py` answers questions from them.
 """
 

@@ -40,7 +40,7 @@ def errors_and_work(case: Case) -> xr.Dataset:
 
 
 def run_times(case: Case) -> xr.Dataset:
-    """Seconds of the timed runs of a scene; alone on the machine."""
+    """Seconds of the timed runs of a scene."""
     scene, options = scenes.scene(case.scene), case.settings
     runs = [TimedRun(*run) for run in options["runs"]]
     efforts = (Effort(*options[name]) for name in ("first", "further"))

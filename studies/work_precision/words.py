@@ -38,6 +38,9 @@ RULES = {
     "derivatives": "each of a Taylor series counts as a force evaluation, and costs more the higher it is",
     "runs that are timed": "a row's cheapest in force evaluations for each error, and those of the comparison of "
     "energy errors; no time is computed from others",
+    "what runs beside": "nothing, or the rounds of another scene on a core of its own, if a trial shows that a run "
+    "there takes at most 1.05 times as long as alone: the attributes `timed_at_once` and `timed_slowdown` of a "
+    "case's file",
 }
 
 

@@ -52,7 +52,7 @@ for command in (
 @click.option("--why", is_flag=True, help="With --status: what has changed, one line for all cases with that reason.")
 @click.option("--check", is_flag=True, help="Compute some stored cases again, in another folder, and compare.")
 @click.option("--only", metavar="METHOD,...", help="Cases of these methods alone, into the folder only of the results.")
-@click.option("--jobs", type=click.IntRange(1), help="Processes for cases that are not timed; one a core by default.")
+@click.option("--jobs", type=click.IntRange(1), help="Processes that compute cases; one a core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute cases that are not timed on this dask cluster.")
 @click.option("--limit", type=float, metavar="SECONDS", help="Longest time of one case; an hour by default.")
 @results_option

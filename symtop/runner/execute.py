@@ -25,7 +25,9 @@ OnResult = Callable[[Task, Result], None]
 
 
 def execute(study: Study, tasks: Iterable[Task], workers: Workers, on_result: OnResult) -> None:
-    """Compute all tasks and call `on_result` with each as it ends, in any order; timed ones last, one at a time.
+    """Compute all tasks and call `on_result` with each as it ends, in any order; timed ones last.
+
+    Those run one at a time, or one on each core where a trial shows that they do not disturb each other (`trial`).
 
     Raises SymtopError if the results cannot be written or the workers cannot work.
     """
@@ -44,7 +46,6 @@ def size_for(tasks: list[Task], workers: Workers, *, timed: bool) -> int:
     """How many processes: none for integrators and scenes that only this process knows, nor for few cases.
 
     Few are not worth the start of a process; workers that are open take them, since they have kernels already.
-    Timed cases are handed over one at a time.
     """
     if any(plugins.is_local(name) for task in tasks for name in task.case.names):
         return HERE
@@ -52,7 +53,7 @@ def size_for(tasks: list[Task], workers: Workers, *, timed: bool) -> int:
         return CLUSTER
     if len(tasks) < WORTH_A_POOL:
         return workers.open_size()
-    return max(workers.open_size(), 1 if timed else min(workers.jobs, len(tasks)))
+    return max(workers.open_size(), min(workers.jobs, len(tasks)))
 
 
 def _run_until_done(
@@ -105,11 +106,15 @@ def _failed(task: Task, reason: str, trace: str = "") -> Result:
 
 def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, settle: OnResult, *, timed: bool) -> None:
     """Hand over all tasks, the first of each integrator before its others."""
-    pool, width = workers.pool(size), 1 if timed else workers.width(size)
+    pool, width = workers.pool(size), workers.width(size)
+    if timed:
+        company = workers.side_by_side(size, len(tasks))
+        tasks, width = [task._replace(company=company) for task in tasks], company.at_once
     given = study if size == HERE else None  # other processes load it by name
     followers: dict[str, list[Task]] = {}
     for task in tasks:
-        followers.setdefault(task.case.integrator, []).append(task)
+        kernels = task.path if timed else task.case.integrator  # a timed case compiles before it times
+        followers.setdefault(kernels, []).append(task)
     ready = deque(group.pop(0) for group in followers.values())
     futures: dict[Future[Result], Task] = {}
     elsewhere: list[Task] = []

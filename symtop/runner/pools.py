@@ -13,8 +13,9 @@ from typing import Any
 
 from symtop.base import cluster
 from symtop.base.threads import cores
-from symtop.runner import work
+from symtop.runner import trial, work
 from symtop.runner.sideline import Beside, Sideline
+from symtop.runner.work import ALONE, Company
 
 HERE, CLUSTER = 0, -1  # in place of a number of processes
 
@@ -33,12 +34,13 @@ class InProcess(Executor):
 
 
 class Workers(contextlib.AbstractContextManager["Workers"]):
-    """Pools of processes by their size, and the cluster if there is one; `jobs` is how many untimed cases may take."""
+    """Pools of processes by their size, and the cluster if there is one; `jobs` is how many cases may take."""
 
     def __init__(self, jobs: int | None = None, scheduler: str | None = None) -> None:
         self.jobs = jobs or cores()
         self.scheduler = scheduler
         self._client: Any = None
+        self._slowdown: dict[int, float] = {}
         self._sideline = Sideline(lambda: self._spawned(1), self._idle)
         self._pools: dict[int, Executor] = {HERE: InProcess()}
         if scheduler:
@@ -90,6 +92,15 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         if size == CLUSTER:
             return cluster.width(self._client)
         return 3 * size if size > 1 else 1
+
+    def side_by_side(self, size: int, cases: int) -> Company:
+        """How many timed cases to hand over at a time: one a worker if a trial shows that they do not disturb."""
+        if size < 2 or cases < 2:
+            return ALONE
+        if size not in self._slowdown:
+            self._slowdown[size] = trial.slowdown(self.pool(size), size)
+        ratio = self._slowdown[size]
+        return Company(size, ratio) if ratio <= trial.DISTURBED else Company(1, ratio)
 
     def drop(self, size: int) -> None:
         """Forget a pool that is broken."""

@@ -1,7 +1,8 @@
 """The runner: computes the cases that are missing, combines them, draws, and writes the findings.
 
 A case is computed only if no file holds its digest, so that an interrupted study resumes and an unchanged one
-ends in seconds. Untimed cases share all cores; timed ones run alone. A study may have a second round of cases, made
+ends in seconds. Cases share all cores, and timed ones too if a trial shows that they do
+not disturb each other (`trial`); else these run alone. A study may have a second round of cases, made
 from what the first one found. Two runs may share one folder: each case is computed by one of them. How a picture is
 written to a file is the caller's choice (`Save`): this room knows no style.
 """

@@ -85,7 +85,7 @@ class Case:
     scene: str
     integrator: str
     settings: Mapping[str, Any] = field(default_factory=dict)
-    timed: bool = False  # it runs by itself, on a machine that does nothing else
+    timed: bool = False  # untimed cases must not run beside it, nor timed ones that disturb it (see `trial`)
     group: str = ""
 
     @property
@@ -175,5 +175,5 @@ class Study:
         )  # fmt: skip
 
     def is_timed(self, case: Case) -> bool:
-        """Must the case run alone, on a machine that does nothing else?"""
+        """Are times measured in the case, so that nothing may run beside it that disturbs them?"""
         return self.timed or case.timed

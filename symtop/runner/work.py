@@ -7,6 +7,7 @@ failure that the machine causes (a full disk, other sources than the command's) 
 import contextlib
 import faulthandler
 import gc
+import math
 import os
 import signal
 import threading
@@ -32,6 +33,16 @@ _loading = threading.Lock()  # a file that two threads load at once would be exe
 _expendable: list[bool] = []  # not empty in workers: only they may be ended when a case hangs
 
 
+class Company(NamedTuple):
+    """How many timed cases ran at once, and how many times longer a trial run took beside others (`trial`)."""
+
+    at_once: int
+    slowdown: float  # NaN without a trial
+
+
+ALONE = Company(1, math.nan)
+
+
 class Task(NamedTuple):
     """A case to compute, and everything that another process must know for it."""
 
@@ -41,6 +52,7 @@ class Task(NamedTuple):
     plugins: tuple[str, ...]
     limit: float  # seconds
     fresh: bool = False
+    company: Company | None = None  # of a timed case
 
 
 class Result(NamedTuple):
@@ -91,6 +103,8 @@ def _compute(study: Study, task: Task, path: Path) -> Result:
         message = sentence(task.case, error)
         store.save_failure(path, task.case, message, traceback.format_exc())
         return Result("failed", message)
+    if task.company is not None:
+        data = data.assign_attrs({f"timed_{name}": value for name, value in task.company._asdict().items()})
     store.save_case(data, path, study, task.case)
     return Result("computed")
 
