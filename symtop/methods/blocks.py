@@ -46,11 +46,12 @@ class Blocks:
         widths = lanes.tops, lanes.size(rule), lanes.dimension, lanes.carry
         per_lane = lanes.flag + 2 + lanes.carry + lanes.room(rule), lanes.tops + lanes.size(rule), lanes.dimension
         room = *(aligned(n * W) for n in per_lane), np.empty(W, dtype=np.int64), np.empty(W, dtype=np.int64)
+        coefficients = lanes.pack(rule)[1]
         alone = [left]
         for first in range(0, len(chosen), BATCH):
             batch = chosen[first : first + BATCH]
             prepared = tuple(np.empty((len(batch), width)) for width in widths)
-            self.prepare(batch, numbers, tuple(rule), h, marks, prepared, done.momenta)
+            self.prepare(batch, numbers, coefficients, h, marks, prepared, done.momenta)
             at = np.array([0, -1])
             while at[0] * W < len(batch):
                 heed()

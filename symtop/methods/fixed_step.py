@@ -160,7 +160,7 @@ class FixedStep:
         kind, numbers = pack(rule)
         parts = kind, prepare.numbers, scale, sample
         lanes = loop.lanes(rule)
-        blocks = None if lanes is None else partial(loop.blocks, lanes, as_fields(rule)[0], *parts[1:])
+        blocks = None if lanes is None else partial(loop.blocks, lanes, lanes.pack(rule)[0], *parts[1:])
         costs = self.evaluations, self.each_step, int(self.implicit)
         alone = loop.whole(*parts), numbers, prepare.check, size, *costs
         return _Whole(numbers, size, alone, blocks, rule)

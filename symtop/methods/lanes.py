@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 
 from symtop.base.compiled import compile_kernel, register_jitable, set_item
 from symtop.base.vectors import wide_vectors
-from symtop.methods.preparation import Body, Start, conserved
+from symtop.methods.preparation import Body, Pack, Start, as_fields, conserved
 
 Array = NDArray[np.float64]
 
@@ -90,6 +90,7 @@ class Lanes:
         size(rule)                       how many numbers `lay` writes
         effort(rule)                     work of a step that is known beforehand
         room(rule)                       numbers of working space that a lane has beside its carry
+        pack(rule)                       how a rule travels into compiled code
         show(par, t, state, out)         write a sample at the time t; None where there is a kernel for each chart
 
     The first four and the last compile; the others take the rule of a method before it is scaled.
@@ -106,6 +107,7 @@ class Lanes:
     room: Callable[[Any], int] = _no_numbers
     begin: Callable[..., Any] | None = None
     show: Callable[..., None] | None = None  # of charts that differ in how many numbers a sample has
+    pack: Pack = as_fields
 
     def __post_init__(self) -> None:
         for part in (self.step, self.lay, self.read, self.begin, self.show):  # at once, as in `preparation.Preparation`

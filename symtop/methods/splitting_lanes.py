@@ -13,7 +13,7 @@ from symtop.base.vectors import wide_vectors
 from symtop.methods.lanes import Lanes, W, column, put
 from symtop.methods.loop import accumulate
 from symtop.methods.outcomes import OK
-from symtop.methods.splitting_loop import Composition, Stages
+from symtop.methods.splitting_loop import Composition, Stages, packed_for_lanes
 
 
 def lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
@@ -83,7 +83,7 @@ def composed(
         for j in range(W):
             last(block, row, table, j)
 
-    return Lanes(step, lay, read, _size, top, dimension, carry, effort=_forces)
+    return Lanes(step, lay, read, _size, top, dimension, carry, effort=_forces, pack=packed_for_lanes)
 
 
 def _size(rule: Composition) -> int:
