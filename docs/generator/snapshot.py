@@ -1,8 +1,8 @@
 """Copies the report in words and its figures to docs/snapshot, which this repository holds: make snapshot.
 
 What the studies write into results/ is not tracked, so that a run of them leaves a checkout as it was. The snapshot is
-taken when its messages change; a figure that the report no longer shows is removed from it. The report's first answer
-is also put at the top of docs/choosing.md.
+taken when its messages change; a figure that the report no longer shows is removed from it. What pages quote from the
+report is put between their marks: its first answer at the top of docs/choosing.md, first findings in docs/results.md.
 """
 
 import re
@@ -38,22 +38,38 @@ def answer(report: str) -> str:
     """The sentences and the table of the report's first section."""
     first = re.split(r"^## .*$", report, flags=re.MULTILINE)[1]
     sentences, table = (part.strip().splitlines() for part in first.strip().split("\n\n")[:2])
-    wrap = textwrap.TextWrapper(WIDTH, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False)
-    return "\n".join([*(wrap.fill(sentence) for sentence in sentences), "", *table]) + "\n"
+    return "\n".join([*map(_wrapped, sentences), "", *table]) + "\n"
 
 
-def quote(report: str, page: str) -> str:
-    """A page with the report's answer between its two marks. SystemExit if the page has none."""
+def findings(report: str, section: str, count: int) -> str:
+    """The first sentences that the report has in a section."""
+    part = re.split(rf"^## {re.escape(section)}$", report, flags=re.MULTILINE)[1]
+    sentences = re.findall(r"^- .*$", part, flags=re.MULTILINE)[:count]
+    return "\n".join(map(_wrapped, sentences)) + "\n"
+
+
+def _wrapped(sentence: str) -> str:
+    return textwrap.fill(sentence, WIDTH, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False)
+
+
+def quote(said: str, page: str) -> str:
+    """A page with what is said between its two marks. SystemExit if the page has none."""
     parts = re.split(f"({re.escape(BEGIN)}|{re.escape(END)})", page)
     if len(parts) != 5 or (parts[1], parts[3]) != (BEGIN, END):
         sys.exit(f"snapshot: a page must have the lines {BEGIN.strip()} and {END.strip()} once each, in this order")
-    return "".join([*parts[:2], answer(report), *parts[3:]])
+    return "".join([*parts[:2], said, *parts[3:]])
+
+
+def quoted(report: str) -> dict[str, str]:
+    """What pages of docs quote from the report."""
+    return {"choosing.md": answer(report), "results.md": findings(report, "Factors", 3)}
 
 
 if __name__ == "__main__":
     docs = ROOT / "docs"
     names = take(ROOT / "results", docs / "snapshot")
-    choosing = docs / "choosing.md"
     report = (docs / "snapshot" / "report.md").read_text(encoding="utf-8")
-    choosing.write_text(quote(report, choosing.read_text(encoding="utf-8")), encoding="utf-8")
+    for name, said in quoted(report).items():
+        page = docs / name
+        page.write_text(quote(said, page.read_text(encoding="utf-8")), encoding="utf-8")
     print(f"snapshot: {len(names)} figures in docs/snapshot")  # noqa: T201

@@ -5,8 +5,9 @@
 
 |S_n| are the terms of the axis, or of the attitude, at the end of the step: the tolerance is an error of one step in
 radians. The first neglected term is smaller than e by the ratio of two terms, 0.2 to 0.5. A rejected step costs one
-series; so does a sample, which is the series of the step with a shorter time. Time and state are sums with
-compensation. `taylor` does the same on equations that its compiler knows nothing of.
+series. So does a sample, the series of the step with a shorter time, 0.1 us: it is the method's dense output and, as
+that of `taylor`, no force evaluation of the run, whose work would otherwise depend on who looks at it. Time and state
+are sums with compensation. `taylor` does the same on equations that its compiler knows nothing of.
 Source: Biscani, Izzo, Mon. Not. R. Astron. Soc. 504 (2021) 2614 (order and step of a tolerance).
 """
 
@@ -73,7 +74,7 @@ def march(chart: str, order: int) -> Callable[..., tuple[int, int, int, int]]:  
     """The loop of one order in one chart, compiled when it is first used.
 
     It is a loop as `adaptive` takes it, from the place (state, its low half, time, its low half, step), and counts
-    series.
+    the series of its steps.
     """
     prepare, series_of, sample, axis, size = CHARTS[chart]
     series = series_of(order)
@@ -112,7 +113,6 @@ def march(chart: str, order: int) -> Callable[..., tuple[int, int, int, int]]:  
                 after = (rest + (t - ahead)) + h if t > h else (rest + (h - ahead)) + t
                 while seen < len(times) and (times[seen] - ahead) - after <= 0.0:
                     part, _ = terms(state, body, (times[seen] - t) - rest)
-                    effort += 1
                     shown, _ = accumulate(state, low, part)
                     shown = sample(par, shown, times[seen])
                     for i in range(size):

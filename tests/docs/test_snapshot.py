@@ -74,20 +74,28 @@ More.
 def test_the_first_answer_is_put_between_the_marks_of_a_page():
     taker = _taker()
     page = f"# P\n\n{taker.BEGIN}old\n{taker.END}\nrest\n"
-    made = taker.quote(REPORT, page)
+    made = taker.quote(taker.answer(REPORT), page)
     assert made == f"# P\n\n{taker.BEGIN}{taker.answer(REPORT)}{taker.END}\nrest\n"
     assert " ".join(taker.answer(REPORT).split()).startswith(" ".join(REPORT.split("\n\n")[3].split()))
     assert taker.answer(REPORT).endswith("- Then b.\n\n| x | y |\n|---|---|\n| 1 | 2 |\n")
-    assert taker.quote(REPORT, made) == made
+    assert taker.quote(taker.answer(REPORT), made) == made
     for bad in ("no marks\n", f"{taker.END}{taker.BEGIN}"):
         with pytest.raises(SystemExit, match="once each, in this order"):
-            taker.quote(REPORT, bad)
+            taker.quote(taker.answer(REPORT), bad)
 
 
-def test_what_is_said_of_choosing_is_the_answer_of_the_stored_report():
-    page = (ROOT / "docs" / "choosing.md").read_text(encoding="utf-8")
+def test_findings_are_the_first_sentences_of_their_section():
+    taker = _taker()
+    assert taker.findings(REPORT, "Next", 3) == "- Not this.\n"
+    assert taker.findings(REPORT, "Which?", 1).startswith("- Begin with a;")
+    assert "Then b" not in taker.findings(REPORT, "Which?", 1)
+
+
+@pytest.mark.parametrize("name", ["choosing.md", "results.md"])
+def test_what_a_page_quotes_is_what_the_stored_report_says(name):
+    page = (ROOT / "docs" / name).read_text(encoding="utf-8")
     report = (ROOT / "docs" / "snapshot" / "report.md").read_text(encoding="utf-8")
-    assert _taker().quote(report, page) == page
+    assert _taker().quote(_taker().quoted(report)[name], page) == page
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is no checkout")

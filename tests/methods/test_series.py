@@ -183,6 +183,7 @@ def test_samples_do_not_change_the_steps_and_a_budget_ends_a_run(chart, method):
     times = [np.linspace(0.0, 40.0, count) for count in (2, 401)]
     few, many = (method.solvers[chart](scene.top, scene.start, Plan.until(grid, 1e-10)) for grid in times)
     assert few.steps == many.steps
+    assert few.force_evaluations == many.force_evaluations
     assert few.states[-1] == pytest.approx(many.states[-1], abs=0.0)
     short = method.solvers[chart](scene.top, scene.start, Plan.until(np.linspace(0.0, 400.0, 41), 1e-10, budget=500.0))
     assert short.outcome == "out_of_budget"
