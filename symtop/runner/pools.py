@@ -94,13 +94,20 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         return 3 * size if size > 1 else 1
 
     def side_by_side(self, size: int, cases: int) -> Company:
-        """How many timed cases to hand over at a time: one a worker if a trial shows that they do not disturb."""
-        if size < 2 or cases < 2:
-            return ALONE
-        if size not in self._slowdown:
-            self._slowdown[size] = trial.slowdown(self.pool(size), size)
-        ratio = self._slowdown[size]
-        return Company(size, ratio) if ratio <= trial.DISTURBED else Company(1, ratio)
+        """How many timed cases to hand over at a time: as many as a trial shows not to disturb each other.
+
+        One for each worker, or half as many, and so on.
+        """
+        company = ALONE
+        width = min(size, cases)
+        while width > 1:
+            if width not in self._slowdown:
+                self._slowdown[width] = trial.slowdown(self.pool(size), width)
+            company = Company(1, self._slowdown[width])
+            if company.slowdown <= trial.DISTURBED:
+                return company._replace(at_once=width)
+            width //= 2
+        return company
 
     def drop(self, size: int) -> None:
         """Forget a pool that is broken."""

@@ -46,7 +46,7 @@ def turn() -> Turn:
 
 
 def slowdown(pool: Executor, size: int) -> float:
-    """How many times longer a run takes while all `size` workers of a pool run; infinite if they never did at once."""
+    """How many times longer a run takes while `size` workers of a pool run; infinite if they never did at once."""
 
     def at_once() -> list[Turn]:
         return [future.result() for future in [pool.submit(turn) for _ in range(size)]]

@@ -63,6 +63,19 @@ def test_a_trial_decides_whether_timed_cases_run_at_once(study, tmp_path, monkey
     assert asked == [2]  # once for all studies of a command
 
 
+def test_where_all_workers_disturb_each_other_half_as_many_may_not(monkeypatch):
+    asked = []
+    monkeypatch.setattr(trial, "slowdown", lambda _, size: asked.append(size) or 0.3 * size)
+    with Workers(1) as workers:
+        assert workers.side_by_side(8, 100) == (2, 0.6)
+        assert workers.side_by_side(8, 3) == (3, 0.3 * 3)
+        assert asked == [8, 4, 2, 3]
+        monkeypatch.setattr(trial, "slowdown", lambda *_: 2.0)
+        assert workers.side_by_side(5, 5) == (2, 0.6)
+        assert workers.side_by_side(7, 7) == (3, 0.3 * 3)
+        assert workers.side_by_side(8, 1) == workers.side_by_side(1, 8) == (1, pytest.approx(math.nan, nan_ok=True))
+
+
 def test_untimed_cases_need_no_trial(tmp_path, monkeypatch):
     (tmp_path / "slept.py").write_text(SCRIPT.replace("timed=True", "timed=False"))
     study = runner.load(str(tmp_path / "slept.py"))
