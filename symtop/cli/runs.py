@@ -1,11 +1,15 @@
 """``symtop run``, ``long`` and ``claims``: one integrator on one scene, compared with the truth."""
 
+import math
 import sys
 
 import click
 
+from symtop.base.validate import SymtopError
 from symtop.cli.common import File, apart, as_text, figure_file, json_option, plugin_option, say, standing, table, warn
 from symtop.cli.completion import completing
+
+SAME = 0.01  # a step that differs by more from the one asked for is told
 
 
 @click.command(short_help="Run one integrator on one scene; show its errors.")
@@ -78,7 +82,10 @@ def run(
         method = told["integrator"]
         row = method if method.endswith("]") else f"{method}[{told['chart']}]"
         say(f"{row} on {chosen.name}: {told['outcome_message']}")
-        say("{steps} steps, {force_evaluations} force evaluations".format(**told))
+        made = told["step_size"]
+        other = step_size is not None and abs(made / step_size - 1.0) > SAME
+        of = f" of {made:.6g}, for a whole number of them fills the horizon" if other else ""
+        say(f"{told['steps']} steps{of}, {told['force_evaluations']} force evaluations")
         if data.attrs["outcome"] == "ok":
             say(f"judged against the truth: {verdict.words()}")
         for name, values in largest.items():
@@ -119,7 +126,10 @@ def long(
         from symtop.model import scenes
         from symtop.run.long_run import PER_NUTATION, long_run
 
-    h = scenes.scene(scene).nutation_period / PER_NUTATION if step_size is None else step_size
+    period = scenes.scene(scene).nutation_period
+    if step_size is None and period == math.inf:
+        raise SymtopError(f"{scene} has no nutation to take a step from: give --step-size")
+    h = period / PER_NUTATION if step_size is None else step_size
     count = whole("steps", steps, 1)
     try:
         data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True, output=output)

@@ -29,7 +29,7 @@ from symtop.base.fingerprint import digest, file_reasons, hashed
 from symtop.base.numbers import GOLDEN
 from symtop.base.progress import beating
 from symtop.base.signals import ending_on_sigterm
-from symtop.base.validate import SymtopError, SymtopWarning, place, positive, whole
+from symtop.base.validate import SymtopError, SymtopWarning, place, positive, spare, whole
 from symtop.methods.fixed_step import FixedStep, inside
 from symtop.methods.loop import Loop, Position
 from symtop.methods.outcomes import OK, OUTCOMES, sentence
@@ -81,7 +81,8 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     """Relative changes of energy, modified energy and momenta since the start, and theta, of any samples of a run.
 
     The oscillation that the modified energy leaves is fitted on the first `FIRST` steps, which are run here. States are
-    the loop's own, or, where they are `shown`, those of the chart.
+    the loop's own, or, where they are `shown`, those of the chart. The energy is that of the momenta that the run shows
+    unless the method keeps them: then those of the start have more digits.
     """
     chart, solver = chart_of(method)
     par, rule, state = solver.setup(scene.top, scene.start, h)
@@ -91,20 +92,27 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     def presented(states: Array) -> Array:
         return states if solver.present is None else solver.present(par, np.zeros(len(states)), states)
 
-    first = presented(solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES)).states)
-    first = first[np.isfinite(first).all(axis=1)]  # a run may fail in its first steps
-    at_start = presented(solver.loop(par, rule, state, h, np.array([0])).states)
-    first = first if len(first) else at_start
-    energy_start = float(modified.energy(scene, chart, at_start)[0])
+    kept = {"p_phi", "p_psi"} <= set(method.conserves or ())
+
+    def with_momenta(momenta: Array) -> Array | None:
+        return None if kept else momenta
+
+    begun = solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES))
+    first, ahead = presented(begun.states), begun.momenta
+    ran = np.isfinite(first).all(axis=1) & np.isfinite(ahead).all(axis=1)  # a run may fail in its first steps
+    at_start, given = presented(solver.loop(par, rule, state, h, np.array([0])).states), np.array([start[:2]])
+    first, ahead = (first[ran], ahead[ran]) if ran.any() else (at_start, given)
+    energy_start = float(modified.energy(scene, chart, at_start, with_momenta(given))[0])
     curve = modified.oscillation(
-        *modified.section(chart, first), modified.modified_energy(scene, method, chart, first, h)
+        *modified.section(chart, first), modified.modified_energy(scene, method, chart, first, h, with_momenta(ahead))
     )
 
     def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
         states = states if shown else presented(states)
-        values = modified.modified_energy(scene, method, chart, states, h)
+        seen = with_momenta(momenta)
+        values = modified.modified_energy(scene, method, chart, states, h, seen)
         return {
-            "energy": (modified.energy(scene, chart, states) - energy_start) / energy_unit,
+            "energy": (modified.energy(scene, chart, states, seen) - energy_start) / energy_unit,
             "modified_energy": curve.rest(*modified.section(chart, states), values) / energy_unit,
             "p_phi": (momenta[:, 0] - start.p_phi) / momentum_unit,
             "p_psi": (momenta[:, 1] - start.p_psi) / momentum_unit,
@@ -222,6 +230,8 @@ class _Book:
     def __init__(self, file: "str | Path | bool", identity: str) -> None:
         own = cache_root() / "runs" / f"{identity}.nc"
         self.own = file is True
+        if not isinstance(file, bool) and place("checkpoint", file).is_dir():
+            raise SymtopError(f"checkpoint must be a file, not the folder {str(file)!r}")
         self.file = own if file is True else None if file is False else place("checkpoint", file)
         self.identity = identity
         self.saved = time.monotonic()
@@ -292,6 +302,7 @@ class _Book:
             raise SymtopError(f"output must be a file, not the folder {str(output)!r}")
         if self.file is not None and output.absolute() == self.file.absolute():
             raise SymtopError(f"output and checkpoint must be two files, not both {str(output)!r}")
+        spare(output)
         return output
 
     def write(self, data: xr.Dataset, output: Path) -> None:

@@ -30,14 +30,22 @@ Array = np.ndarray
 HARMONICS = 40
 
 
-def energy(scene: Scene, chart: str, states: Array) -> Array:
-    """The energy of kernel states (n, dimension) with the momenta of the start, less its constant parts."""
-    return np.asarray(View(chart, scene.top, states).nutation_energy(scene.top.momenta(scene.start)))
+def energy(scene: Scene, chart: str, states: Array, momenta: Array | None = None) -> Array:
+    """The energy of kernel states (n, dimension), less a constant.
+
+    With the momenta that the run showed, (n, 2) of p_phi and p_psi; or, without them, with those of the start and less
+    its constant parts, which has more digits and is the energy only where both momenta are constants of the method.
+    """
+    if momenta is None:
+        return np.asarray(View(chart, scene.top, states).nutation_energy(scene.top.momenta(scene.start)))
+    return np.asarray(View(chart, scene.top, states, momenta[:, 0], momenta[:, 1]).energy)
 
 
-def modified_energy(scene: Scene, method: "str | Integrator", chart: str, states: Array, h: float) -> Array:
+def modified_energy(
+    scene: Scene, method: "str | Integrator", chart: str, states: Array, h: float, momenta: Array | None = None
+) -> Array:
     """The modified energy of kernel states (n, dimension) up to O(h^4), less constants; H where none is known."""
-    plain, correction = energy(scene, chart, states), integrator(method).modified_energy
+    plain, correction = energy(scene, chart, states, momenta), integrator(method).modified_energy
     if correction is None:
         return plain
     return plain + correction(View(chart, scene.top, states), scene.top.momenta(scene.start), h)

@@ -17,7 +17,7 @@ import xarray as xr
 from symtop.base import datasets
 from symtop.base.numbers import GOLDEN
 from symtop.base.over_time import over_time
-from symtop.base.validate import SymtopError, SymtopWarning, one_of, positive, shown, whole
+from symtop.base.validate import SymtopError, SymtopWarning, one_of, positive, shown, truth, whole
 from symtop.methods.calling import solve
 from symtop.methods.outcomes import sentence
 from symtop.methods.plan import Plan, Run
@@ -151,7 +151,8 @@ def simulate(
     ``quaternion`` where the chart has one. Samples after a failure are NaN; ``outcome``, ``outcome_message`` and
     ``reached_time`` say what happened, ``guard`` what was expected to. `observe` ("nutation", "axis", "attitude";
     default: what the scene is watched for) picks the smallest chart of the integrator that shows it; a row, such as
-    ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step.
+    ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step. A whole number of
+    steps fills the horizon, the one nearest to horizon/step_size: the attribute ``step_size`` is the step made.
 
     Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
     error is expected; the run is the same either way. Give a function to be handed the sentence instead, or False for
@@ -162,6 +163,7 @@ def simulate(
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
     chosen, method = _scene(scene), _integrator(integrator)
+    guard = guard if callable(guard) else truth("guard", guard)
     end = chosen.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2, MOST_SAMPLES)
     chart = chart_of(method, chosen.observes, observe)
@@ -169,9 +171,10 @@ def simulate(
     plan, dithered = make_plan(chosen, method, step_size, tolerance, horizon=end, samples=count, budget=limit)
     context = f" on {chosen.name}"
     # a run that its probe would repeat step by step comes first, and the probe reads it: a third of the guard's time
-    done = solve(method, chart, chosen.top, chosen.start, plan, context) if guard and repeats(method, plan) else None
-    caution = warning(chosen, method, chart, plan, done) if guard is not False else "off"
-    if guard is not False and caution:
+    guarded = guard is not False
+    done = solve(method, chart, chosen.top, chosen.start, plan, context) if guarded and repeats(method, plan) else None
+    caution = warning(chosen, method, chart, plan, done) if guarded else "off"
+    if guarded and caution:
         if callable(guard):
             guard(caution)
         else:

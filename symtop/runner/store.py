@@ -145,6 +145,7 @@ def _dense(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
     Sizes differ from case to case: each dimension gets the largest one, and a shorter case fills the beginning.
     """
     cases = [one for case, data in cases for one in _apart(case, data)]
+    _check_apart(cases)
     scenes = list(dict.fromkeys(case.scene for case, _ in cases))
     methods = list(dict.fromkeys(case.integrator for case, _ in cases))
     sizes: dict[str, int] = {}
@@ -175,6 +176,19 @@ def _dense(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
         for name, (dims, values, attrs) in filled.items()
     }
     return xr.Dataset(variables, coords=coordinates)
+
+
+def _check_apart(cases: list[tuple[Case, xr.Dataset]]) -> None:
+    """SymtopError for cases that would replace each other; a later round may measure other variables of a cell."""
+    taken = set[tuple[str, str, str]]()
+    for case, data in cases:
+        cells = {(case.scene, case.integrator, str(name)) for name in data.data_vars}
+        for scene, method, name in sorted(cells & taken)[:1]:
+            raise SymtopError(
+                f"two cases of {method} on {scene} measure {name}, and one would replace the other: "
+                "give each a group, or measure all settings in one case, over a dimension of the dataset"
+            )
+        taken |= cells
 
 
 def _apart(case: Case, data: xr.Dataset) -> list[tuple[Case, xr.Dataset]]:

@@ -57,6 +57,20 @@ def test_a_check_names_the_group_that_differs():
     assert check.differences(LONG, LONG) == []
 
 
+def test_cases_that_would_replace_each_other_are_refused():
+    """A study of three steps of each method, say, whose cases differ in their settings alone."""
+    steps = [(Case("spheroid", "rk4", {"n": n}), LONG) for n in (6, 3)]
+    with pytest.raises(
+        SymtopError, match="two cases of rk4 on spheroid measure energy, and one would replace the other"
+    ):
+        store.combine(steps)
+    other = LONG.rename(energy="seconds", outcome="told", steps="calls")
+    both = store.combine([steps[0], (steps[1][0], other)])  # the control: another round, which measures something else
+    assert {"energy", "seconds"} <= set(both.data_vars)
+    apart = store.combine([(Case("spheroid", "rk4", {"n": n}, group=f"n-{n}"), LONG) for n in (6, 3)])
+    assert set(apart.children) == {"n-6", "n-3"}
+
+
 def test_a_case_without_a_group_among_cases_with_one_is_refused():
     cases = [(Case("spheroid", "midpoint"), LONG), (Case("spheroid", "strang", group="windows"), LONG)]
     with pytest.raises(SymtopError, match="case spheroid--midpoint has no group"):

@@ -4,6 +4,7 @@ import dataclasses
 import importlib
 import json
 import linecache
+import math
 import os
 import re
 import shutil
@@ -434,7 +435,7 @@ import xarray as xr
 from symtop.runner.study import Case, Picture, Study
 
 def cases(quick):
-    return [Case("spheroid", ("midpoint", "strang")[k % 2], {"k": k}, timed=k >= 8) for k in range(16)]
+    return [Case("spheroid", ("midpoint", "strang")[k % 2], {"k": k}, k >= 8, f"case-{k}") for k in range(16)]
 
 def measure(case):
     begin, crew = time.monotonic(), Path(os.environ["CREW"])
@@ -451,7 +452,8 @@ STUDY = Study("clocked", "Clocked", "Alone?", "", cases, measure, lambda data: [
 
 @pytest.mark.parametrize("count", [8, 2])
 def test_timed_cases_run_one_at_a_time_in_workers_that_are_there_already(tmp_path, monkeypatch, count):
-    """Few of them, too: workers have the kernels, this process has not."""
+    """Few of them, too: workers have the kernels, this process has not. (Side by side: `test_trial`.)"""
+    monkeypatch.setattr("symtop.runner.trial.slowdown", lambda *_: math.inf)
     (tmp_path / "crew").mkdir()
     monkeypatch.setenv("CREW", str(tmp_path / "crew"))
     (tmp_path / "clocked.py").write_text(CLOCKED.replace("range(16)", f"range({8 + count})"))

