@@ -12,7 +12,7 @@ from symtop.methods.registry import integrators, split_name
 from symtop.report import style
 from symtop.runner.study import Picture
 
-from . import messages, rows, words
+from . import behaviours, messages, rows
 
 LABELS = {
     "energy": "energy", "modified_energy": "modified energy", "p_phi": r"$p_\varphi$", "p_psi": r"$p_\psi$",
@@ -133,8 +133,8 @@ def exponents(histories: xr.Dataset) -> Picture:
         "Growth exponents of the phase error over the last decade of time, a dot a run of a method[chart], in columns "
         f"of {BIN:g}; a panel holds the runs whose row fares alike with its energy on its worst scene. 0 is a bounded "
         "error, 1 a steady lag (shaded), 3/2 the phase under a random walk of the energy, 2 that under a drift of the "
-        f"energy. Phase errors below {words.ROUNDED_PHASE:g} rad may be rounding alone, which also grows as t^3/2. "
-        f"{rows.setting(data)}"
+        f"energy. Phase errors below {behaviours.ROUNDED_PHASE:g} rad may be rounding alone, which also grows as "
+        f"t^3/2. {rows.setting(data)}"
     )
     alt = "Columns of dots of the growth exponents of the phase error, in a panel for each behaviour of the energy."
     return Picture("exponents", figure, caption, alt)

@@ -1,7 +1,7 @@
 """Tables of the study, and the sentences of its captions and its verdict."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import product
 
 import numpy as np
@@ -19,8 +19,6 @@ from .phase_loss import LOST
 from .rows import charts_apart, charts_table, setting, used, without_repeats
 from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS, by_integrator, losses, rounding, worst_behaviour
 
-FULL_LENGTH = 0.99  # of the longest run of a scene: a shorter run is named
-ROUNDED_PHASE = 1e-9  # rad: symplectic methods of order 8 reach 4.6e-10 in a million steps, by rounding
 CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
 ROUNDING_COLUMNS = {  # header: variable
     "exponent": "exponent",
@@ -120,14 +118,14 @@ def holding(histories: xr.Dataset) -> list[str]:
 
 def shortened(histories: xr.Dataset) -> str:
     """How many rows ran over a part of the horizon only, with its share of the longest run; empty if none did."""
-    ends = histories["sample_time"].max("sample")
-    shares = (ends / ends.max("integrator")).min("scene").to_series()
-    shares = shares[shares < FULL_LENGTH].sort_values(ascending=False, kind="stable")
-    if not len(shares):
+    every = behaviours.run_shares(histories)
+    shorter = {row: share for row, share in every.items() if share < behaviours.FULL_LENGTH}
+    if not shorter:
         return ""
-    least, most = (f"{100.0 * share:.2g}%" for share in (shares.iloc[-1], shares.iloc[0]))
-    part = most if least == most else f"{least} ({shares.index[-1]}) to {most}"
-    return f"To save time, {few(list(shares.index))} ran over {part} of the horizon only, and are judged on that part."
+    names = sorted(shorter, key=lambda row: -shorter[row])
+    least, most = (f"{100.0 * shorter[row]:.2g}%" for row in (names[-1], names[0]))
+    part = most if least == most else f"{least} ({names[-1]}) to {most}"
+    return f"To save time, {few(names)} ran over {part} of the horizon only, and are judged on that part."
 
 
 def moved(windows: xr.Dataset) -> str:
@@ -163,8 +161,8 @@ def walks(ensembles: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def predictions(runs: Mapping[str, xr.Dataset], place: str = "") -> str:
-    """Which losses of phase were predicted, and which were not."""
+def predictions(runs: Mapping[str, xr.Dataset], place: str = "", left: Sequence[str] = ()) -> str:
+    """Which losses of phase were predicted, and which were not; `left` are the rows of which nothing was foretold."""
     off = {name: abs(float(cell["ratio"]) - 1.0) for name, cell in runs.items()}  # NaN: not reached
     times = [float(cell["measured"] / cell["short"]) for name, cell in runs.items() if math.isfinite(off[name])]
     hits = [100.0 * error for error in off.values() if error <= CLOSE]
@@ -179,8 +177,9 @@ def predictions(runs: Mapping[str, xr.Dataset], place: str = "") -> str:
     )
     if hits:
         text += f": right to {max(hits):.2g}% for {len(hits)} of {counted(len(off))}"
-    rest = (f" Off by more than {CLOSE:.0%}: {few(missed)}.", f" Not reached by the end of a run: {few(never)}.")
-    return f"{text}." + "".join(said for said, rows in zip(rest, (missed, never), strict=True) if rows)
+    rest = (f" Off by more than {CLOSE:.0%}: {few(missed)}.", f" Not reached by the end of a run: {few(never)}.",
+            f" No prediction was possible for: {few(list(left))}.")  # fmt: skip
+    return f"{text}." + "".join(said for said, rows in zip(rest, (missed, never, left), strict=True) if rows)
 
 
 def verdict(data: xr.DataTree) -> list[str]:
@@ -190,7 +189,11 @@ def verdict(data: xr.DataTree) -> list[str]:
     if HISTORIES in groups:
         told = without_repeats(groups[HISTORIES])
         sentences = [behaviours.constant_sentence(told, name) for name in CONSTANTS]
-        sentences += [behaviours.phase_sentence(told), charts_apart(groups[HISTORIES])]
+        sentences += [
+            behaviours.phase_sentence(told),
+            behaviours.faster_sentence(told),
+            charts_apart(groups[HISTORIES]),
+        ]
         held = [setting(told), shortened(told)]
     if WINDOWS in groups:
         steps, names = float(groups[WINDOWS]["steps"].max()), list(map(str, groups[WINDOWS]["integrator"].values))
@@ -199,5 +202,7 @@ def verdict(data: xr.DataTree) -> list[str]:
     if ROUNDINGS in groups:
         sentences.append(walks(by_integrator(groups[ROUNDINGS])))
     if HORIZONS in groups:
-        sentences.append(predictions(losses(groups[HORIZONS]), f" on {_scene(groups[HORIZONS])}"))
+        foretold = losses(groups[HORIZONS])
+        left = [name for name in map(str, groups[HORIZONS]["integrator"].values) if name not in foretold]
+        sentences.append(predictions(foretold, f" on {_scene(groups[HORIZONS])}", left))
     return list(filter(None, [*sentences, *held]))

@@ -1,7 +1,9 @@
-"""Own compiled rows against heyoka's `taylor`, timed in one round: the ratio by scene, horizon and target.
+"""Own compiled rows against heyoka's `taylor` in double precision, timed in one round, by scene, horizon and target.
 
-An own row is any compiled row that takes steps and is none of heyoka's, which are `taylor` in three precisions. Rows
-whose step is the motion itself (`Integrator.exact_steps`) take no part in the study.
+Own is any compiled row that takes steps and is none of heyoka's three: `taylor`, which has double precision as the own
+rows have, and its two forms of longer arithmetic, which are no rivals and are told of only where they alone meet a
+target. Each side shows its fastest row in any chart. Rows whose step is the motion itself (`Integrator.exact_steps`)
+take no part in the study.
 """
 
 from typing import NamedTuple
@@ -11,44 +13,69 @@ import xarray as xr
 
 from symtop.measure import ranking
 from symtop.measure.work import TARGETS
+from symtop.methods.registry import split_name
 from symtop.report.sentences import joined
 from symtop.runner.study import Table
 
-RIVAL = "taylor"  # what the rows of heyoka begin with
+RIVAL = "taylor"
+LONGER = ("taylor-longdouble", "taylor-quad")  # the same of heyoka, in longer arithmetic
 FINE = 1e-9  # rad: errors up to it are fine
 
 
 class Ratio(NamedTuple):
-    """The fastest own row and the fastest of heyoka's; NaN in place of a time where none met the target."""
+    """The fastest row of each side; no name, and NaN in place of a time, where none met the target."""
 
     row: str
     seconds: float
     rival: float  # seconds
+    longer: str  # the fastest of heyoka's rows in longer arithmetic
 
     @property
     def value(self) -> float:
         """The own time over the rival's: below 1 the own row is ahead."""
         return self.seconds / self.rival
 
+    @property
+    def alone(self) -> str:
+        """Which of the two met the target alone: "own" or `RIVAL`; empty if both or neither did."""
+        met = np.isfinite([self.seconds, self.rival])
+        return "" if met[0] == met[1] else "own" if met[0] else RIVAL
+
+    @property
+    def neither(self) -> bool:
+        """Did no row in double precision meet the target?"""
+        return bool(np.isnan(self.seconds) and np.isnan(self.rival))
+
+
+def rivals(data: xr.Dataset) -> list[str]:
+    """The rows of the rival, one a chart that it has."""
+    return [name for name in ranking.ranked(data) if split_name(name)[0] == RIVAL]
+
 
 def compared(data: xr.Dataset) -> dict[tuple[str, int, float], Ratio]:
     """Every scene, horizon (by index) and target that is asked there; nothing without the rival."""
-    if not any(_is_rival(name) for name in ranking.ranked(data)):
+    if not rivals(data):
         return {}
     ratios = {}
     for scene in data["scene"].values:
         for far in range(data.sizes["horizon"]):
             cell = data.sel(scene=scene).isel(horizon=far)
             for target in ranking.targets(cell):
-                places = ranking.cheapest(cell, target, implementation="compiled")
-                own = next(((p.integrator, p.cost) for p in places if not _is_rival(p.integrator)), ("", np.nan))
-                theirs = min((p.cost for p in places if _is_rival(p.integrator)), default=np.nan)
-                ratios[str(scene), far, target] = Ratio(*own, theirs)
+                ratios[str(scene), far, target] = _ratio(ranking.cheapest(cell, target, implementation="compiled"))
     return ratios
 
 
-def _is_rival(name: str) -> bool:
-    return name.startswith(RIVAL)
+def _ratio(places: list[ranking.Place]) -> Ratio:
+    """The fastest of each side among the rows that meet a target, which come cheapest first."""
+    sides: dict[str, ranking.Place] = {}
+    for place in places:
+        method = split_name(place.integrator)[0]
+        sides.setdefault(RIVAL if method == RIVAL else "longer" if method in LONGER else "own", place)
+    own, rival, longer = (sides.get(side) for side in ("own", RIVAL, "longer"))
+    return Ratio(
+        own.integrator if own else "", own.cost if own else np.nan, rival.cost if rival else np.nan,
+        longer.integrator if longer else "",
+    )  # fmt: skip
 
 
 def headline(data: xr.Dataset, spans: list[str]) -> str:
@@ -58,17 +85,21 @@ def headline(data: xr.Dataset, spans: list[str]) -> str:
     if not both:
         return ""
     ahead = sum(ratio.value <= 1.0 for ratio in both.values())
-    alone = sum(np.isfinite(ratio.seconds) and not np.isfinite(ratio.rival) for ratio in ratios.values())
+    mine, theirs = (sum(ratio.alone == side for ratio in ratios.values()) for side in ("own", RIVAL))
     said = (
-        f"The fastest of symtop's own rows takes no more time than heyoka's {RIVAL} in {ahead} of {len(both)} "
-        "combinations of scene, run length and error that both meet"
-    ) + (f", and meets {alone} more." if alone else ".")
+        f"The fastest own row takes no more time than heyoka's {joined(rivals(data))} (double precision) in {ahead} of "
+        f"{len(both)} combinations of scene, run length and error that both meet; own rows meet {mine} more, it "
+        f"{theirs or 'none'}."
+    )
     parts = []
     for far, span in enumerate(spans):
         fine = [1.0 / ratio.value for (_, k, target), ratio in both.items() if k == far and target <= FINE]
         if fine:
-            parts.append(f"{min(fine):.1f} to {max(fine):.1f} times faster {span} (median {np.median(fine):.1f})")
-    return said + (f" To {FINE:.0e} rad and below it is {joined(parts)}." if parts else "")
+            ends = f"{min(fine):.1f} to {max(fine):.1f}"
+            parts.append(f"{ends} times{' faster' * (not parts)} {span} (median of {len(fine)}: {np.median(fine):.1f})")
+    said += f" To {FINE:.0e} rad and below it is {joined(parts)}." if parts else ""
+    beyond = [ratio.longer for ratio in ratios.values() if ratio.neither and ratio.longer]
+    return said + (f" Met by {joined(list(dict.fromkeys(beyond)))} alone: {len(beyond)}." if beyond else "")
 
 
 def table(data: xr.Dataset, spans: list[str]) -> Table:
@@ -80,7 +111,8 @@ def table(data: xr.Dataset, spans: list[str]) -> Table:
         for far, span in enumerate(spans)
     ]
     return Table(
-        f"The fastest own row over {RIVAL}, timed in the same rounds: ratio of the times, below 1 where it is ahead",
+        f"The fastest own row over heyoka's {RIVAL} in double precision, each in its fastest chart, timed in the same "
+        "rounds: ratio of the times, below 1 where the own row is ahead",
         ["scene", "horizon", *(f"axis error {target:.0e}" for target in TARGETS)],
         rows,
     )
@@ -89,6 +121,8 @@ def table(data: xr.Dataset, spans: list[str]) -> Table:
 def _cell(ratio: Ratio | None) -> str:
     if ratio is None:
         return ""
-    if np.isnan(ratio.seconds):
-        return "neither" if np.isnan(ratio.rival) else f"{RIVAL} alone"
-    return f"{ratio.row} alone" if np.isnan(ratio.rival) else f"{ratio.value:.2f} ({ratio.row})"
+    if ratio.neither:
+        return f"{ratio.longer} alone" if ratio.longer else "neither"
+    if ratio.alone:
+        return f"{ratio.row or RIVAL} alone{f' of double precision, beside {ratio.longer}' if ratio.longer else ''}"
+    return f"{ratio.value:.2f} ({ratio.row})"

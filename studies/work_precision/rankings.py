@@ -153,7 +153,7 @@ def slowdown(data: xr.Dataset) -> Picture:
         "slowdown",
         figure,
         f"Of {asked} targets, each an axis error on a scene over a horizon, how many every compiled row, "
-        "method[chart], meets with some step or tolerance within a million force evaluations. Beside it, its time "
+        "method[chart], meets with some step or tolerance within its budget (see the rules). Beside it, its time "
         "over that of the fastest row, the median over all targets. Rows that meet most come first, and of these "
         f"those that are closest to the fastest. The {slow} rows that miss half of the targets or more have no median "
         "and are left out; the table on when to choose each row has them.",

@@ -1,7 +1,8 @@
 """Which method is the fastest at the accuracy I need?
 
 Its rows are methods in one chart, every method in each chart that shows the axis, but not in the chart of the attitude
-where it has one of the axis alone: that costs more for the same axis, as the `reduction` study measures.
+where it has one of the axis alone: that shows the same axis, for about the same time or more, as the `reduction` study
+measures.
 
 Two rounds. First every row walks down to each target on every scene and over both horizons, all runs kept
 (`measure/work.py`). Then the rows of each scene are timed against each other
@@ -14,8 +15,7 @@ from symtop.measure.settings import compared
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
-from . import words
-from .energy import in_comparison
+from . import energy, words
 from .figures import pictures
 from .opening import charts, opening
 from .tables import errors_and_work, run_times
@@ -53,7 +53,7 @@ def cases(quick: bool) -> list[Case]:
 def follow_up(data: xr.Dataset) -> list[Case]:
     """One case a scene that times its rows against each other."""
     grid = []
-    energies = in_comparison(data)
+    energies = energy.timed(data)
     periods = [float(value) for value in data["horizon"].values]
     for name in data["scene"].values:
         runs = timed_runs(data.sel(scene=name), energies)

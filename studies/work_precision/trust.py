@@ -14,6 +14,7 @@ class Trust(NamedTuple):
     """What is known of the times."""
 
     timed: int
+    forecast: int  # of them, those that the row's other times predict; it takes two others
     rounds: int  # the least of a time
     measured: float  # the share of the times that are the smallest sample of that very run
     miss: float  # median difference from the time that the row's other times predict
@@ -43,7 +44,8 @@ def trust(data: xr.Dataset) -> Trust:
         for far in range(data.sizes["horizon"])
     ]
     return Trust(
-        int(taken.notnull().sum()), int(rounds.min()), measured(data), float(miss.median()), int((miss > MISSED).sum()),
+        int(taken.notnull().sum()), int(miss.notnull().sum()), int(rounds.min()), measured(data), float(miss.median()),
+        int((miss > MISSED).sum()),
         int((samples[..., 1] > (1.0 + AGAIN) * samples[..., 0]).sum()), (min(margins), max(margins)),
     )  # fmt: skip
 
@@ -52,10 +54,13 @@ def sentence(data: xr.Dataset) -> str:
     """How far a time can be trusted, and from which ratio on a lead counts."""
     known = trust(data)
     least, most = known.margins
+    rest = known.timed - known.forecast
     return (
-        f"Each of the {known.timed} times was compared with the one that the row's other times predict: the median "
-        f"difference is {known.miss:.1%}. A lead counts as larger than the noise from a ratio of {least:.2f} to "
-        f"{most:.2f} on, by scene and run length."
+        f"{known.forecast} of the {known.timed} times were compared with the one that the row's other times predict: "
+        f"the median difference is {known.miss:.1%}."
+        f"{f' The other {rest} belong to rows with too few times to predict one.' if rest else ''}"
+        f" A lead counts as larger than the noise only from a ratio of {least:.2f} to {most:.2f} on, by scene and run "
+        "length."
     )
 
 
@@ -67,6 +72,8 @@ def table(data: xr.Dataset) -> Table:
     rows = [
         ["runs that ended well", str(int((data["outcome"] == "ok").sum())), ""],
         ["runs of these that were timed", str(known.timed), "only these are shown against seconds"],
+        ["times of these with a predicted one beside them", str(known.forecast),
+         "the others have fewer than two times of their row and scene beside them, and were taken again"],
         ["rounds of a time, at least", str(known.rounds), "each is with the other rows of its scene"],
         ["share of the times that are measured", f"{known.measured:.0%}", "none is computed from others"],
         ["median difference from the predicted time", f"{known.miss:.1%}", "predicted from the row's other times"],

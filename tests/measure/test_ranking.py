@@ -105,14 +105,23 @@ def test_the_closed_form_is_compared_with_the_fastest_row():
     data = data.expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
     pairs = work_closed_form.compared(data)
     assert [(pair.row, pair.target, pair.ratio) for pair in pairs] == [("b", 1e-3, 10.0), ("b", 1e-6, 10.0)]
-    said = work_closed_form.headline(data)
+    said = work_closed_form.headline(data, ["over ten"])
     assert said.startswith("The closed form takes less time than the fastest compiled row in 2 of 2 combinations")
-    assert "10 to 10 times less, with a median of 10." in said
+    assert "that of the closed form is 10 to 10 (median of all 2: 10) over ten." in said
     (row,) = work_closed_form.table(data, ["ten"]).rows
     assert row == ["x", "ten", "10 (1e+05 us; b)", "10 (1e+05 us; b)", "", ""]
     slow = data.assign(seconds=data["seconds"].where(data["control"] != "", 5.0))
-    assert "slower than the fastest row in all 2" in work_closed_form.headline(slow)
-    assert work_closed_form.headline(data.sel(integrator=["b", "c"])) == ""
+    assert "in 0 of 2 combinations" in work_closed_form.headline(slow, ["over ten"])
+    assert "is 0.2 to 0.2 (median of all 2: 0.2) over ten." in work_closed_form.headline(slow, ["over ten"])
+    assert work_closed_form.headline(data.sel(integrator=["b", "c"]), ["over ten"]) == ""
+
+
+def test_the_median_of_the_closed_form_is_over_all_combinations_and_not_those_that_it_wins():
+    short = cell([[2.0] * 3, [1.0] * 3, [4.0] * 3], errors=[1e-16, 1e-4, 1e-7])
+    short["control"][0] = ""
+    said = work_closed_form.headline(short.expand_dims(scene=["x"]).expand_dims(horizon=[10.0]), ["over ten"])
+    assert "row in 1 of 2 combinations" in said
+    assert "is 0.5 to 2 (median of all 2: 1.2) over ten." in said  # of the one that it wins it would be 2
 
 
 def test_own_rows_are_compared_with_taylor():
@@ -124,11 +133,40 @@ def test_own_rows_are_compared_with_taylor():
     assert row == ["x", "over ten", "0.50 (series[axis])", "2.00 (rk4[axis])", "rk4[axis] alone", "neither"]
     said = against_taylor.headline(data, ["over ten"])
     assert said == (
-        "The fastest of symtop's own rows takes no more time than heyoka's taylor in 1 of 2 combinations of scene, run "
-        "length and error that both meet, and meets 1 more."
+        "The fastest own row takes no more time than heyoka's taylor[axis] (double precision) in 1 of 2 combinations "
+        "of scene, run length and error that both meet; own rows meet 1 more, it none."
     )
     only = data.sel(integrator=["series[axis]", "rk4[axis]"])
     assert (against_taylor.compared(only), against_taylor.headline(only, ["over ten"])) == ({}, "")
+
+
+def test_the_rival_is_taylor_in_double_precision_and_its_longer_forms_are_told_where_they_are_alone():
+    """In longer arithmetic taylor is slower at 1e-9, and alone at 1e-12; a row of another name is no rival."""
+    names = ["series[axis]", "taylor[axis]", "taylor-longdouble[axis]", "taylor-mine[axis]"]
+    data = cell([[1.0] * 3, [3.0] * 3, [20.0] * 3, [0.5] * 3], errors=[1e-10, 1e-10, 1e-13, 1e-4])
+    data = data.assign_coords(integrator=names).expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
+    said = against_taylor.headline(data, ["over ten"])
+    assert "in 3 of 3 combinations" in said
+    assert "own rows meet 0 more, it none." in said
+    assert said.endswith("below it is 3.0 to 3.0 times faster over ten (median of 1: 3.0). Met by "
+                         "taylor-longdouble[axis] alone: 1.")  # fmt: skip
+    (row,) = against_taylor.table(data, ["over ten"]).rows
+    assert row[2:] == ["0.17 (taylor-mine[axis])", "0.33 (series[axis])", "0.33 (series[axis])",
+                       "taylor-longdouble[axis] alone"]  # fmt: skip
+    loose = data.assign(axis=data["axis"].where(data["integrator"] != "taylor[axis]", 1e-4))
+    said = against_taylor.headline(loose, ["over ten"])  # 20 times faster than the longer form, which is no rival
+    assert "in 1 of 1 combinations" in said
+    assert "own rows meet 2 more, it none." in said
+    assert "times faster" not in said
+    only = data.sel(integrator=[names[0], names[2]])
+    assert against_taylor.headline(only, ["over ten"]) == ""
+
+
+def test_a_row_that_meets_an_error_alone_has_no_lead():
+    alone = cell([[1.0, 1.0, 1.0], [1.3, 1.3, 1.3]], errors=[1e-7, 1e-4])
+    alone = alone.expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
+    said = work_words.fastest(alone, [won for won in ranking.winners(alone).values() if won])
+    assert said.endswith("In 1 the lead is larger than the noise, and in 1 no other row meets the error.")
 
 
 def test_the_fastest_row_its_times_and_its_leads_are_told_where_there_are_any():

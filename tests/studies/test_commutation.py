@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.optimize import root
-from symtop_studies.reduction import commutation, words
+from symtop_studies.reduction import commutation, figures, words
 from symtop_studies.reduction.commutation import gap, kernel_path, path, reduced_first
 from symtop_studies.reduction.tables import Column, Ratio, commutation_table, unreduced_forms
 
@@ -151,3 +151,48 @@ def test_what_a_larger_chart_costs_is_said_by_its_ends_and_listed_by_family(monk
     assert "1 times as long (attitude over axis, splitting) to 2.4 times as long (attitude over axis, runge" in said
     monkeypatch.setattr(words, "ratios", lambda _: [])
     assert words.larger_sentence(None) == ""
+
+
+def timed_pair(time, iterations):
+    """One rule on one scene at two steps: nanoseconds and iterations a step, reduced and unreduced."""
+    dims = ("scene", "integrator", "kernel", "twin_step")
+    return xr.Dataset(
+        {Column.SECONDS_A_STEP: (dims, [[np.array(time) * 1e-9]]), Column.ITERATIONS_A_STEP: (dims, [[iterations]]),
+         Column.COMPARED_STEP: (("scene", "integrator", "twin_step"), [[[0.1, 0.01]]])},
+        coords={"scene": ["spheroid"], "integrator": ["midpoint"], "kernel": ["reduced", "unreduced"]},
+    )  # fmt: skip
+
+
+def test_what_a_reduced_kernel_saves_is_told_by_iterations_and_by_the_time_of_one():
+    """Twice the time for twice the iterations, or for as many that take twice as long each: two other sentences."""
+    more = words.cheaper(timed_pair([[100.0, 100.0], [200.0, 300.0]], [[2.0, 1.5], [4.0, 4.5]]))
+    assert "midpoint takes 2.0 to 3.0 times as long as a reduced one." in more
+    assert "It has 2.0 to 3.0 times as many Newton iterations (4.0 to 4.5, not 1.5 to 2.0)" in more
+    assert "each takes 1.00 to 1.00 times as long" in more
+    assert "what eliminating phi and psi alone saves was not measured" in more
+    dearer = words.cheaper(timed_pair([[100.0, 100.0], [200.0, 300.0]], [[2.0, 1.5], [2.0, 1.5]]))
+    assert "It has 1.0 to 1.0 times as many" in dearer
+    assert "each takes 2.00 to 3.00 times as long" in dearer
+    (pair, _) = words.savings(timed_pair([[100.0, 100.0], [200.0, 300.0]], [[2.0, 1.5], [3.0, 4.5]]))
+    assert (pair.time, pair.more, pair.each) == pytest.approx((2.0, 1.5, 4.0 / 3.0))
+    assert words.cheaper(xr.Dataset(coords={"scene": ["spheroid"], "integrator": ["midpoint"]})) == ""
+
+
+def test_the_title_of_the_charts_counts_comparisons_and_not_methods():
+    said = figures.charts_message([1.0, 1.05, 2.0], 2, "the chart axis")
+    assert said == (
+        "In 2 of 3 comparisons, of 2 methods, another chart takes at most 10% more time than the chart axis, in the "
+        "others up to 2 times as long, at the same step or tolerance"
+    )
+    assert "others" not in figures.charts_message([1.0, 1.05], 1, "the chart axis")
+
+
+@pytest.mark.parametrize(("gap", "judged"), [(2e-13, "within"), (3e-4, "more than")])
+def test_the_distance_of_a_kernel_from_its_unreduced_form_is_held_against_rounding(gap, judged):
+    columns = dict.fromkeys((Column.THETA_GAP, Column.PSI_GAP, Column.P_PHI_DRIFT, Column.P_PSI_DRIFT), 1e-15)
+    columns |= {Column.PHI_GAP: gap}
+    data = xr.Dataset({name: (("scene", "integrator", "sample"), [[[0.0, value]]]) for name, value in columns.items()},
+                      coords={"scene": ["spheroid"], "integrator": ["midpoint"]})  # fmt: skip
+    said = words.same_map(data)
+    assert f"differ by up to {gap:.1e} rad in 10000 steps, {judged} the 1e-11 rad that rounding may reach." in said
+    assert said.endswith("change by up to 1.0e-15, relative.")

@@ -142,17 +142,44 @@ def test_what_is_said_of_the_phase_follows_from_its_exponents():
         coords={"integrator": list(exponents), "scene": ["spheroid", "goldstein"]},
     )
     said = behaviours.phase_sentence(data)
-    assert said.startswith(
-        "The phase error grows as t with strang. It grows faster, as it does where the energy drifts"
-    )
-    assert "with rk4, taylor: most with rk4 (t^2.09 and t^1.90, to 1 rad)." in said
+    assert said.startswith("The phase error grows as t with strang. It grows faster with rk4, taylor, and is largest")
+    assert "largest with rk4 (t^2.09 and t^1.90, to 1 rad)." in said
     assert said.endswith("With mixed no one power fits all scenes. With 1 row none is seen.")
     assert "exact" not in said
+    lost = data.assign(phase_exponent=data["phase_exponent"].where(data["integrator"] != "mixed"))
+    assert behaviours.phase_sentence(lost).endswith("With 1 row none is seen. With 1 row no power was fitted.")
     groups = behaviours.phases(data)
     assert {word: [one.row for one in group] for word, group in groups.items()} == {
         behaviours.STEADY: ["strang"], behaviours.FASTER: ["rk4", "taylor"], behaviours.UNCLEAR: ["mixed"],
     }  # fmt: skip
     assert groups[behaviours.FASTER][1].said == "taylor (t^1.94 and t^2.03, to 7e-10 rad)"
+
+
+def fast_rows(**energy):
+    """Three rows whose phase error grows as t^2, the last over a fiftieth of the horizon; largest energy, exponent."""
+    given = {"rk4[axis]": (1e-3, 1.0), "taylor[axis]": (1e-15, 0.5), "radau[angles]": (1e-6, 0.0)} | energy
+    sizes, powers = zip(*given.values(), strict=True)
+    per_row = {
+        "outcome": ["ok"] * 3, "energy_largest": sizes, "energy_exponent": powers,
+        "energy_exponent_interval": [0.05] * 3,
+        "phase_largest": [1.0, 7e-10, 3e-6], "phase_exponent": [2.0] * 3, "phase_exponent_interval": [0.05] * 3,
+    }  # fmt: skip
+    columns = {key: (("scene", "integrator"), [list(values)]) for key, values in per_row.items()}
+    time = np.linspace(0.0, 1.0, 3) * np.array([[1.0], [1.0], [0.02]])
+    columns["sample_time"] = (("scene", "integrator", "sample"), time[None])
+    return xr.Dataset(columns, coords={"scene": ["spheroid"], "integrator": list(given)})
+
+
+def test_a_phase_that_grows_faster_is_not_laid_to_an_energy_that_does_not_drift():
+    assert behaviours.faster_sentence(fast_rows()) == (
+        "Of 3 rows whose phase error grows faster than t, the energy drifts with 1; it has a bounded error with 1 "
+        "(radau[angles] over 2% of the horizon); it is at rounding with 1 (taylor[axis]: phase errors below 1e-09 rad, "
+        "which may be rounding)."
+    )
+    drifting = behaviours.faster_sentence(fast_rows(**{"taylor[axis]": (1e-3, 1.0), "radau[angles]": (1e-3, 1.0)}))
+    assert drifting == "Of 3 rows whose phase error grows faster than t, the energy drifts with 3."
+    steady = fast_rows()
+    assert behaviours.faster_sentence(steady.assign(phase_exponent=steady["phase_exponent"] * 0.5)) == ""
 
 
 def test_the_same_run_has_one_behaviour_in_every_study():
@@ -241,6 +268,9 @@ def test_a_loss_that_is_off_by_a_fifth_was_not_predicted():
     unreached = sentence(1.01, math.nan)
     assert unreached.endswith("for 1 of 2 rows. Not reached by the end of a run: method-1.")
     assert "Off by more" not in unreached
+    known = {"method-0": xr.Dataset({"short": 100.0, "measured": 250.0, "ratio": 1.01})}
+    assert words.predictions(known, left=["rk4[axis]"]).endswith("No prediction was possible for: rk4[axis].")
+    assert "No prediction" not in sentence(1.01)
 
 
 @pytest.mark.parametrize(
@@ -328,8 +358,8 @@ def test_the_fates_of_all_rows_are_counted_in_a_sentence_and_listed_in_tables():
     data = xr.Dataset(columns, coords={"integrator": list(sizes), "scene": ["spheroid"]})
     data = data.assign(outcome=(("integrator", "scene"), [["ok"]] * 4))
     assert behaviours.constant_sentence(data, "p_phi") == (
-        "Of 4 rows, the relative change of p_phi is no more than rounding with 2 (up to 2.0e-15), is bounded with 1 "
-        "(up to 1.0e-04, verlet), and grows in time with 1 (up to 1.0e-02, rk4)."
+        "Of 4 rows, the relative change of p_phi is no more than rounding with 2 (up to 2.0e-15), stays bounded over "
+        "the run with 1 (up to 1.0e-04, verlet), and grows in time with 1 (up to 1.0e-02, rk4)."
     )
     counts, every = behaviours.tables(data)
     assert list(counts.rows[0]) == ["energy", "at rounding", "2", "1.0e-15", "strang", "2.0e-15", "cayley"]

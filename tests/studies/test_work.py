@@ -198,9 +198,41 @@ def test_energies_are_compared_within_a_chart():
         "Structure-preserving methods in the axis chart keep energy better at every run time in at least half of the "
         "comparisons with rk4 (100%), in less than half of the comparisons with taylor (0%)"
     )
+    with_gauss = xr.concat([data, data.sel(integrator=["strang[axis]"]).assign_coords(integrator=["gauss-4[axis]"])],
+                           "integrator", data_vars="minimal")  # fmt: skip
+    assert energy.by_construction(with_gauss, "axis") == ["gauss-4[axis]"]  # and it changes no number
+    assert energy.tallies(with_gauss, "axis") == energy.tallies(data, "axis")
+    assert energy.message(with_gauss, "axis") == energy.message(data, "axis")
+    assert "(e, L), without 1 that conserves the energy by construction, have" in energy.sentence(with_gauss, "axis")
+    assert "by construction" not in said
+    assert energy.timed(with_gauss) == [
+        "rk4[axis]", "taylor[axis]", "strang[axis]", "gauss-4[axis]", "rk4[angles]", "midpoint[angles]",
+    ]  # fmt: skip
     error, work = energy.at_steps(data.isel(scene=0, horizon=0).sel(integrator="rk4[axis]"), 118.0)
     assert (error, work) == (pytest.approx(0.1 * 118.0**-4), pytest.approx(4.0))
     assert "with strang[axis] (1)" in energy.at_equal_steps(data, ["rk4[axis]", "strang[axis]"], "x")
+
+
+@pytest.mark.parametrize(
+    ("share", "said"), [(0.0, "0%"), (1 / 163, "0.6%"), (0.47, "47%"), (0.998, "99.8%"), (1.0, "100%")]
+)
+def test_a_share_that_is_neither_none_nor_all_does_not_read_as_such(share, said):
+    assert energy.percent(share) == said
+
+
+def test_times_that_no_other_predicts_are_told_apart(timed_study):
+    known = timed_study["seconds_forecast"].where(timed_study["seconds"].notnull())
+    assert trust.trust(timed_study).forecast == int(known.notnull().sum())
+    lone = timed_study.assign(seconds_forecast=known.where(known["integrator"] != "taylor[axis]"))
+    least = int((timed_study["seconds"].sel(integrator="taylor[axis]").notnull()).sum())
+    whole = int(timed_study["seconds"].notnull().sum())
+    rest = int((timed_study["seconds"].notnull() & lone["seconds_forecast"].isnull()).sum())
+    assert rest >= least > 0
+    said = trust.sentence(lone)
+    assert said.startswith(f"{whole - rest} of the {whole} times were compared with the one")
+    assert f"The other {rest} belong to rows with too few times" in said
+    full = timed_study.assign(seconds_forecast=timed_study["seconds"])
+    assert "The other" not in trust.sentence(full)
 
 
 def called(seconds, table):
