@@ -45,6 +45,19 @@ def test_a_longer_horizon_than_can_be_run_is_extrapolated(monkeypatch):
     assert measured(symtop.scene("spheroid"), advice) <= 5e-3
 
 
+def test_a_method_that_cannot_start_at_a_pole_is_left_out():
+    """A user who named no chart is not told of one, and what runs in another chart is recommended."""
+    top, start = symtop.SymmetricTop(1.0, 0.5, 1.0), symtop.Angles(0.0, psi_dot=9.0, theta_dot=0.5)
+    scene = symtop.Scene("upright", top, start, 5.0)
+    advice = symtop.recommend(scene, accuracy=1e-6)
+    assert advice.confidence == "checked"
+    assert measured(scene, advice) <= 1e-6
+    (said,) = (words for words in advice.fails if words.startswith("Not run, as theta must lie inside"))
+    assert "rk4[angles]" in said
+    tilted = symtop.recommend(symtop.Scene("tilted", top, symtop.Angles(0.5, psi_dot=9.0), 5.0), accuracy=1e-6)
+    assert not any(words.startswith("Not run") for words in tilted.fails)
+
+
 def test_what_nobody_reaches_is_said():
     advice = symtop.recommend("spheroid", accuracy=1e-17, horizon=8.0)
     assert advice.integrator is None

@@ -71,14 +71,15 @@ def _ends(scene: Scene, stages: Stages, horizon: float, counts: NDArray[np.int64
     momenta = np.tile(np.array(charts.momentum_parts(np, top, theta, phi, *rates))[:, np.newaxis], counts.size)
     drifts, kicks = ([Wide(value) for value in part] for part in (stages.drift, stages.kick))
     drifts = [value / sum(drifts) / Wide(top.I1) for value in drifts]
-    kicks = [value / sum(kicks) * Wide(top.mgl) for value in kicks]
+    kicks = [value / (sum(kicks) or 1) * Wide(top.mgl) for value in kicks]  # those of a free top are zero
     for done in range(counts[-1]):
         left = slice(int(np.searchsorted(counts, done, side="right")), None)  # runs with more steps than that
         (x, y, z), momentum, h = axes[:, left], momenta[:, left], step[left]
         for kick, drift in zip(kicks, [*drifts, Wide(0.0)], strict=True):
             momentum = momentum + kick * h * np.stack([-y, x, 0.0 * z])
             length = np.sqrt((momentum * momentum).sum(axis=0))
-            (a, b, c), angle = momentum / length, length * drift * h
+            # a top at rest turns by no angle about any axis
+            (a, b, c), angle = momentum / np.where(length > 0, length, 1), length * drift * h
             cos, sin, along = np.cos(angle), np.sin(angle), (1 - np.cos(angle)) * (a * x + b * y + c * z)
             x, y, z = (
                 cos * x + sin * (b * z - c * y) + along * a,

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from decimal import ROUND_DOWN, Context
 from typing import NamedTuple
 
+from symtop.base.validate import SymtopError
 from symtop.measure.accuracy import error_row
 from symtop.measure.phase import FREQUENCIES
 from symtop.measure.timing import bare_run, timings
@@ -220,7 +221,10 @@ def search(
         met = tried[setting] = attempt(scene, method, setting, horizon, quantity)
         return met.error, met.evaluations
 
-    setting = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience, least=least)
+    try:
+        setting = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience, least=least)
+    except SymtopError as error:  # a start at a pole, for a method in the angles chart
+        return f"Not run, as {error}"
     return setting if isinstance(setting, str) else tried[setting]
 
 

@@ -13,7 +13,8 @@ where [v] x = v x x. In body axes the third row of J is (0, 0, I3), so that the 
 I1 x + h (I1 - I3) w3 e x x = r; the projected form is solved below in closed form too. All are of order 1, but for the
 first, which leaves out a term of the equations: it follows the spherical top with I3 := I1, started with the same w, at
 any step. What `rescaled` keeps is |L|, not L: in a fast top the axis wanders away from L by (1 - I3/I1)^2 w3^2 h/2 a
-second, relatively, until the body lies flat. Sources: each engine's own file, `Integrator.reference`.
+second, relatively, until the body lies flat. Where N = 0, in a body at rest, it stays zero, as in the engines.
+Sources: each engine's own file, `Integrator.reference`.
 """
 
 from typing import Any, NamedTuple
@@ -67,7 +68,9 @@ def _rescaled(par: Any, e: Any, w: Any, h: Any) -> Any:
     """The gyroscopic term in an explicit step, at the length that L had."""
     L = momentum(par, e, w)
     N = plus(L, -h, cross(w, L))
-    return velocity(par, e, scaled(np.sqrt(dot(L, L) / dot(N, N)), N))
+    square = dot(N, N)
+    stretch = np.sqrt(dot(L, L) / square) if square > 0 else par.zero  # a body at rest stays so, as in the engines
+    return velocity(par, e, scaled(stretch, N))
 
 
 def no_gyro(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
@@ -117,7 +120,9 @@ def torque_then_rescaled(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any
     w = _pulled(par, e, w, h)
     L = momentum(par, e, w)
     N = plus(L, -h, cross(w, L))
-    w = plus(w, par.one, velocity(par, e, plus(scaled(np.sqrt(dot(L, L)) / np.sqrt(dot(N, N)), N), -par.one, L)))
+    length = np.sqrt(dot(N, N))
+    stretch = np.sqrt(dot(L, L)) / length if length > 0 else par.zero
+    w = plus(w, par.one, velocity(par, e, plus(scaled(stretch, N), -par.one, L)))
     return exponential(par, w, h), w, carry
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from symtop.base.compiled import compile_kernel, register_jitable
+from symtop.base.numbers import real_numbers
 from symtop.base.validate import SymtopError, one_of
 from symtop.methods.angles import BareTop
 from symtop.methods.euler_lagrange import field_angles
@@ -46,6 +47,7 @@ def _attitude(I1: Any, I3: Any, mgl: Any, y: Any) -> Any:
 
 
 _RIGHT = {"angles": _angles, "axis": _axis, "attitude": _attitude}
+_SHAPES = {"angles": (6,), "axis": (6,), "attitude": (7,)}
 
 
 @functools.cache
@@ -65,9 +67,14 @@ class Field:
     def __init__(self, chart: str, top: SymmetricTop, *, compiled: bool) -> None:
         self.chart, self.top, self.compiled = chart, top, compiled
         self.parameters = top.I1, top.I3, top.mgl
+        self._shape = _SHAPES[chart]
 
     def __call__(self, _: float, y: Any) -> Array:
-        """y' at any time: an array like y."""
+        """y' at any time: an array like y. Raises SymtopError for a y that is no state of the chart."""
+        if not isinstance(y, np.ndarray):
+            y = real_numbers("y", y)
+        if y.shape != self._shape:  # compiled code would read what lies behind the array
+            raise SymtopError(f"y must have the shape {self._shape} in the chart {self.chart}, not {y.shape}")
         if self.compiled:
             return np.asarray(self.kernel(*self.parameters, y))
         return np.array(_RIGHT[self.chart](*self.parameters, np.asarray(y, dtype=float).tolist()))
@@ -92,9 +99,10 @@ def field(chart: str, top: SymmetricTop, *, compiled: bool = False) -> Field:
         attitude   (7,)  q (w, x, y, z; body to space) and L     as for the axis
 
     ``f.state(start)`` is an `Angles` as y. With `compiled` each call runs compiled code (y must be an array of floats);
-    ``f.kernel(*f.parameters, y)`` can be called from functions that numba compiles.
+    ``f.kernel(*f.parameters, y)`` can be called from functions that numba compiles; it does not look at the shape of y.
 
-    Raises SymtopError for a chart that is none of the three, and for a top that is none.
+    Raises SymtopError for a chart that is none of the three, and for a top that is none; so does a call for a y that
+    has not the shape of the chart.
     """
     if not isinstance(top, SymmetricTop):
         raise SymtopError(f"top must be a SymmetricTop, not {type(top).__name__}")

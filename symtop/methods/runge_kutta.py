@@ -16,9 +16,11 @@ Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, sect
 
 import math
 from collections.abc import Sequence
+from reprlib import repr as short
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symtop.base.compiled import register_jitable, set_item
 from symtop.base.validate import SymtopError, row
@@ -29,6 +31,9 @@ from symtop.methods.loop import Loop, driver
 from symtop.methods.registry import Integrator
 from symtop.methods.runge_kutta_lanes import explicit
 from symtop.methods.space import SpaceTop
+
+Row = Sequence[float] | NDArray[Any]
+Rows = Sequence[Row] | NDArray[Any]
 
 TABLE_ROUNDING = 1e-12  # sums of a tableau may be off by this: coefficients come with 15 digits or more
 
@@ -128,10 +133,15 @@ _STEPPED = {"angles": (BareTop, 6), "axis": (SpaceTop, 6), "attitude": (SpaceTop
 LOOPS = {chart: _loop(form, *_STEPPED[chart]) for chart, form in FORMULATIONS.items()}
 
 
-def _explicit(a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[list[list[float]], list[float]]:
+def _explicit(a: Rows, b: Row) -> tuple[list[list[float]], list[float]]:
     """The strict lower triangle, by rows, and the weights; refuses what is not an explicit tableau."""
     weights = row("b", b)
-    rows = [row("a", values) for values in a] if isinstance(a, Sequence) else []
+    try:
+        rows = None if isinstance(a, (str, bytes, dict)) else [row("a", values) for values in a]
+    except TypeError:  # nothing to go through, such as an array without dimensions
+        rows = None
+    if rows is None:
+        raise SymtopError(f"a must be rows of numbers, not {short(a)}")
     if not weights or len(rows) != len(weights):
         raise SymtopError(
             f"a must have one row for each of the {len(weights)} entries of b (at least one), not {len(rows)}"
@@ -149,13 +159,13 @@ def _explicit(a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[list[li
 
 
 def runge_kutta(
-    name: str, a: Sequence[Sequence[float]], b: Sequence[float], c: Sequence[float] | None = None, *,
+    name: str, a: Rows, b: Row, c: Row | None = None, *,
     order: int | None = None, summary: str = "", reference: str = "",
 ) -> Integrator:  # fmt: skip
     """An explicit Runge-Kutta method from its Butcher tableau.
 
     `a` has one row a stage, either the entries below the diagonal (the first row empty) or whole rows with zeros from
-    the diagonal on; `b` must sum to 1. With `c` given, the row sums of `a` are checked against it.
+    the diagonal on; `b` must sum to 1. All may be arrays. With `c` given, the row sums of `a` are checked against it.
 
     Raises SymtopError for a tableau that is implicit, ragged or inconsistent.
     """

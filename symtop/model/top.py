@@ -285,6 +285,9 @@ def _steady_theta(top: SymmetricTop, momenta: Momenta) -> float:
 def turning_cosines(top: Any, at: Any) -> tuple[float, float]:
     """`SymmetricTop.turning_cosines` of any records with these fields: bisections of both at a time."""
     cubic, start = nutation_cubic(top, at), math.cos(at.theta)
+    rests = top.mgl == 0.0 and at.theta_dot == 0.0 and at.phi_dot * math.sin(at.theta) == 0.0
+    if rests and cubic[2] * cubic[2] == 0.0:  # nothing turns the axis, and the cubic vanishes at every cosine
+        return start, start
     low, high, below, above = -1.0, 1.0, start, start
     for _ in range(BISECTIONS):
         low, below, high, above = bisected(cubic, start, low, below, high, above)

@@ -19,6 +19,8 @@ from symtop.model.top import flat
 
 POINTS = 100  # of the motion that are compared
 SMALL = 64.0 * EPSILON  # a change whose effect the closed form shows: rounding is a tenth of it
+LEAST = 2.0 * EPSILON  # the least change that any theta in [0, pi] and every rate can take
+FAR = 0.1  # rad: beyond it a departure no longer grows with the change, and it ends at pi
 
 
 def departure(scene: Scene, change: float, horizon: float) -> float:
@@ -42,5 +44,18 @@ def departure(scene: Scene, change: float, horizon: float) -> float:
 
 
 def conditioning(scene: Scene, horizon: float) -> float:
-    """Rad by which the axis moves up to the horizon for each of the start, or relative; 1 at least, or NaN."""
-    return float(np.maximum(departure(scene, SMALL, horizon) / SMALL, 1.0))
+    """Rad by which the axis moves up to the horizon for each of the start, or relative; 1 at least, or NaN.
+
+    Where a change departs `FAR`, a smaller one is tried, which the start takes less exactly: `LEAST` to a third. What
+    is `unbounded` departs `FAR` even so, and moves by that much at least.
+    """
+    for change in (SMALL, 8.0 * EPSILON, LEAST):
+        apart = departure(scene, change, horizon)
+        if not apart > FAR:
+            break
+    return float(np.maximum(apart / change, 1.0))
+
+
+def unbounded(factor: float) -> bool:
+    """Is a `conditioning` only the least that it can be: does the smallest change of the start depart `FAR`?"""
+    return factor * LEAST > FAR

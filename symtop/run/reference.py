@@ -30,7 +30,7 @@ from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.bounds import closed_bounds, closed_values
 from symtop.run.certificate import KINDS, certificate
-from symtop.run.departure import conditioning
+from symtop.run.departure import conditioning, unbounded
 from symtop.run.kept import kept, place
 from symtop.run.witnesses import CHECKS, DIGITS, SAFETY, Checks, envelope, have_heyoka, integrated
 
@@ -127,7 +127,12 @@ def conditioned(scene: Scene, horizon: float) -> str:
     factor = conditioning(scene, horizon)
     if math.isnan(factor):  # a changed start that comes too close to a pole
         return "unknown"
-    lost = f"; rounding the start anew moves the axis by {min(factor * EPSILON, math.pi):.1g} rad"
+    if unbounded(factor):
+        return (
+            f"at least {factor:.2g} times a change of the start; rounding the start anew moves the axis by "
+            f"{factor * EPSILON:.2g} rad or more: nothing is known of the axis but from these very doubles"
+        )
+    lost = f"; rounding the start anew moves the axis by {factor * EPSILON:.1g} rad"
     return f"{factor:.2g} times a change of the start{lost if factor > ILL else ''}"
 
 

@@ -138,6 +138,16 @@ def test_runs_side_by_side_in_long_double_are_those_alone(name):
         assert np.abs(end - alone(where, stages, horizon, count + 1)).max() > 1e-12  # the control
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("psi_dot", [0.0, 3.0])
+def test_a_free_top_is_run_in_long_double_without_a_warning(psi_dot):
+    """Its kicks are zero, and so is its momentum if it rests."""
+    free = symtop.Scene("free", symtop.SymmetricTop(1.0, 0.5, 0.0), symtop.Angles(1.0, phi_dot=psi_dot / 3.0), 5.0)
+    ends = extended._ends(free, extended._composition(free, integrator("strang")), 2.0, np.array([7, 8]))
+    true = symtop.ClosedForm(free.top, free.start).axis([2.0])[0]
+    assert np.abs(ends.astype(float) - true).max() < 1e-14
+
+
 def test_only_plain_compositions_are_run_in_long_double():
     where = scene("goldstein")
     for name in ("takahashi-imada", "cayley", "gauss-4", "stormer-verlet", "rk4", "rk45"):

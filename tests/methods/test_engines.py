@@ -139,6 +139,21 @@ def test_no_test_of_conservation_sees_that_it_is_another_top():
     assert wobble == pytest.approx(0.10, abs=0.01)  # L_z alone shows it, and nobody looks
 
 
+# ---- at rest ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", registry.engines())
+def test_a_top_that_starts_at_rest_falls_and_a_free_one_stays(name):
+    """Jolt, PhysX and rapier rescale a momentum to its length, and each asks first whether it has one."""
+    for mgl in (1.0, 0.0):
+        scene = symtop.Scene("rest", symtop.SymmetricTop(1.0, 0.5, mgl), symtop.Angles(1.0), 2.0)
+        for chart in symtop.integrator(name).charts():
+            shown = "axis" if chart == "axis" else "attitude"
+            run = symtop.simulate(scene, f"{name}[{chart}]", step_size=0.005, observe=shown, samples=11, guard=False)
+            assert run.attrs["outcome"] == "ok"
+            assert float(symtop.errors(run)["axis"].max()) < (0.02 if mgl else 1e-6)
+
+
 # ---- charts and momenta ----------------------------------------------------------------------------------------------
 
 

@@ -58,6 +58,24 @@ def test_a_pole_of_the_angles_is_nan_and_no_other_chart_has_one():
     assert math.isnan(symtop.field("angles", top)(0.0, np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]))[4])
 
 
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("chart", CHARTS)
+def test_a_state_of_another_shape_is_refused(chart, compiled):
+    """Compiled code does not look where an array ends."""
+    size = 7 if chart == "attitude" else 6
+    f = symtop.field(chart, symtop.SymmetricTop(1.0, 0.5, 1.0), compiled=compiled)
+    for shape in ((3,), (13 - size,), (size, 3), (size, 1), (0,), ()):
+        with pytest.raises(symtop.SymtopError) as refused:
+            f(0.0, np.ones(shape))
+        assert str(refused.value) == f"y must have the shape ({size},) in the chart {chart}, not {shape}"
+    for value in ("abcdef", None, [1.0, 2.0], [[1.0], [2.0, 3.0]]):
+        with pytest.raises(symtop.SymtopError, match="y must"):
+            f(0.0, value)
+    y = f.state(symtop.Angles(1.0, psi_dot=2.0))
+    for same in (list(y), np.repeat(y, 2)[::2]):
+        np.testing.assert_array_equal(f(0.0, same), f(0.0, y))
+
+
 def test_an_unknown_chart_is_refused():
     with pytest.raises(symtop.SymtopError, match="did you mean axis"):
         symtop.field("axs", symtop.SymmetricTop(2.0, 1.0, 1.0))

@@ -61,6 +61,14 @@ def test_a_users_tableau_has_its_order(a, b, order):
     assert_order("goldstein", runge_kutta("mine", a, b), order, 0.05, steps)
 
 
+def test_a_tableau_may_be_made_of_arrays():
+    heun = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([0.5, 0.5]), np.array([0.0, 1.0])
+    rules = [runge_kutta("heun", *tableau).solvers["axis"].rule for tableau in (heun, [part.tolist() for part in heun])]
+    assert rules[0] == rules[1]
+    rows = [np.array([]), np.array([1.0])]
+    assert runge_kutta("heun", rows, heun[1]).solvers["axis"].rule == rules[0]
+
+
 def test_one_step_is_the_definition():
     scene = symtop.scene("spheroid")
     par, state = with_rates(scene.top, scene.start)
@@ -107,6 +115,14 @@ def test_rk4_is_not_reversible():
         (((), (0.5, 0.1, 0.0), (0.0, 0.5, 0.5)), (0.2, 0.3, 0.5), None, "row 2 of a"),
         (((),), (math.nan,), None, "an entry of b"),
         ((), (), None, "at least one"),
+        (np.zeros((2, 3)), np.array([0.5, 0.5]), None, "row 1 of a must have 0 entries"),
+        (np.array([[0.0, 1.0], [1.0, 0.0]]), (0.5, 0.5), None, "row 1 of a must have 0 entries"),
+        (np.zeros((3, 3)), (0.5, 0.5), None, "a must have one row for each of the 2"),
+        (np.zeros(2), (0.5, 0.5), None, "a must be a row of numbers"),
+        (np.zeros((2, 2, 2)), (0.5, 0.5), None, "an entry of a must be a finite number"),
+        (np.array(1.0), (1.0,), None, r"a must be rows of numbers, not array\(1.\)"),
+        (None, (1.0,), None, "a must be rows of numbers, not None"),
+        ("ab", (0.5, 0.5), None, "a must be rows of numbers, not 'ab'"),
     ],
 )
 def test_bad_tableaux_are_refused(a, b, c, words):

@@ -112,6 +112,22 @@ def test_free_and_hanging_tops_have_a_nutation_period():
     assert down.nutation_period(mirrored) == pytest.approx(up.nutation_period(start), rel=1e-12)
 
 
+@pytest.mark.parametrize("theta", [0.0, 0.3, 1.0, math.pi])
+@pytest.mark.parametrize("psi_dot", [0.0, 1e-200])
+def test_a_free_top_at_rest_keeps_its_inclination(theta, psi_dot):
+    """The nutation cubic vanishes at every cosine."""
+    cosine = math.cos(theta)
+    assert SymmetricTop(1.0, 0.5, 0.0).turning_cosines(Angles(theta, psi_dot=psi_dot)) == (cosine, cosine)
+
+
+def test_a_top_that_moves_or_falls_from_rest_does_not():
+    free = SymmetricTop(1.0, 0.5, 0.0)
+    for swing in (0.2, 1e-200):  # a great circle through both poles, however slowly
+        assert free.turning_cosines(Angles(1.0, theta_dot=swing)) == (-1.0, 1.0)
+    low, high = SymmetricTop(1.0, 0.5, 1.0).turning_cosines(Angles(1.0))
+    assert (low, high) == (-1.0, pytest.approx(math.cos(1.0), abs=1e-15))
+
+
 @pytest.mark.parametrize(
     ("build", "says"),
     [
