@@ -41,7 +41,10 @@ def _ends(values: Mapping[str, float]) -> str:
 
 def limits(part: xr.Dataset) -> str:
     """Linear limits of the step, the methods that have none or only narrow windows, and those that show nothing."""
-    phases = {name: float(cell[Column.LIMIT_PHASE]) for name, cell in rows_with(part, Column.LIMIT_PHASE).items()}
+    phases = {
+        name: float(np.fmin(cell[Column.LIMIT_PHASE], cell.get(Column.WINDOW_START, math.nan)))
+        for name, cell in rows_with(part, Column.LIMIT_PHASE).items()
+    }  # a narrow window may come first
     free, narrow, parts = unlimited(part), only_windows(part), []
     if phases:
         parts.append(f"at h omega {_ends(phases)} with {few(list(phases), most=2)}")

@@ -154,6 +154,9 @@ def test_a_method_without_a_linear_limit_is_said_to_have_none():
     assert "only between steps tried, in windows up to 0.007 wide from 6.28 on, with midpoint" in said
     assert "none of" not in said
     assert words.tables(narrow)[-1].rows[0][1:3] == ["none of 300 steps up to 10", "6.280"]
+    both = narrow.assign({Column.LIMIT_PHASE: narrow[Column.WINDOW_START] + 2.0})  # strang is of this kind
+    assert "first grow or lose it at h omega at 6.28 (midpoint)" in words.limits(both.sel(scene="steady-fast"))
+    assert words.tables(both)[-1].rows[0][1:3] == ["8.2800", "6.280"]
     unknown = mechanism(math.nan, math.nan)  # not symmetric: nothing is claimed
     assert words.limits(unknown.sel(scene="steady-fast")) == ""
 
