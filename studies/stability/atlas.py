@@ -75,9 +75,9 @@ class OutcomeMap(NamedTuple):
 
     @property
     def silent(self) -> float:
-        """The share of the inaccurate runs that ended without an error."""
+        """The share of the inaccurate runs that ended without an error; NaN if every run is accurate."""
         wrong = self.outcome[self.outcome != 0]
-        return float(np.mean(wrong < len(JUDGED))) if wrong.size else 0.0
+        return float(np.mean(wrong < len(JUDGED))) if wrong.size else math.nan
 
     @property
     def failure(self) -> Failure:

@@ -13,7 +13,7 @@ from symtop.report.sentences import counted, few
 from symtop.runner.study import Table
 
 from .atlas import COMMON, NOTABLE, OutcomeMap, accurate_everywhere, closed_forms, common, maps, pole_effect
-from .tables import PERIODS, Column
+from .tables import CURVE_STEPS, PERIODS, Column
 
 FAILURES = {
     "drifting": f"change their energy by more than {DRIFT:.0%} and ever more",
@@ -24,7 +24,7 @@ FAILURES = {
     "step_too_small": "stop because their steps become too small",
     "out_of_budget": "exceed their budget of steps",
 }  # what runs do
-NO_LIMIT = "none"  # in the table: small nutations grow at no step of the map
+NO_LIMIT = "none"  # in the table: small nutations grow at none of the steps tried
 EXCEPTIONS = 2  # methods at most that a sentence on all others names apart
 
 
@@ -191,8 +191,8 @@ def _without_limit(data: xr.Dataset, family: str, shown: Mapping[str, OutcomeMap
         return ""
     longest = max(float(shown[name].settings[-1]) for name in free)
     return (
-        f" With {few(free, most=2)} small nutations grow at no spin and no step up to {longest:.2g} nutation periods "
-        f"(h omega = {2.0 * math.pi * longest:.3g})."
+        f" With {few(free, most=2)} small nutations grow at no spin at any of {CURVE_STEPS} steps tried up to "
+        f"{longest:.2g} nutation periods (h omega = {2.0 * math.pi * longest:.3g})."
     )
 
 
@@ -221,11 +221,14 @@ def summary(data: xr.Dataset, family: str) -> list[str]:
     sentences = [said for said in (_reaches(data, family, by_name), _charts_apart(by_name, family)) if said]
     never = [name for name, one in by_name.items() if one.early == 0.0]
     if by_name:
-        median = float(np.median([one.silent for one in by_name.values()]))
+        silent = [one.silent for one in by_name.values() if math.isfinite(one.silent)]
+        ends_well = f"{len(never)} of {counted(len(by_name))} never end a run early"
+        if silent:
+            often = f"With the median row {np.median(silent):.0%} of inaccurate runs end without an error"
+            ends_well = f"{often}, whether or not they keep the energy, and {ends_well}"
         sentences.append(
-            f"With the median row {median:.0%} of inaccurate runs end without an error, whether or not they keep the "
-            f"energy, and {len(never)} of {counted(len(by_name))} never end a run early. That a run ends "
-            "without an error says little: what energy, momenta and the guard notice is in Populations."
+            f"{ends_well}. That a run ends without an error says little: what energy, momenta and the guard notice is "
+            "in Populations."
         )
     return sentences
 
@@ -236,17 +239,25 @@ def _reaches(data: xr.Dataset, family: str, by_name: Mapping[str, OutcomeMap]) -
     for kind in ("fast", "slow"):
         reach = {
             name: one.usual_reach[kind] for name, one in by_name.items()
-            if one.control == "step_size" and name not in apart and one.usual_reach[kind] > 0.0
+            if one.control == "step_size" and name not in apart and math.isfinite(one.usual_reach[kind])
         }  # fmt: skip
         if reach:
-            ends_of = [f"{reach[name]:.2g} ({name})" for name in (pick(reach, key=lambda one: reach[one])
-                                                                  for pick in (min, max))]  # fmt: skip
+            short = [name for name, value in reach.items() if value <= 0.0]
+            below = max((float(by_name[name].settings[0]) for name in short), default=0.0)
+            ends_of = [f"below {below:.2g} ({few(short, most=1)})"] if short else []
+            for pick in (max,) if short else (min, max):
+                name = pick(reach, key=lambda one: reach[one])
+                ends_of += [f"{reach[name]:.2g} ({name})"] if reach[name] > 0.0 else []
             parts.append(f"from {' to '.join(ends_of)} on {kind} tops")
     if not parts:
         return ""
+    left = [f"{few(apart)} (exact at any step)"] if apart else []
+    if others := sum(one.control != "step_size" and name not in apart for name, one in by_name.items()):
+        left.append(f"{counted(others)} without a fixed step")
+    apart_from = f" Not counted: {' and '.join(left)}." if left else ""
     return (
-        f"The longest accurate step on the family {family}, over {PERIODS:g} nutations, is {', '.join(parts)}, in "
-        f"nutation periods.{f' Not counted: {few(apart)}, exact at any step.' if apart else ''}"
+        f"The longest accurate step on the family {family}, over {PERIODS:g} nutations and for nine spins in ten, is "
+        f"{', '.join(parts)}, in nutation periods.{apart_from}"
     )
 
 
@@ -269,11 +280,11 @@ def atlas_tables(data: xr.Dataset, family: str) -> list[Table]:
     by_name, lines = maps(data, family), []
     for name, line in advice(data, family).items():
         one = by_name[name]
-        shares = (f"{share:.0%}" for share in (one.shares[0], one.early, one.silent))
+        shares = ("" if math.isnan(share) else f"{share:.0%}" for share in (one.shares[0], one.early, one.silent))
         lines.append([line.integrator, line.use, line.fails, *shares, _limit(data, family, name)])
     title = f"The atlas in words: {family} with its spin changed, {PERIODS:g} nutations"
     header = ["row", "use it", "it fails", "accurate runs", "runs that end early", "inaccurate runs without an error",
-              "small nutations grow beyond a step of (nutation periods)"]  # fmt: skip
+              f"small nutations first grow at a step of (nutation periods, {CURVE_STEPS} tried)"]  # fmt: skip
     made = [Table(title, header, lines)]
     if several := _charts(by_name):
         charts = list(dict.fromkeys(split_name(name)[1] for rows in several.values() for name in rows))

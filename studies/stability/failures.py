@@ -2,7 +2,7 @@
 
 `surviving_displacements` displaces a steady precession and finds how far that may be without its running away within
 some thousands of steps. A linear analysis calls every step below the limit stable; at a third of a turn a step
-(`linear_stability`) hardly any displacement survives all the same.
+(`linear_stability`) some small displacement is lost all the same.
 
 `separatrix_horizon` follows the top that rises towards the upright and never reaches it. Near this motion a deviation
 grows as exp(g t/2), g^2 = mgl/I1, so that an error e at time t1 reaches E at t1 + (2/g) ln(E/e): each digit of accuracy
@@ -102,6 +102,7 @@ class Horizon(NamedTuple):
     error: float  # axis error at `SEEN`, rad
     reached: float  # first time at which it passes `LOST`; NaN if it does not, or the run ended before
     predicted: float  # from the error at `SEEN`
+    broken: float  # 1 if the run ended before it passed `LOST`, else 0
 
 
 def separatrix_horizon(method: Integrator, scene: Scene, setting: float, longest: float = LONGEST) -> Horizon:
@@ -112,12 +113,13 @@ def separatrix_horizon(method: Integrator, scene: Scene, setting: float, longest
     else:
         plan = Plan.until(np.linspace(0.0, longest, 1601) / g, setting)
     times = plan.times
-    _, seen = _run(method, scene, scene.start, plan)
+    outcome, seen = _run(method, scene, scene.start, plan)
     error = charts.axis_distance(seen.axis, closed_form(scene).axis(times))
     early = float(error[np.searchsorted(times, SEEN / g * (1.0 - 1e-12))])
     past = np.flatnonzero(error > LOST)
     reached = float(times[past[0]]) if past.size else math.nan
-    return Horizon(early, reached, SEEN / g + 2.0 / g * math.log(LOST / early) if early > 0.0 else math.nan)
+    predicted = SEEN / g + 2.0 / g * math.log(LOST / early) if early > 0.0 else math.nan
+    return Horizon(early, reached, predicted, float(outcome != "ok" and not past.size))
 
 
 def sampled_energy_error(method: Integrator, scene: Scene, steps: int, periods: int) -> tuple[float, float]:

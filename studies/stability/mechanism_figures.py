@@ -19,8 +19,9 @@ from symtop.runner.study import Picture
 
 from . import messages
 from .failures import LOST, SEEN
+from .resonance_words import resonant
 from .tables import Column
-from .words import LEAST_SAMPLED, held_fixed, mechanism_sentences, outlasting, resonant
+from .words import LEAST_SAMPLED, held_fixed, mechanism_sentences, outlasting
 
 SHOWN = (
     "midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "galerkin-simpson[angles]", "strang[axis]",
@@ -88,7 +89,7 @@ def _pole(axis: Any, data: xr.Dataset) -> None:
 
 
 def _resonance(axis: Any, data: xr.Dataset) -> None:
-    """Rows whose step can turn the nutation by a third; those that lose all there have a colour and a ring."""
+    """Rows whose step can turn the nutation by a third; those that lose a small displacement there have a ring."""
     ends, ringed = {}, resonant(data)
     tried = [str(row) for row in data["integrator"].values[np.isfinite(data[Column.THIRD_TURN_PHASE].values)]]
     for name, cell in _each(data, Column.SURVIVING, tried):
@@ -105,7 +106,9 @@ def _resonance(axis: Any, data: xr.Dataset) -> None:
         axis.plot(x, y, **marks, markevery=6, clip_on=False)
         ends[name] = float(x[-1]), float(y[-1]), str(marks["color"])
     most = float(np.nanmax(data[Column.SURVIVING].values))
-    axis.set(xlabel=r"step $h\omega$ ($\omega$: frequency of the nutation)", ylabel="displacement that survives (rad)")
+    axis.set(
+        xlabel=r"step $h\omega$ ($\omega$: frequency of the nutation)", ylabel="all stay up to a displacement of (rad)"
+    )
     groups: dict[float, list[str]] = {}  # rows whose rings are at one step
     for name, phase in sorted(ringed.items(), key=lambda one: one[1]):
         near = next((other for other in groups if abs(other - phase) < RINGED_TOGETHER), phase)
@@ -230,7 +233,7 @@ DRAWINGS: dict[str, tuple[str, str, Callable[[Any, xr.Dataset], None]]] = {  # s
 }
 ALTS = {
     "pole": "Error against the gap to a pole.",
-    "resonances": "Surviving displacement against the step.",
+    "resonances": "Displacement up to which all survive against the step.",
     "sleeping": "Least sleeping spin against the step.",
     "separatrix": "Accurate time against the early error.",
     "sampling": "Absolute energy errors sampled in two ways.",

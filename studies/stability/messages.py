@@ -7,15 +7,17 @@ import xarray as xr
 
 from symtop.methods.registry import split_name
 from symtop.model.charts import Array
+from symtop.report.sentences import counted
 from symtop.report.style import number
 
 from .atlas import FAR, NEAR, methods_of
 from .failures import LOST
+from .resonance_words import BARELY, resonant
 from .tables import Column
-from .words import BARELY, LEAST_SAMPLED, misses, outlasting, resonant
+from .words import LEAST_ASKED, LEAST_SAMPLED, misses, outlasting, unreached
 
 SLEEPERS = ("strang", "cayley", "midpoint", "gauss-4", "yoshida-4")  # methods, of the figure of the sleeping top
-ROUNDED, ROUNDED_ENERGY = 1e-14, 1e-12  # rad, and absolute: errors up to these are rounding
+ROUNDED = 1e-14  # rad: errors up to this are rounding
 SHIFTED = 1e-3  # of the threshold: less is kept
 
 
@@ -64,8 +66,8 @@ def _resonances(part: xr.Dataset) -> str:
     if not steps:
         return "No step that turns the nutation by a third a step was found to be unstable"
     return (
-        f"{len(steps)} of {tried} methods lose every top displaced by {BARELY:g} rad or more at the step that turns "
-        "the nutation by a third, though it is linearly stable"
+        f"{len(steps)} of {tried} methods lose a top at some displacement of at most {BARELY:g} rad at the step that "
+        "turns the nutation by a third, though it is linearly stable"
     )
 
 
@@ -87,6 +89,8 @@ def _separatrix(part: xr.Dataset) -> str:
     if not gap.size:
         return "Next to the separatrix no run was seen to lose its accuracy"
     rest = f"; {len(apart)} method{'s last' if len(apart) > 1 else ' lasts'} longer" if apart else ""
+    if ended := sum(unreached(part).values()):
+        rest += f"{',' if rest else ';'} {counted(ended, 'run')} never got there"
     text = f"Next to the separatrix an early error predicts when it reaches {LOST:g} rad"
     return f"{text}, to {np.median(gap):.2f}/λ in the median{rest}"
 
@@ -95,7 +99,7 @@ def _sampled(part: xr.Dataset) -> dict[str, tuple[float, float]]:
     """Energy errors above rounding, sampled once a nutation and at every step, by row."""
     once, every = part[Column.ENERGY_ONCE].values, part[Column.ENERGY_EVERY].values
     rows = zip(map(str, part["integrator"].values), once, every, strict=True)
-    return {name: (float(a), float(b)) for name, a, b in rows if np.isfinite(a) and b > ROUNDED_ENERGY}
+    return {name: (float(a), float(b)) for name, a, b in rows if np.isfinite(a) and b > LEAST_ASKED}
 
 
 def hidden_sampled(part: xr.Dataset) -> list[str]:

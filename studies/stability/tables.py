@@ -20,9 +20,11 @@ from symtop.run.linear_stability import linear_limits, sleeping_threshold, with_
 from .failures import sampled_energy_error, separatrix_horizon, surviving_displacements
 from .outcome_maps import family, outcome_map
 from .solver_tolerance import solver_sweep, textbook_midpoint
+from .windows import narrow_window
 
 PERIODS = 10.0  # nutations of a run of a map over spin, as in the other studies' short runs
-SOUGHT_PHASE = 10.0  # h omega up to which a linear limit is looked for
+SOUGHT_PHASE, SOUGHT_STEPS = 10.0, 300  # h omega up to which a linear limit is looked for, at so many steps
+CURVE_STEPS = 48  # steps at which it is looked for at every spin of a map
 PAST_RESONANCE = 1.05  # times the resonant step: far enough for what a resonance kills to live again
 
 
@@ -39,11 +41,12 @@ class Column:
     # resonances: largest displacement that survives at h omega; phase. Linear limit, a third of a turn, what survives
     PHASE, SURVIVING = "phase_value", "surviving"
     LIMIT_PHASE, THIRD_TURN_PHASE, SOUGHT_PHASE = "limit_phase", "third_turn_phase", "sought_phase"
+    WINDOW_START, WINDOW_END = "window_start", "window_end"  # h omega, of the first narrow window of unstable steps
     SURVIVING_AT_THIRD_TURN, SURVIVING_PAST_THIRD_TURN = "surviving_at_third_turn", "surviving_past_third_turn"
     # the sleeping top; rung
     SLEEPING_STEP, SLEEPING_THRESHOLD = "sleeping_step", "sleeping_threshold"
     # next to the separatrix; setting
-    EARLY_ERROR, HORIZON, PREDICTED_HORIZON = "early_error", "horizon", "predicted_horizon"
+    EARLY_ERROR, HORIZON, PREDICTED_HORIZON, BROKEN = "early_error", "horizon", "predicted_horizon", "broken"
     # an energy error that is sampled once a nutation, and at every step
     ENERGY_ONCE, ENERGY_EVERY = "energy_once", "energy_every"
     # the solver of an implicit method; tolerance_setting
@@ -90,20 +93,21 @@ def family_limits(name: str, method: Integrator, parameter: float, longest: floa
     if not 0.0 < theta < math.pi or not math.isfinite(period):
         return math.nan, math.nan
     steady = Scene(member.name, member.top, with_momenta(member.top, theta, momenta), member.horizon)
-    limit, third = linear_limits(method, steady, np.geomspace(0.05, longest, 48) * period)
+    limit, third = linear_limits(method, steady, np.geomspace(0.05, longest, CURVE_STEPS) * period)
     return limit / period, third / period
 
 
 def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
     """What survives of a displaced steady precession against h omega, and where the linearised map has its limits.
 
-    The limits are looked for at 300 steps up to h omega = 10; one that is NaN is not there.
+    The limits are looked for at 300 steps up to h omega = 10, one that is NaN is not there; then narrow windows between
+    these steps, as `windows` says.
     """
     scene = scenes.scene(name)
     omega = scene.top.nutation_frequency(scene.top.momenta(scene.start))
     phases = np.asarray(settings["phases"], float)
-    limit, third = linear_limits(method, scene, np.linspace(0.02, SOUGHT_PHASE, 300) / omega)
-
+    sought = np.linspace(0.02, SOUGHT_PHASE, SOUGHT_STEPS) / omega
+    (limit, third), window = linear_limits(method, scene, sought), narrow_window(method, scene, sought)
     steps = [*(phases / omega).tolist(), third, PAST_RESONANCE * third]
     *surviving, at_third, past_third = surviving_displacements(method, scene, steps, settings["steps"]).tolist()
     columns: dict[str, Any] = {
@@ -112,6 +116,8 @@ def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) 
         Column.DISPLACED_STEPS: float(settings["steps"]),
         Column.LIMIT_PHASE: limit * omega,
         Column.THIRD_TURN_PHASE: third * omega,
+        Column.WINDOW_START: window.start * omega,
+        Column.WINDOW_END: window.end * omega,
         Column.SOUGHT_PHASE: SOUGHT_PHASE,
         Column.SURVIVING_AT_THIRD_TURN: at_third,
         Column.SURVIVING_PAST_THIRD_TURN: past_third,
@@ -129,7 +135,7 @@ def sleeping_table(name: str, method: Integrator, settings: Mapping[str, Any]) -
 def separatrix_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
     """How long runs next to the separatrix stay right, and how long their early error says that they will."""
     rows = [separatrix_horizon(method, scenes.scene(name), float(value)) for value in settings["ladder"]]
-    names = (Column.EARLY_ERROR, Column.HORIZON, Column.PREDICTED_HORIZON)  # in the order of a Horizon
+    names = Column.EARLY_ERROR, Column.HORIZON, Column.PREDICTED_HORIZON, Column.BROKEN  # in the order of a Horizon
     return xr.Dataset(
         {name: ("setting", list(values)) for name, values in zip(names, zip(*rows, strict=True), strict=True)}
     )

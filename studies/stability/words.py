@@ -4,7 +4,6 @@ Each measured mechanism stands beside what theory says. A quick or a partial stu
 """
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
@@ -17,44 +16,25 @@ from symtop.runner.study import Table
 from .atlas import NEAR, families, map_of, methods_of, pole_effect
 from .atlas_words import atlas_tables, summary
 from .failures import LONGEST, LOST, SEEN
-from .tables import Column
+from .resonance_words import VERLET, limits, only_windows, resonances, rows_with, unlimited
+from .tables import CURVE_STEPS, SOUGHT_PHASE, SOUGHT_STEPS, Column
 
 HOW_TO_READ = (
     "A row is a method in one chart, method[chart], as rk4[axis]. A map has one cell a run. To the right the step or "
     "the tolerance grows; upwards the spin r, or the gap delta between path and pole. Green is accurate. Yellow has "
     "bounded energy and a wrong phase. Hatched cells fail: they lose energy, cross a turning point of the true motion, "
-    "or end early. Solid lines: the linear limit, the step beyond which small nutations about a steady precession "
-    "grow; without one there is no such limit on the map, or none that can be measured. Dashed lines: the step that "
-    "advances such a nutation by a third of a turn. A limit for fast tops (r > 3) or slow tops (r < 1) holds for nine "
-    "spins in ten. A method fails from a step or tolerance on if at least half of all spins fail there and at every "
-    "larger one."
+    "or end early. Solid lines: the linear limit, where small nutations about a steady precession first grow or the "
+    f"precession is lost, sought at {CURVE_STEPS} steps; without one there is none, or none that can be followed. "
+    "Dashed lines: the step that advances such a nutation by a third of a turn. A limit for fast tops (r > 3) or slow "
+    "tops (r < 1) holds for nine spins in ten. A method fails from a step or tolerance on if at least half of all "
+    "spins fail there and at every larger one."
 )
-VERLET = "stormer-verlet[angles]"
 LOOSE = 10.0  # times the change of the solved equation: lost because the solver's tolerance is too loose
-THIRDS = {  # the step that turns the nutation by a third, as h omega: two rows with a closed form
-    VERLET: "sqrt 3", "midpoint[angles]": "2 sqrt 3",
-}  # fmt: skip
-BARELY = 0.02  # rad: a largest surviving displacement below this counts as none
-REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
 LEAST_SAMPLED = 1e-14  # an energy error that is rounding
+LEAST_ASKED = 1e-12  # an energy error at every step from which on one asks what samples show of it
+HIDDEN = 10.0  # times too small looks an error that samples hide
 OUTLASTS = 10.0  # 1/λ: two and a half digits more than the early error has
 EARLY = 1e-15, 1e-2  # rad, axis errors that predict the time next to a separatrix: above rounding, still small
-
-
-def _rows(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
-    """The integrators that have a value of a variable, by name."""
-    return {
-        str(name): part.isel(integrator=k)
-        for k, name in enumerate(part["integrator"].values)
-        if np.isfinite(part[variable].isel(integrator=k).values).any()
-    }
-
-
-def _ends(values: Mapping[str, float]) -> str:
-    """The least and the largest of some numbers, with their rows."""
-    ranked = sorted(values, key=lambda name: values[name])
-    said = [f"{values[name]:.4g} ({name})" for name in dict.fromkeys((ranked[0], ranked[-1]))]
-    return f"from {' to '.join(said)}" if len(said) > 1 else f"at {said[0]}"
 
 
 def held_fixed(data: xr.Dataset, mechanism: str) -> str:
@@ -104,70 +84,10 @@ def poles(part: xr.Dataset) -> str:
     )
 
 
-def limits(part: xr.Dataset) -> str:
-    """Linear limits of the step, the methods that have none, and those of which neither is known."""
-    phases = {name: float(cell[Column.LIMIT_PHASE]) for name, cell in _rows(part, Column.LIMIT_PHASE).items()}
-    free, subject, parts = unlimited(part), "Small nutations about a steady precession", []
-    if phases:
-        parts.append(
-            f"{subject} grow beyond a step limit with {few(list(phases), most=2)}: h omega, step times nutation "
-            f"frequency, {_ends(phases)}."
-        )
-    if free:
-        parts.append(
-            f"{'They' if phases else subject} grow at no step up to h omega = {max(free.values()):g} with "
-            f"{few(list(free))}."
-        )
-    neither = [name for name in _rows(part, Column.SOUGHT_PHASE) if name not in phases and name not in free]
-    if parts and neither:
-        parts[-1] = f"{parts[-1][:-1]}; {counted(len(neither))} show{'s' * (len(neither) == 1)} neither."
-    return " ".join(parts)
-
-
-def unlimited(part: xr.Dataset) -> dict[str, float]:
-    """Methods whose small nutations grow at no step, with the largest h omega at which they were tried.
-
-    A method whose step reaches a third of a turn was followed on the whole way there; one that shows neither is not
-    symmetric, or has no precession to follow.
-    """
-    if Column.SOUGHT_PHASE not in part:
-        return {}
-    turning = _rows(part, Column.THIRD_TURN_PHASE)
-    return {
-        name: float(cell[Column.SOUGHT_PHASE])
-        for name, cell in turning.items()
-        if math.isnan(float(cell[Column.LIMIT_PHASE]))
-    }
-
-
-def resonant(part: xr.Dataset) -> dict[str, float]:
-    """The linearly stable steps, as h omega, at which hardly any displacement survives, by row."""
-    phases = {}
-    for name, cell in _rows(part, Column.THIRD_TURN_PHASE).items():
-        at, past = float(cell[Column.SURVIVING_AT_THIRD_TURN]), float(cell[Column.SURVIVING_PAST_THIRD_TURN])
-        if past > REVIVAL * at and at < BARELY:
-            phases[name] = float(cell[Column.THIRD_TURN_PHASE])
-    return phases
-
-
-def resonances(part: xr.Dataset) -> str:
-    """The linearly stable steps at which hardly any displacement survives, in a sentence."""
-    steps = resonant(part)
-    if not steps:
-        return ""
-    tried = int(np.isfinite(part[Column.THIRD_TURN_PHASE]).sum())
-    known = [f"{steps[name]:.4f} with {name} (theory: {theory})" for name, theory in THIRDS.items() if name in steps]
-    return (
-        "A step that turns the nutation by a third is linearly stable, but with "
-        f"{len(steps)} of {counted(tried)} a top displaced by {BARELY:g} rad or more does not stay. "
-        f"There h omega is {', '.join(known) or _ends(steps)}."
-    )
-
-
 def sleepers(part: xr.Dataset) -> str:
     """The sleeping thresholds of methods that move it, beside their closed forms."""
     moved, methods = [], methods_of(part)
-    for name, cell in _rows(part, Column.SLEEPING_THRESHOLD).items():
+    for name, cell in rows_with(part, Column.SLEEPING_THRESHOLD).items():
         if name in methods and (theory := methods[name].sleeps_from) is not None:
             good = np.isfinite(cell[Column.SLEEPING_THRESHOLD].values)
             h, measured = cell[Column.SLEEPING_STEP].values[good], cell[Column.SLEEPING_THRESHOLD].values[good]
@@ -188,22 +108,20 @@ def outlasting(part: xr.Dataset) -> list[str]:
     return [name for name, values in rows if np.max(values[np.isfinite(values)], initial=0.0) > OUTLASTS]
 
 
-def foreseen(part: xr.Dataset) -> xr.Dataset:
-    """The runs next to the separatrix to which the law of their early error applies; others are NaN."""
+def lawful(part: xr.Dataset) -> xr.DataArray:
+    """To which runs next to the separatrix does the law of their early error apply?"""
     early = part[Column.EARLY_ERROR]
     methods, apart = methods_of(part), outlasting(part)
     conserving = [
         name in apart or (name in methods and "energy" in (methods[name].conserves or ()))
         for name in map(str, part["integrator"].values)
     ]
-    good = (early < EARLY[1]) & (early > EARLY[0]) & ~xr.DataArray(conserving, dims="integrator")
-    return part[[Column.HORIZON, Column.PREDICTED_HORIZON]].where(good)
+    return (early < EARLY[1]) & (early > EARLY[0]) & ~xr.DataArray(conserving, dims="integrator")
 
 
 def misses(part: xr.Dataset) -> NDArray[np.float64]:
     """By how much the law misses the accurate time of the runs to which it applies, in units of 1/λ."""
-    runs = foreseen(part)
-    gap = np.abs(runs[Column.HORIZON] - runs[Column.PREDICTED_HORIZON]).values
+    gap = np.abs(part[Column.HORIZON] - part[Column.PREDICTED_HORIZON]).where(lawful(part)).values
     return np.asarray(gap[np.isfinite(gap)])
 
 
@@ -212,12 +130,28 @@ def horizons(part: xr.Dataset) -> str:
     gap = misses(part)
     if not gap.size:
         return ""
-    longest = float(foreseen(part)[Column.HORIZON].max())
     return (
         "Next to the separatrix, the motion that rises for ever, errors grow as exp(λ t/2), λ = "
-        f"sqrt(mgl/I1). An error at {SEEN:g}/λ predicts when {gap.size} runs, the longest after {longest:.0f}/λ, "
-        f"reach {LOST:g} rad: to {np.median(gap):.2f}/λ in the median, {np.max(gap):.1f}/λ at most.{_longer(part)}"
+        f"sqrt(mgl/I1). An error at {SEEN:g}/λ predicts when {gap.size} runs reach {LOST:g} rad: to "
+        f"{np.median(gap):.2f}/λ in the median, {np.max(gap):.1f}/λ at most.{_unreached(part)}{_longer(part)}"
     )
+
+
+def unreached(part: xr.Dataset) -> dict[str, int]:
+    """How many runs of a row the law applies to that never reach the error of which it speaks."""
+    without = lawful(part) & part[Column.HORIZON].isnull()
+    count = without.sum([dim for dim in without.dims if dim != "integrator"]).values
+    return {str(name): int(k) for name, k in zip(part["integrator"].values, count, strict=True) if k}
+
+
+def _unreached(part: xr.Dataset) -> str:
+    """Which runs are not among those that the law was held against; empty if there is none."""
+    apart = unreached(part)
+    if not apart:
+        return ""
+    broken = part[Column.BROKEN].where(lawful(part)).sum() if Column.BROKEN in part else 0.0
+    how = "ended before" if int(broken) == sum(apart.values()) else "never did"
+    return f" {counted(sum(apart.values()), 'more run')} ({few(list(apart), most=3)}) {how}."
 
 
 def _longer(part: xr.Dataset) -> str:
@@ -225,7 +159,7 @@ def _longer(part: xr.Dataset) -> str:
     apart = outlasting(part)
     if not apart:
         return ""
-    return f" {few(apart)} {'last' if len(apart) > 1 else 'lasts'} more than {OUTLASTS:g}/λ longer."
+    return f" {few(apart, most=2)} {'last' if len(apart) > 1 else 'lasts'} more than {OUTLASTS:g}/λ longer."
 
 
 def absolute() -> str:
@@ -234,19 +168,31 @@ def absolute() -> str:
 
 
 def sampling(part: xr.Dataset) -> str:
-    """What an energy error sampled once a nutation hides: no ratio is formed with a number at rounding."""
+    """What an energy error sampled once a nutation hides: no ratio is formed with a number at rounding.
+
+    A row of which the samples show all but a factor `HIDDEN` has an error that goes on from nutation to nutation.
+    """
     once, every = part[Column.ENERGY_ONCE].values, part[Column.ENERGY_EVERY].values
-    good = np.isfinite(once) & (every > 1e-12)
+    good = np.isfinite(once) & (every > LEAST_ASKED)
     if not good.any():
         return ""
     names, seen = part["integrator"].values, good & (once > LEAST_SAMPLED)
-    hidden = int((good & ~seen).sum())
-    parts = [f"that of {counted(hidden)} falls below rounding"] if hidden else []
-    if seen.any():
-        ratio = np.where(seen, every / np.where(seen, once, 1.0), 0.0)
+    ratio = np.where(seen, every / np.where(seen, once, 1.0), 0.0)
+    below, small, whole = good & ~seen, ratio > HIDDEN, seen & (ratio <= HIDDEN)
+    parts = [f"{below.sum()} below rounding"] if below.any() else []
+    if small.any():
         worst = int(np.argmax(ratio))
-        parts.append(f"the others look up to {ratio[worst]:.0e} times too small ({names[worst]})")
-    text = f"An energy error that is sampled once a nutation looks too small: {', '.join(parts)}."
+        parts.append(f"{small.sum()} up to {ratio[worst]:.0e} times ({names[worst]})")
+    text = (
+        f"Sampled once a nutation, the energy errors of {int((below | small).sum())} of {counted(int(good.sum()))} "
+        f"look more than {HIDDEN:g} times too small{': ' * bool(parts)}{', '.join(parts)}."
+    )
+    if whole.any():
+        text += (
+            f" Those of {counted(int(whole.sum()))} drift and look at most {ratio[whole].max():.1f} times too small."
+        )
+    if tiny := int((np.isfinite(once) & ~good).sum()):
+        text += f" {counted(tiny)} with errors up to {LEAST_ASKED:g} are not asked."
     if VERLET in part["integrator"].values:
         verlet = part.sel(integrator=VERLET)
         true, shown = float(verlet[Column.ENERGY_EVERY]), float(verlet[Column.ENERGY_ONCE])
@@ -256,7 +202,7 @@ def sampling(part: xr.Dataset) -> str:
 
 def solver(part: xr.Dataset) -> str:
     """The share of the solver in what an implicit method does to energy and momenta."""
-    for name, row in _rows(part, Column.TEXTBOOK_ENERGY).items():
+    for name, row in rows_with(part, Column.TEXTBOOK_ENERGY).items():
         solved, one = float(row[Column.TEXTBOOK_ENERGY][-1]), float(row[Column.ONE_ITERATION_ENERGY])
         energy, momenta = row[Column.SOLVER_ENERGY].values, row[Column.SOLVER_MOMENTUM].values
         first = f"grows to {one:.1e}" if one > LOOSE * solved else f"stays at {one:.1e}"
@@ -274,7 +220,7 @@ def solver(part: xr.Dataset) -> str:
 
 SENTENCES = (  # mechanism, its scene, a variable without which there is nothing to say, and what says it
     ("pole", "grazing", Column.OUTCOME, poles),
-    ("resonances", "steady-fast", Column.LIMIT_PHASE, limits),
+    ("limits", "steady-fast", Column.LIMIT_PHASE, limits),
     ("resonances", "steady-fast", Column.THIRD_TURN_PHASE, resonances),
     ("sleeping", "sleeping", Column.SLEEPING_THRESHOLD, sleepers),
     ("separatrix", "separatrix", Column.HORIZON, horizons),
@@ -297,9 +243,15 @@ def sentences(data: xr.Dataset) -> list[str]:
 
 
 LIMITS = (  # scene, variable, header, format
-    ("steady-fast", Column.LIMIT_PHASE, "linear limit, h omega", "{:.4f}"),
+    ("steady-fast", Column.LIMIT_PHASE, "linear limit: small nutations first grow at h omega", "{:.4f}"),
+    (
+        "steady-fast",
+        Column.WINDOW_START,
+        "first narrow window of growth between the steps tried before, from h omega",
+        "{:.3f}",
+    ),
     ("steady-fast", Column.THIRD_TURN_PHASE, "a third of a turn a step, h omega", "{:.4f}"),
-    ("steady-fast", Column.SURVIVING_AT_THIRD_TURN, "largest displacement that stays near there (rad)", "{:.2g}"),
+    ("steady-fast", Column.SURVIVING_AT_THIRD_TURN, "displacement up to which all stay near there (rad)", "{:.2g}"),
     ("sleeping", Column.SLEEPING_THRESHOLD, "sleeps from a spin I3 w3 of (largest step)", "{:.6f}"),
     ("goldstein", Column.ENERGY_EVERY, "largest absolute energy error, every step", "{:.1e}"),
     ("goldstein", Column.ENERGY_ONCE, "the same, once a nutation", "{:.1e}"),
@@ -311,13 +263,14 @@ def tables(data: xr.Dataset) -> list[Table]:
     shown = [table for family in families(data) for table in atlas_tables(data, family)]
     columns = [one for one in LIMITS if one[0] in data["scene"].values and one[1] in data]
     rows, limit = [], LIMITS[0]
-    free = unlimited(data.sel(scene=limit[0])) if limit in columns else {}
+    part = data.sel(scene=limit[0]) if limit in columns else None
+    free = {} if part is None else unlimited(part) | dict.fromkeys(only_windows(part), SOUGHT_PHASE)
     for name in map(str, data["integrator"].values):
         last = [float(np.ravel(data[key].sel(scene=scene, integrator=name).values)[-1]) for scene, key, *_ in columns]
         if np.isfinite(last).any():
             texts = [one[3].format(x) if math.isfinite(x) else "" for one, x in zip(columns, last, strict=True)]
             if name in free:
-                texts[columns.index(limit)] = f"none up to {free[name]:g}"
+                texts[columns.index(limit)] = f"none of {SOUGHT_STEPS} steps up to {free[name]:g}"
             rows.append([name, *texts])
     limits_of_all = Table("Limits in numbers", ["row", *(one[2] for one in columns)], rows)
     return [*shown, limits_of_all] if columns else shown

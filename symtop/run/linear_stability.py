@@ -151,7 +151,7 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     difference does not obey it (a method with more roots than two, say), its size is followed for longer. Rounding
     comes anew in every step and adds up, as a random walk, until what came first has grown by e.
     """
-    stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))
+    stride = _stride(method, h, frequency)
     runs, delta, off = _apart(method, scene, h, chart, NUDGE, stride)
     with np.errstate(over="ignore"):  # of a run that has blown up
         single = chart != "angles" and bool(
@@ -170,6 +170,11 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
         return UNKNOWN
     factor **= 1.0 / stride
     return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), SLOWEST)))
+
+
+def _stride(method: Integrator, h: float, frequency: float) -> int:
+    """Steps between two places of a recurrence."""
+    return max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))
 
 
 def _apart(
@@ -246,6 +251,12 @@ def sleeping_threshold(method: Integrator, h: float) -> float:
 
 STEADILY = 1e-7  # t - 2 beyond rounding
 GROWING = 1e-4  # growth of a nutation per step that counts, for a method that is not symmetric
+FAR = 0.01  # rad, of a precession that has drifted away in some steps
+
+
+def surpasses(at: Trace, doubt: float = 0.0) -> float:
+    """Above zero where small nutations of a symmetric method grow, below where they do not, NaN without fixed point."""
+    return max(at.trace - 2.0 - max(STEADILY, doubt), -2.0 - doubt - at.trace)  # small steps have t just below 2
 
 
 def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[float, float]:
@@ -255,14 +266,11 @@ def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[f
 
     Both at the steady precession of `scene`. A fixed point that is lost between two steps (an implicit equation without
     a solution, say) counts as the end of stability; a window narrower than the grid is not seen. Where a method is not
-    symmetric, nutations grow or shrink at every step: there the limit is where they begin to grow by 1e-4 a step, and a
-    third of a turn has no meaning.
+    symmetric, the limit is where nutations begin to grow by 1e-4 a step, if that can be followed so far (`_growing`),
+    and a third of a turn has no meaning.
     """
-
-    def unstable(at: Trace, doubt: float = 0.0) -> float:
-        if not method.symmetric:
-            return at.growth - 1.0 - GROWING
-        return max(at.trace - 2.0 - max(STEADILY, doubt), -2.0 - doubt - at.trace)  # small steps have t just below 2
+    if not method.symmetric:
+        return _limit_of_growth(method, scene, grid), math.nan
 
     def turned(at: Trace) -> float:
         return -1.0 - at.trace
@@ -271,13 +279,36 @@ def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[f
     before = NO_TRACE
     for h in map(float, grid):
         at = trace(method, scene, h)
-        if method.symmetric and math.isnan(third) and turned(at) >= 0.0 > turned(before):
+        if math.isnan(third) and turned(at) >= 0.0 > turned(before):
             third = _edge(lambda x: turned(trace(method, scene, x)), last, h, lost=-1.0)
-        if not unstable(at, at.doubt) <= 0.0:
-            limit = _edge(lambda x: unstable(trace(method, scene, x)), last, h, lost=1.0)
+        if not surpasses(at, at.doubt) <= 0.0:
+            limit = _edge(lambda x: surpasses(trace(method, scene, x)), last, h, lost=1.0)
             return limit, third if not third > limit else math.nan
         last, before = h, at
     return math.nan, third
+
+
+def _limit_of_growth(method: Integrator, scene: Scene, grid: np.ndarray) -> float:
+    """The step of a grid at which small nutations first grow by `GROWING`, for a method that need not be symmetric."""
+    frequency, last = scene.top.nutation_frequency(scene.top.momenta(scene.start)), math.nan
+    for h in map(float, grid):
+        over = _growing(method, scene, h, frequency)
+        if math.isnan(over):
+            return math.nan
+        if over > 0.0:
+            return _edge(lambda x: _growing(method, scene, x, frequency), last, h, lost=-1.0)
+        last = h
+    return math.nan
+
+
+def _growing(method: Integrator, scene: Scene, h: float, frequency: float) -> float:
+    """By how much the growth of small nutations in a step exceeds what counts; NaN where that cannot be followed.
+
+    What counts is `GROWING`, and the way that the precession itself goes meanwhile: some methods drift to another
+    inclination, where nutations have another size, and `FAR` away none is left next to which growth could be told.
+    """
+    factor, size = nutation_growth(method, scene, h, method.chart_for("axis"), frequency)
+    return factor - 1.0 - max(GROWING, size) if size < FAR else math.nan
 
 
 def _edge(value: Callable[[float], float], a: float, b: float, *, lost: float) -> float:

@@ -142,13 +142,38 @@ def mechanism(limit, third):
 
 def test_a_method_without_a_linear_limit_is_said_to_have_none():
     free = mechanism(math.nan, 3.4641)
-    assert "grow at no step up to h omega = 10 with midpoint." in words.limits(free.sel(scene="steady-fast"))
-    assert words.tables(free)[-1].rows[0][1] == "none up to 10"
+    said = words.limits(free.sel(scene="steady-fast"))
+    assert "first grow or lose it at none of 300 steps up to h omega = 10 with midpoint." in said
+    assert words.tables(free)[-1].rows[0][1] == "none of 300 steps up to 10"
     bound = mechanism(1.9999, 1.7321)
-    assert "no step" not in words.limits(bound.sel(scene="steady-fast"))
+    assert "none of" not in words.limits(bound.sel(scene="steady-fast"))
     assert words.tables(bound)[-1].rows[0][1] == "1.9999"
+    narrow = free.assign({Column.WINDOW_START: free[Column.LIMIT_PHASE].fillna(6.28),
+                          Column.WINDOW_END: free[Column.LIMIT_PHASE].fillna(6.287)})  # fmt: skip
+    said = words.limits(narrow.sel(scene="steady-fast"))
+    assert "only between steps tried, in windows up to 0.007 wide from 6.28 on, with midpoint" in said
+    assert "none of" not in said
+    assert words.tables(narrow)[-1].rows[0][1:3] == ["none of 300 steps up to 10", "6.280"]
+    both = narrow.assign({Column.LIMIT_PHASE: narrow[Column.WINDOW_START] + 2.0})  # strang is of this kind
+    assert "first grow or lose it at h omega at 6.28 (midpoint)" in words.limits(both.sel(scene="steady-fast"))
+    assert words.tables(both)[-1].rows[0][1:3] == ["8.2800", "6.280"]
     unknown = mechanism(math.nan, math.nan)  # not symmetric: nothing is claimed
     assert words.limits(unknown.sel(scene="steady-fast")) == ""
+
+
+def test_a_resonance_is_said_to_lose_some_displacement_and_not_every_larger_one():
+    """What is measured is the displacement up to which all stay: the next one may be 5 % larger."""
+    for at, said in ((0.006, True), (0.0195, False)):
+        data = mechanism(math.nan, 3.4641)
+        for name, value in ((Column.SURVIVING_AT_THIRD_TURN, at), (Column.SURVIVING_PAST_THIRD_TURN, 0.2)):
+            data[name] = data[Column.THIRD_TURN_PHASE] * 0.0 + value
+        part = data.sel(scene="steady-fast")
+        assert ("with 1 of 1 row a top is lost at some displacement of at most 0.02 rad" in words.resonances(part)) is (
+            said
+        )
+        assert ("lose a top at some displacement of at most 0.02 rad" in messages.of_mechanism("resonances", part)) is (
+            said
+        )
 
 
 def test_the_caption_of_a_page_names_the_methods_without_a_limit():
@@ -157,7 +182,8 @@ def test_the_caption_of_a_page_names_the_methods_without_a_limit():
         for variable, value in ((Column.LINEAR_LIMIT, limit), (Column.THIRD_TURN, 0.55)):
             data[variable] = (("scene", "integrator", "curve"), [[[value, value]]])
         caption = atlas_words.caption(data, "cusp", ["midpoint"])
-        assert ("With midpoint small nutations grow at no spin and no step up to 1 nutation periods" in caption) is said
+        text = "With midpoint small nutations grow at no spin at any of 48 steps tried up to 1 nutation periods"
+        assert (text in caption) is said
         (table,) = atlas_words.atlas_tables(data, "cusp")
         assert table.rows[0][-1] == ("none" if said else "0.3")
 
@@ -243,6 +269,33 @@ def test_the_two_charts_of_a_method_are_compared_and_one_alone_is_not():
     assert [row[3:6] for row in every.rows] == [["33%", "67%", "0%"], ["67%", "33%", "0%"]]
     assert {len(row) for row in every.rows} == {len(every.header)}
     assert "The chart alone" not in " ".join(atlas_words.summary(store.combine(cells[:1]), "cusp"))
+
+
+def test_rows_that_reach_less_than_the_smallest_step_are_the_least_and_are_counted():
+    """On slow tops (the first two rows of a map) one of two methods is inaccurate at the smallest step already."""
+    cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", integrator="midpoint", drop=True))
+             for name, rows in (("rk4[axis]", [[B, B, B]] * 2 + [[A, A, B]] * 2), ("strang[axis]", [[A, A, B]] * 4),
+                                ("gauss-2[axis]", [[A, B, B]] * 4))]  # fmt: skip
+    said = atlas_words.summary(store.combine(cells), "cusp")[0]
+    assert "from 0.01 (gauss-2[axis]) to 0.1 (rk4[axis]) on fast tops" in said
+    assert "from below 0.01 (rk4[axis]) to 0.1 (strang[axis]) on slow tops" in said
+    never = store.combine([(Case("cusp", "rk4[axis]"), cells[0][1].isel(parameter=[0, 0, 1, 1]))])
+    assert "is from below 0.01 (rk4[axis]) on slow tops" in atlas_words.summary(never, "cusp")[0]
+    without = store.combine([*cells, (Case("cusp", "rk45[axis]"), hand_made([[A, B, B]] * 4, knob_name="tolerance").sel(
+        scene="cusp", integrator="midpoint", drop=True))])  # fmt: skip
+    assert said.endswith("in nutation periods.")
+    assert atlas_words.summary(without, "cusp")[0].endswith("Not counted: 1 row without a fixed step.")
+
+
+def test_a_row_without_an_inaccurate_run_has_no_share_of_them():
+    cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", integrator="midpoint", drop=True))
+             for name, rows in (("rk4[axis]", [[A, B, L]] * 4), ("strang[axis]", [[A, A, A]] * 4))]  # fmt: skip
+    assert math.isnan(atlas.maps(store.combine(cells), "cusp")["strang[axis]"].silent)
+    assert "With the median row 50% of inaccurate runs end" in atlas_words.summary(store.combine(cells), "cusp")[-1]
+    (table,) = atlas_words.atlas_tables(store.combine(cells), "cusp")
+    assert [row[5] for row in table.rows] == ["50%", ""]
+    right = atlas_words.summary(store.combine(cells[1:]), "cusp")[-1]
+    assert right.startswith("1 of 1 row never end a run early")
 
 
 def test_a_pole_that_spoils_is_named():
@@ -362,6 +415,13 @@ def test_the_runs_that_outlast_the_law_of_the_separatrix_are_named_and_not_count
     assert words.misses(part) == pytest.approx([0.5, 0.2])
     assert messages.of_mechanism("separatrix", part).endswith("to 0.35/λ in the median; 1 method lasts longer")
     assert words.horizons(part).endswith("gauss-4[axis] lasts more than 10/λ longer.")
+    assert "more run" not in words.horizons(part)
+    part[Column.HORIZON][0, 1] = math.nan  # it never reaches the error of which the law speaks
+    assert "1 more run (rk4[axis]) never did." in words.horizons(part)
+    part[Column.BROKEN] = ("integrator", "setting"), [[0.0, 1.0], [0.0, 0.0]]
+    assert "predicts when 1 runs reach" in words.horizons(part)
+    assert "1 more run (rk4[axis]) ended before." in words.horizons(part)
+    assert "; 1 method lasts longer, 1 run never got there" in messages.of_mechanism("separatrix", part)
 
 
 def slope(pixels):

@@ -16,6 +16,7 @@ from symtop_studies.stability.failures import (
     surviving_displacements,
 )
 from symtop_studies.stability.solver_tolerance import solver_sweep, textbook_midpoint
+from symtop_studies.stability.windows import narrow_window
 
 import symtop
 from symtop.methods.calling import solve
@@ -115,6 +116,75 @@ def test_the_trace_is_that_of_the_discrete_nutation(name, turn):
     damped = trace(integrator("rk4"), STEADY, 1.0 / OMEGA)
     assert damped.growth == pytest.approx(math.sqrt(damped.determinant), rel=1e-9)
     assert damped.growth < 1.0
+
+
+def swings(name, phase, steps, nudge, centre=STEADY.start.theta):
+    """The swing of theta over the first 20 nutations, the last 20 and all, a start displaced by so many radians."""
+    start = with_momenta(STEADY.top, centre + nudge, STEADY.top.momenta(STEADY.start))
+    chart, done = run(name, STEADY, phase / OMEGA, steps, start=start)
+    theta, width = np.asarray(View(chart, STEADY.top, done.states).theta), math.ceil(40.0 * math.pi / phase)
+    return float(np.ptp(theta[:width])), float(np.ptp(theta[-width:])), float(np.ptp(theta))
+
+
+@pytest.mark.parametrize(
+    ("name", "phase", "drifts"),
+    [("rkmk-se3-2", 0.03, 1e-4), ("commutator-free-4", 0.17, 1e-4), ("rkmk-se3-4", 0.8, 1e-2)],
+)
+def test_a_drift_of_the_inclination_is_no_growth(name, phase, drifts):
+    """The trace of a method that drifts takes that for growth; its nutations, followed, do not grow."""
+    method = integrator(name)
+    assert trace(method, STEADY, phase / OMEGA).growth > 1.0 + drifts
+    limit, third = linear_limits(method, STEADY, np.linspace(0.01, 1.0, 60) / OMEGA)
+    assert math.isnan(limit)
+    assert math.isnan(third)
+    if phase < 0.5:  # with longer steps the run drifts to another inclination in 200 nutations
+        early, late, _ = swings(name, phase, round(400.0 * math.pi / phase), 1e-3)
+        assert early == pytest.approx(2e-3, rel=0.01)
+        assert late == pytest.approx(early, rel=0.01)
+        assert math.exp(1e-4 * 400.0 * math.pi / phase) > 2.0  # growth at the limit would have been seen
+
+
+@pytest.mark.parametrize("name", ["rk4[angles]", "rk4[axis]"])
+def test_a_method_that_damps_has_a_limit_where_its_nutations_begin_to_grow(name):
+    """rk4 damps the oscillator up to h omega = 2 sqrt 2, where |R| = 1; nutations in angles are one."""
+    limit, _ = linear_limits(integrator(name), STEADY, np.linspace(0.02, 4.0, 80) / OMEGA)
+    assert limit * OMEGA == pytest.approx(math.sqrt(8.0), rel=1e-4 if name == "rk4[angles]" else 1e-2)
+    for place, grows in ((0.99, False), (1.01, True)):
+        early, late, _ = swings(name, place * limit * OMEGA, 90, 1e-6)
+        assert (late > 10.0 * early) is grows
+        assert (late < 0.1 * early) is not grows
+
+
+def test_a_method_that_cannot_be_followed_has_no_limit():
+    """Its precession drifts so far in a step that its nutations change as much: no growth is told from that."""
+    grid = np.linspace(0.02, 10.0, 300) / OMEGA
+    for name in ("crouch-grossman-3", "rkmk-se3-2", "commutator-free-4", "generalised-alpha"):
+        assert math.isnan(linear_limits(integrator(name), STEADY, grid)[0])
+
+
+WINDOWED = [("kahan-li-8", 6.283, True), ("kahan-li-8", 9.4235, True), ("srkn-11-6", 6.283, True),
+            ("sofroniou-spaletta-10", 6.283, True), ("aba-8-6-4", 6.283, True), ("strang", 3.1414, True),
+            ("gauss-8", 6.283, False), ("exact-discrete", 6.283, False), ("cayley", 3.1414, False)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "phase", "unstable"), WINDOWED)
+def test_a_window_between_two_steps_of_the_grid_is_seen(name, phase, unstable):
+    method, near = integrator(name), np.linspace(0.02, 10.0, 300)
+    grid = near[np.abs(near - phase) < 0.3] / OMEGA
+    assert math.isnan(linear_limits(method, STEADY, grid)[0])
+    window = narrow_window(method, STEADY, grid)
+    assert math.isfinite(window.start) is unstable
+    outside = phase - 0.05
+    stays = swings(name, outside, 20_000, 1e-6, trace(method, STEADY, outside / OMEGA).theta)[-1]
+    assert stays < 1e-5
+    if unstable:
+        assert window.start * OMEGA < phase < window.end * OMEGA
+        assert (window.end - window.start) * OMEGA < 0.011
+        own = trace(method, STEADY, phase / OMEGA).theta  # the precession itself is lost beside 2 pi
+        centre = own if math.isfinite(own) else STEADY.start.theta
+        assert swings(name, phase, 20_000, 1e-6, centre)[-1] > 1e-4
+    elif phase > 6.0:  # a whole nutation a step, and nothing is driven away
+        assert swings(name, phase, 20_000, 1e-6)[-1] < 1e-5
 
 
 # ---- a pole next to the path -----------------------------------------------------------------------------------------
@@ -274,6 +344,15 @@ def test_errors_grow_by_half_of_g_and_the_horizon_is_their_logarithm():
     assert best.reached == pytest.approx(2.0 / g * math.log(1e16), abs=5.0)
 
 
+def test_a_run_that_leaves_its_chart_before_it_is_wrong_is_told_from_one_that_is_wrong():
+    scene = scenes.scene("separatrix")
+    broken = separatrix_horizon(integrator("galerkin-simpson"), scene, 0.1)
+    assert broken.broken == 1.0
+    assert math.isnan(broken.reached)
+    assert broken.predicted < 80.0
+    assert separatrix_horizon(integrator("strang"), scene, 0.1).broken == 0.0
+
+
 def test_elsewhere_errors_do_not_grow_like_that():
     error, _ = axis_errors("strang", scenes.scene("goldstein"), 0.0125, 1200)
     times = np.arange(1201) * 0.0125
@@ -341,6 +420,17 @@ def test_the_integrable_map_has_no_resonance():
     cayley = integrator("cayley")
     _, third = linear_limits(cayley, STEADY, np.linspace(0.05, 4.0, 80) / OMEGA)
     assert surviving_displacements(cayley, STEADY, [third], 3000)[0] == pytest.approx(0.3)
+
+
+def test_what_is_measured_is_the_first_displacement_that_is_lost_and_larger_ones_may_stay():
+    method = integrator("galerkin-simpson")
+    h = linear_limits(method, STEADY, np.linspace(0.05, 2.5, 60) / OMEGA)[1]
+    assert h * OMEGA == pytest.approx(2.1409, abs=1e-4)
+    assert 0.0 < surviving_displacements(method, STEADY, [h], 3000)[0] < 0.01
+    centre = trace(method, STEADY, h).theta
+    assert survives(method, STEADY, centre, [0.03, 0.1, 0.2], h, 3000).all()
+    verlet = integrator("stormer-verlet")
+    assert not survives(verlet, STEADY, STEADY.start.theta, [0.03, 0.1, 0.2], math.sqrt(3.0) / OMEGA, 3000).any()
 
 
 @pytest.mark.slow

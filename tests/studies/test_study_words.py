@@ -196,13 +196,15 @@ def test_the_same_run_has_one_behaviour_in_every_study():
 
 def test_an_energy_error_that_no_sample_sees_is_below_rounding_and_no_ratio_of_a_floor():
     part = xr.Dataset(
-        {stability_words.Column.ENERGY_ONCE: ("integrator", [0.0, 5e-9]),
-         stability_words.Column.ENERGY_EVERY: ("integrator", [4.2e-8, 2.5e-4])},
-        coords={"integrator": ["yoshida-4", "stormer-verlet"]},
+        {stability_words.Column.ENERGY_ONCE: ("integrator", [0.0, 5e-9, 2e-5, 1e-16]),
+         stability_words.Column.ENERGY_EVERY: ("integrator", [4.2e-8, 2.5e-4, 3e-5, 1e-15])},
+        coords={"integrator": ["yoshida-4", "stormer-verlet", "rkmk-se3-2", "gauss-4"]},
     )  # fmt: skip
     sentence = stability_words.sampling(part)
+    assert "errors of 2 of 3 rows look more than 10 times too small" in sentence
+    assert ": 1 below rounding, 1 up to 5e+04 times (stormer-verlet)." in sentence
     assert (
-        "that of 1 row falls below rounding, the others look up to 5e+04 times too small (stormer-verlet)" in sentence
+        "Those of 1 row drift and look at most 1.5 times too small. 1 row with errors up to 1e-12 are not" in sentence
     )
     assert "e+08" not in sentence
 
