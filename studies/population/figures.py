@@ -112,7 +112,7 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
     first = verdicts.costs(data, Cell(horizon, "axis", targets[0]), unit)
     style.legend_below(figure, axes)
     headline(figure, messages.run_lengths(data, unit, horizon))
-    asked, untimed = first.values.shape[1], "" if unit == "evaluations" else "; no run was timed, and no call is in it"
+    asked, untimed = first.values.shape[1], "" if unit == "evaluations" else "; no run was timed"
     return Picture(
         f"run-lengths-{unit}",
         figure,
@@ -246,7 +246,8 @@ def draw_strata(data: xr.DataTree) -> Picture:
         figure,
         "The row that wins on the most tops of each kind, and its share of those that a row solves, for each axis "
         "error. Pale and with a tilde: its lead may be chance or noise of the times; level: two rows are closer than a "
-        f"win. Cost in {UNITS[words.UNIT]}, each at its own setting on each top. {words.strata_sentence(data)}",
+        f"win. Cost in {UNITS[words.UNIT]}, each at its own step or tolerance on each top. "
+        f"{words.strata_sentence(data)}",
         "Coloured cells naming the winning row, a line a stratum, a column an accuracy, a panel a horizon.",
     )
 
