@@ -22,6 +22,7 @@ EXPLAINED = {
 
 
 MARGIN = 0.05  # of all tops: that many more met by another row are said
+ENOUGH = 30  # tops of a kind whose gap is told
 
 
 def behind(one: Standing, widest: Standing) -> bool:
@@ -44,7 +45,7 @@ def unmet_sentence(data: xr.DataTree) -> str:
         name = overall[0].names[overall[1].row] if overall[1] is not None else listed[0].name
         first = next((one for one in listed if one.name == name), listed[0])
         widest = verdicts.widest([first, *listed])
-        if behind(first, widest):
+        if behind(first, widest) and (everyone or first.solved.total >= ENOUGH):
             tops = "all tops" if everyone else f"{cell.stratum} tops"
             said = (
                 f"{widest.name} meets {cell.target:.0e} rad over {verdicts.nutations(data, cell.horizon):g} nutations"

@@ -378,6 +378,11 @@ def test_the_stored_tolerance_meets_the_target(tops, strang):
 def test_the_opening_says_which_row_meets_the_error_on_more_tops():
     held = {name: ("scene", [value]) for name, value in (("nutations", 10.0), ("budget", 1e3))}
     wider = {"a": [1.0] * 6 + [INF] * 4, "b": [3.0] * 10}
+    many = {name: values * 3 for name, values in wider.items()}  # tops of a kind, enough to tell
+    for given, kind in ((wider, False), (many, True)):
+        data = tree(given)
+        data["short"] = data["short"].to_dataset().assign(held)
+        assert ("on 100.0% of slow tops, and a on 60.0%" in unmet_sentence(data)) == kind
     for given, row in ((wider, "b"), (wider | {"b": [3.0] * 6 + [INF] * 4}, "")):
         data = tree(given)
         data["short"] = data["short"].to_dataset().assign(held)
