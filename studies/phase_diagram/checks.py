@@ -64,7 +64,7 @@ class _Row(NamedTuple):
     @classmethod
     def of(cls, data: xr.DataTree, name: str, quantity: str) -> "_Row":
         one = tables.cell(data, tables.SCENE, name)
-        return cls(one, tables.work_to_reach(one, quantity)[1])
+        return cls(one, tables.cost_of(one, quantity, np.ones(one.sizes["setting"]))[1])
 
     def settings(self, at: tuple[int, int]) -> tuple[list[float], float, float]:
         """The coarser and the finer setting in a cell, the evaluations a nutation of the finer, the row's reach."""
@@ -74,26 +74,34 @@ class _Row(NamedTuple):
         return values.tolist(), float(np.nanmax(self.one["work"].values[fine])), float(reach)
 
 
-def check(asked: Any) -> xr.Dataset:
-    """Evaluations a nutation that the cell takes, of the winner and of the next row: ``evaluations`` over ``rank``.
+def cost(one: xr.Dataset, rank: int, prices: Array) -> float:
+    """Of what was checked, the cost a nutation of the winner or of the next row; infinite if the target is not reached.
 
-    ``errors`` over rank and ``side`` are those at the coarser and at the finer setting; infinite evaluations mean that
-    neither reaches the target. ``quantity``, ``target``, ``horizon`` and ``row`` say which cell it is.
+    `prices` (sides,) are those of an evaluation.
+    """
+    work = tables.answered(one["work"].values[rank]) * prices
+    errors = one["errors"].values[rank]
+    return float(cost_to_reach(work[:, np.newaxis], errors[:, np.newaxis], (float(one["target"]),))[0, 0])
+
+
+def check(asked: Any) -> xr.Dataset:
+    """Errors and ``work``, evaluations a nutation, of the runs that decide a cell, over ``rank`` and ``side``.
+
+    The ranks are the winner and the next row, the sides the coarser and the finer setting. ``quantity``, ``target``,
+    ``horizon`` and ``row`` say which cell it is.
     """
     tops, far = tops_of(tables.SCENE, 1, 0), horizons()
     ends = far[far <= 1.0001 * asked["horizon"]]
     place = QUANTITIES.index(asked["quantity"])
-    shown, taken = np.full((2, 2), np.nan), np.full(2, np.nan)
+    shown, work = np.full((2, 2), np.nan), np.full((2, 2), np.nan)
     for rank, (name, pair) in enumerate(zip(asked["integrators"], asked["settings"], strict=True)):
         runs = measured(integrator(name), tops, [Asked(setting, ends, np.inf) for setting in pair])
         shown[rank] = [errors[place].max() for errors, _ in runs]
-        work = np.array([each for _, each in runs])
-        with_errors = shown[rank][:, np.newaxis]
-        taken[rank] = cost_to_reach(tables.answered(work), with_errors, (asked["target"],))[0, 0]
+        work[rank] = [float(each[0]) for _, each in runs]
     return xr.Dataset(
         {
             "errors": (("rank", "side"), shown),
-            "evaluations": ("rank", taken),
+            "work": (("rank", "side"), work),
             "setting_value": (("rank", "side"), np.array(asked["settings"])),
             "row": ("rank", list(asked["integrators"])),
             "quantity": ((), asked["quantity"]),

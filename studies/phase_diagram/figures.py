@@ -73,7 +73,7 @@ def draw(data: xr.DataTree, name: str) -> Picture:
     ]
     figure.legend(handles=keys, loc="outside lower center", ncols=2, frameon=False)
     figure.legends[0].set_title(
-        "Cheapest: the least time of a run, its force evaluations times the measured time of one, among "
+        "Cheapest: the least cost of a run, its force evaluations times the measured price of one, among "
         f"{len(words.taking_part(data))} methods.\n{words.foretold_share(data, name):.0%} of the cells that any of "
         "them reaches are predicted."
     )

@@ -1,8 +1,9 @@
 """From errors at all horizons to a diagram: the cost of each row for each target and horizon, and who is the cheapest.
 
 cost(row)   median over the tops of seconds a nutation: force evaluations a nutation of the cheapest setting that
-            keeps the error below the target up to the horizon, interpolated in logarithms between settings
-            (`population.costs.cost_to_reach`), times the measured seconds of an evaluation
+            keeps the error below the target up to the horizon, times the measured seconds of an evaluation at that
+            setting (`population.prices`), interpolated in logarithms between settings
+            (`population.costs.cost_to_reach`). No run is timed
 winner      the row of the least cost; level with it is every row within `TIE`
 foretold    if for most tops one of the two settings of the winner was not run as far as the horizon
 """
@@ -14,8 +15,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.base.remembered import of_one_dataset
+from symtop.methods.registry import integrator
 from symtop.model.charts import Array
 
+from ..population import verdicts
 from ..population.costs import cost_to_reach
 
 LADDERS, PRICES, CHECKS = "ladders", "prices", "checks"  # groups
@@ -67,9 +70,10 @@ def cell(data: xr.DataTree, scene: str, name: str) -> xr.Dataset:
     return one.assign(error=one["error"].fillna(np.inf), reach=one["reach"].where(~dead, np.inf))
 
 
-def price(data: xr.DataTree, name: str) -> float:
-    """Seconds of a force evaluation, in a run by itself."""
-    return float(data[PRICES]["alone"].isel(scene=0).sel(integrator=name))
+def price(data: xr.DataTree, name: str, settings: Array) -> Array:
+    """Seconds of a force evaluation in a run by itself, without the call, at each setting: steps, or tolerances."""
+    fixed = integrator(name).fixed_step
+    return verdicts.price(data, [name], "alone", np.where(fixed, np.nan, settings)[np.newaxis])[0, 0]
 
 
 def answered(work: Array) -> Array:
@@ -77,13 +81,16 @@ def answered(work: Array) -> Array:
     return np.where(np.isfinite(work), work, 1.0)
 
 
-def work_to_reach(one: xr.Dataset, quantity: str, targets: tuple[float, ...] = TARGETS) -> tuple[Array, Array]:
-    """Evaluations a nutation (targets, horizons, n) of a row, and the finer of the two settings that they come from."""
+def cost_of(one: xr.Dataset, quantity: str, prices: Array) -> tuple[Array, Array]:
+    """Cost a nutation (targets, horizons, n) of a row, and the finer of the two settings that it comes from.
+
+    `prices` (settings,) are those of an evaluation.
+    """
     errors = one["error"].sel(quantity=quantity).transpose("setting", "horizon", "member").values
-    work = answered(one["work"].transpose("setting", "member").values)
-    costs = np.stack([cost_to_reach(work, errors[:, k], targets) for k in range(errors.shape[1])], axis=1)
+    work = answered(one["work"].transpose("setting", "member").values) * prices[:, np.newaxis]
+    costs = np.stack([cost_to_reach(work, errors[:, k], TARGETS) for k in range(errors.shape[1])], axis=1)
     levels = np.arange(len(work))[:, np.newaxis, np.newaxis]
-    missed = np.stack([np.where(errors <= target, -1, levels).max(axis=0) for target in targets])
+    missed = np.stack([np.where(errors <= target, -1, levels).max(axis=0) for target in TARGETS])
     return costs, missed + 1
 
 
@@ -94,8 +101,8 @@ def diagram(data: xr.DataTree, scene: str, quantity: str) -> Diagram:
     costs, unseen = [], []
     for name in names:
         one = cell(data, scene, name)
-        work, level = work_to_reach(one, quantity)
-        costs.append(np.median(work, axis=2) * price(data, name))
+        seconds, level = cost_of(one, quantity, price(data, name, one["setting_value"].values))
+        costs.append(np.median(seconds, axis=2))
         reach, far = one["reach"].values, one["horizon"].values
         fine = np.minimum(level, len(reach) - 1)
         shorter = np.minimum(reach[fine], reach[np.maximum(level - 1, 0)])

@@ -71,7 +71,7 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
     """The share of tops that each row has solved within a cost, one panel a target."""
     targets, rows = verdicts.targets(data), named(data, horizon, unit)
     scale = 1e6 if unit != "evaluations" else 1.0
-    label = "force evaluations of a run" if unit == "evaluations" else "time of a run (µs)"
+    label = "force evaluations of a run" if unit == "evaluations" else "force evaluations × measured price of one (µs)"
     figure, axes = grid(len(targets), 2, (label, "share of tops solved"), height=2.3, sharex=True, sharey=True)
     each = [verdicts.costs(data, Cell(horizon, "axis", target), unit) for target in targets]
     ends = [
@@ -112,16 +112,16 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
     first = verdicts.costs(data, Cell(horizon, "axis", targets[0]), unit)
     style.legend_below(figure, axes)
     headline(figure, messages.run_lengths(data, unit, horizon))
-    asked = first.values.shape[1]
+    asked, untimed = first.values.shape[1], "" if unit == "evaluations" else "; no run was timed"
     return Picture(
         f"run-lengths-{unit}",
         figure,
         "Share of random tops, no named scene, on which a row, method[chart], has met the axis error within a cost. "
         f"Further left is faster; a line that ends higher solves more tops within {words.budget(data, horizon)} force "
         f"evaluations a nutation. {words.span(data, horizon)}, {asked:,} with a nutation wider than the largest error. "
-        f"Cost in {UNITS[unit]}, with the step or tolerance that suits the top. Thick: rows that win on the most tops; "
-        "thin: familiar ones; grey: all others. Ring: first to half of the tops. To "
-        f"{targets[0]:.0e}: {words.winner_words(data, Cell(horizon, 'axis', targets[0]), unit)}.",
+        f"Cost in {UNITS[unit]}{untimed}, with the step or tolerance that suits the top. Thick: rows that win on the "
+        "most tops; thin: familiar ones; grey: all others. Ring: first to half of the tops. To "
+        f"{targets[0]:.0e}: {words.winner_words(data, Cell(horizon, 'axis', targets[0]), unit, spoken=True)}.",
         f"Empirical distribution functions of the cost, one panel for each axis error, {len(rows)} lines with a name.",
     )
 
@@ -149,7 +149,7 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
             for place, count in enumerate([*([elsewhere] if others else []), nobody], len(names)):
                 _beside(axis, place, messages.share_won(Share(count, solved)))
         axis.set(xscale="log", xlim=(0.6, FAR), ylim=(len(lines) - 0.4, -0.6), yticks=range(len(lines)))
-        axis.set(xlabel="times the least time")
+        axis.set(xlabel="times the least cost")
         axis.set_title(f"to {power(target)} rad", pad=24.0)
         axis.annotate(f"cheapest on,\nof {solved:,} tops", (1.3, -0.6), xycoords=("axes fraction", "data"), va="bottom",
                       ha="right", fontsize=LEAST_TEXT, annotation_clip=False)  # fmt: skip
@@ -165,8 +165,9 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
     axes[0, 0].plot([], [], ">", ms=4, mfc="white", label="unsolved on 10 % or more", **dark)
     style.legend_below(figure, axes)
     note = (
-        f"Cheapest: every other method takes at least {TIE:g} times as long; nobody: two are closer. Counted are the "
-        f"tops that any method solves. {messages.asked_sentence(data, horizon)} Rows: the {len(names)} of "
+        f"Cost: force evaluations × measured price of one, alone. Cheapest: every other method costs at least {TIE:g} "
+        f"times as much; nobody: two are closer. Counted are the tops that any method solves. "
+        f"{messages.asked_sentence(data, horizon)} Rows: the {len(names)} of "
         f"{max(map(len, cells))} methods that are the cheapest {'most often' if others else 'on at least one top'}."
     )
     figure.legends[0].set_title("\n".join(textwrap.wrap(note, 120)))
@@ -176,9 +177,9 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
         figure,
         f"The {len(names)} rows, method[chart], with the most wins, each at its own step or tolerance. Marker: median "
         "of the slowdown against the cheapest row on the same top. Bar: from the 10 % to the 90 % quantile; arrow: not "
-        "reached within the budget. Beside it the share of tops on which the row is the cheapest; last, the tops on "
-        f"which two are closer. {messages.asked_sentence(data, horizon)} {words.span(data, horizon)}, no named scene; "
-        f"cost in {UNITS[words.UNIT]}. A bar that stays near 1 is a safe choice.",
+        "reached within the budget. Beside it the share of the tops that a row solves on which it is the cheapest; "
+        f"last, those on which two are closer. {messages.asked_sentence(data, horizon)} {words.span(data, horizon)}, "
+        f"no named scene; cost in {UNITS[words.UNIT]}. A bar that stays near 1 is a safe choice.",
         "Dot plots of slowdown with bars from the 10 to the 90 % quantile, one panel for each axis error.",
     )
 
@@ -235,16 +236,18 @@ def draw_strata(data: xr.DataTree) -> Picture:
     axes[0, 0].set_ylabel("kind of top")
     figure.supxlabel(
         "In a cell: the method (on the axis e and L if it names no chart) that is the cheapest on the most tops, and\n"
-        "on what share of them. Pale, ~: its lead may be chance. None: no method reaches the error.",
+        "on what share of those that any method solves. Pale, ~: its lead may be chance. None: no method reaches the "
+        "error.",
         fontsize=7.5, ha="left", x=0.01,
     )  # fmt: skip
     headline(figure, messages.strata(data))
     return Picture(
         "strata",
         figure,
-        "The row that wins on the most tops of each kind, and its share of wins, for each axis error. Pale and with a "
-        "tilde: its lead may be chance or noise of the times; level: two rows are closer than a win. Cost in "
-        f"{UNITS[words.UNIT]}, each row at its own step or tolerance on each top. {words.strata_sentence(data)}",
+        "The row that wins on the most tops of each kind, and its share of those that a row solves, for each axis "
+        "error. Pale and with a tilde: its lead may be chance or noise of the times; level: two rows are closer than a "
+        f"win. Cost in {UNITS[words.UNIT]}, each at its own step or tolerance on each top. "
+        f"{words.strata_sentence(data)}",
         "Coloured cells naming the winning row, a line a stratum, a column an accuracy, a panel a horizon.",
     )
 
@@ -274,9 +277,9 @@ def draw_silent(data: xr.DataTree) -> Picture:
     axis.grid(visible=False, axis="y")
     axis.tick_params(axis="y", length=0)
     figure.supxlabel(
-        f"Wrong: the axis is off by more than {WRONG:g} rad. Healthy: it ends without an error and keeps energy and "
-        f"momenta to {KEPT:.0%}.\n{words.span(data, 'short')}, by every method; those with a tolerance are in the "
-        "first bar only.",
+        f"Wrong: the axis is off by more than {WRONG:g} rad within the run. Healthy: it ends without an error and "
+        f"keeps\nenergy and momenta to {KEPT:.0%}. {words.span(data, 'short')}, by every method; those with a "
+        "tolerance are in\nthe first bar only.",
         fontsize=7.5, ha="left", x=0.01,
     )  # fmt: skip
     headline(figure, messages.silent(data))

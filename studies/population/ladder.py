@@ -15,6 +15,7 @@ the energy and both momenta to `KEPT`. A member that left with an accurate run i
 Variables over `quantity`, `target`, `member`, `level`, `stratum`, `guarded`:
 
     cost(quantity, target, member)   force evaluations, inf if it was not reached, NaN if it was not asked
+    met_at(quantity, target, member) tenths of a decade of the tolerance that reaches it; 0 if none does, or has a step
     setting(level)                   steps a nutation, or the tolerance
     runs, wrong, ended, silent (level, stratum)    numbers of members: judged, wrong, ended `ok`, silent failures
     foretold, measured (level, guarded)            axis error, rad: of the guard's forecast, and of the run
@@ -55,6 +56,7 @@ ASYMPTOTIC = 1e-2  # rad; an error below this falls as the order says
 FORGIVEN = 10.0
 BLOCK = 256  # members of an adaptive row that climb together: as many starts as heyoka's conversion remembers
 DIGITS = 10  # bits of a cost that are stored, 0.1 %
+TENTHS = 10.0  # of a decade: how finely a tolerance is stored, in a byte
 Members = NDArray[np.int64]  # places of members
 
 GUARDED_LEVELS = 10  # of them are shown to the guard: up to 559 steps a nutation
@@ -196,6 +198,15 @@ def stored(values: Array) -> Array:
     return np.asarray(np.ldexp(np.rint(np.ldexp(size, DIGITS)), power - DIGITS))
 
 
+def met_at(row: Integrator, done: Climb, name: str, targets: Sequence[float] = TARGETS) -> NDArray[np.uint8]:
+    """The tolerance that reaches each target, (targets, n), interpolated as its cost is, in tenths of a decade."""
+    if row.fixed_step:
+        return np.zeros((len(targets), done.work.shape[1]), dtype=np.uint8)
+    tolerances = np.array([[setting_of(row, level)] for level in range(LEVELS)])
+    reached = cost_to_reach(np.where(np.isfinite(done.work), tolerances, np.nan), done.errors[name], targets)
+    return np.where(np.isfinite(reached), np.rint(-TENTHS * np.log10(reached)), 0.0).astype(np.uint8)
+
+
 def table(
     row: Integrator, tops: Tops, strata: NDArray[np.int64], kinds: int, budget: float, *, twin: bool, guarded: int
 ) -> xr.Dataset:
@@ -203,13 +214,16 @@ def table(
     asked = {name: mask for name, mask in tops.asked(TARGETS).items() if name in quantities_of(row, twin)}
     done = climb(row, tops, asked, budget)
     costs = np.full((len(ASKED), len(TARGETS), len(tops.period)), np.nan)
+    met = np.zeros(costs.shape, dtype=np.uint8)
     for place, name in enumerate(ASKED):
         if name in asked:
             first = round(math.log2(LEAST_STEPS / FIRST)) if row.fixed_step and name == "energy" else 0
             reached = cost_to_reach(done.work[first:], done.errors[name][first:], TARGETS)
             costs[place] = np.where(asked[name], stored(reached), np.nan)
+            met[place] = np.where(np.isfinite(costs[place]), met_at(row, done, name), 0)
     data: dict[str, Any] = {
         "cost": (("quantity", "target", "member"), costs),
+        "met_at": (("quantity", "target", "member"), met),
         "setting": ("level", [setting_of(row, level) for level in range(LEVELS)]),
         **{name: (("level", "stratum"), values) for name, values in _healthy(done, tops, strata, kinds).items()},
         "chart": ((), row.charts()[0]),

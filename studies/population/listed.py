@@ -11,6 +11,7 @@ from symtop.runner.study import Table
 from . import verdicts, words
 from .costs import Share
 from .ladder import KEPT, WRONG
+from .prices import TOLERANCE
 from .verdicts import ALL, UNITS, Cell
 from .words import interval, percent, ratio, span
 
@@ -23,6 +24,9 @@ RULES = {
     "energy 4.4",
     "cost of an error": "interpolated in logarithms between the last run that misses it and the first that meets it "
     "for good; no run of these tables was timed",
+    "price of an evaluation": "the slope of the time between a short and a long run, so that the call itself has no "
+    "part in it; of rows whose order follows the tolerance at each of several, and on each top that of the tolerance "
+    "that meets the error, which is interpolated as the cost is",
     "tops that are asked": "those whose nutation is wider than the error, and where this is at least ten times the "
     "error of the truth",
     "energy": "is asked of the rows that do not conserve it by construction",
@@ -49,7 +53,8 @@ def tables(data: xr.DataTree) -> list[Table]:
     rules = [["budget of a run", f"{most} force evaluations a nutation"], *map(list, RULES.items())]
     return [
         _by_quantity(data), _guard(data), *(_standings(data, unit) for unit in UNITS), _by_stratum(data),
-        _silent(data), _prices(data), Table("Which runs were made", ["what", "rule"], rules),
+        _silent(data), _prices(data), _prices_by_tolerance(data),
+        Table("Which runs were made", ["what", "rule"], rules),
     ]  # fmt: skip
 
 
@@ -161,4 +166,18 @@ def _prices(data: xr.DataTree) -> Table:
     for name in map(str, group["integrator"].values):
         alone, together, spread = (float(group[key].sel(integrator=name)) for key in ("alone", "together", "spread"))
         lines.append([name, f"{1e9 * alone:.3g}", f"{1e9 * together:.3g}", f"{alone / together:.2f}", f"{spread:.0%}"])
-    return Table("Time of a force evaluation, in a run of one top and in one call for many", PRICES, lines)
+    title = (
+        "Measured price of a force evaluation, without the call, in a run of one top and in one call for many; "
+        f"at the tolerance {TOLERANCE:.0e} where it depends on it"
+    )
+    return Table(title, PRICES, lines)
+
+
+def _prices_by_tolerance(data: xr.DataTree) -> Table:
+    group = data["prices"].to_dataset().isel(scene=0)
+    by = group["alone_by"].transpose("integrator", "tolerance").values
+    names = [str(name) for name in group["integrator"].values]
+    lines = [[name, *(f"{1e9 * price:.3g}" for price in row)]
+             for name, row in zip(names, by, strict=True) if np.ptp(row)]  # fmt: skip
+    header = ["row", *(f"{tolerance:.0e}" for tolerance in group["tolerance"].values)]
+    return Table("Price of a force evaluation alone (ns), by tolerance, of rows whose order follows it", header, lines)

@@ -17,6 +17,7 @@ HALF = 0.5  # of the tops, at which costs are compared
 FEW = 0.01  # of the wrong runs: if fewer are missed, they are counted
 SCALES = {"evaluations": 1.0}  # of a cost in a figure, by unit; microseconds of all others
 MADE = {"evaluations": "force evaluations"}
+SOLVED = " of the tops that any method solves"
 
 
 def ten(target: float) -> str:
@@ -70,8 +71,8 @@ def run_lengths(data: xr.DataTree, unit: str, horizon: str) -> str:
     known = {target: one for target, one in each.items() if one is not None}
     if not known:
         return f"No method solves half of the tops {over(data, horizon)}"
-    makes, ends = MADE.get(unit, "µs"), sorted({max(known), min(known)}, reverse=True)
-    said = [f"to {ten(target)} in {number(known[target].cost)}{FIRM}{makes}" for target in ends]
+    makes, ends = MADE.get(unit, "µs of force evaluations"), sorted({max(known), min(known)}, reverse=True)
+    said = [f"to {ten(target)} for {number(known[target].cost)}{FIRM}{makes}" for target in ends]
     names = [known[target].name for target in ends]
     if len(set(names)) == 1:
         return (
@@ -87,7 +88,7 @@ def first_and_last(data: xr.DataTree, horizon: str) -> list[tuple[str, str]]:
     for target in verdicts.targets(data):
         taken, won = verdicts.best(data, Cell(horizon, "axis", target), UNIT)
         if won is not None:
-            winners.append((taken.names[won.row], f"on {share_won(won.share)} of the tops at {ten(target)}"))
+            winners.append((taken.names[won.row], f"on {share_won(won.share)}{SOLVED} at {ten(target)}"))
     return winners if len(winners) < 2 else [winners[0], winners[-1]]
 
 
@@ -97,7 +98,7 @@ def slowdowns(data: xr.DataTree, horizon: str) -> str:
     if not ends:
         return f"No method meets a target {length}"
     (first, share), *others = ends
-    rest = [there.replace(" of the tops", "") if last == first else f"{last} {there}" for last, there in others]
+    rest = [there.replace(SOLVED, "") if last == first else f"{last} {there}" for last, there in others]
     return f"{', '.join([f'{first} is the cheapest {share}', *rest])}, {length}"
 
 

@@ -1,23 +1,31 @@
 """Seconds of a force evaluation of every row, alone and among many tops at once, measured in interleaved rounds.
 
 The study counts force evaluations, because a count is the same on every machine. What an evaluation costs is measured
-here for each row: in the run of one top, bare, and in one call for `TOGETHER` tops where kernels have lanes and work on
-several at once, or for `IN_TURN` where they have not. The ordinary tops of a stratum without poles stand for all: the
-arithmetic of a step does not hang on the top, but for the iterations of implicit methods, which are counted.
+here for each row, as the slope between two runs of unlike lengths,
+
+    seconds of an evaluation = (seconds of the long run - of the short one) / (evaluations of the long - of the short)
+
+so that what a call costs by itself, 1 to 30 us, has no part in it, of rows with a step and of those with a tolerance.
+It is measured in runs of one top and in calls for `TOGETHER` tops where kernels have lanes and work on several at once,
+or for `IN_TURN` where they have not. Ordinary tops that stay `CLEAR` of the poles, so that no chart is left and no run
+ends early, stand for all: the arithmetic of a step does not hang on the top, but for the iterations of implicit
+methods, which are counted. It hangs on the tolerance where the order does: an evaluation of a Taylor series costs the
+more the fewer there are of a step. Such rows have a price at each of `TOLERANCES`.
 """
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from symtop.measure.timing import timings
-from symtop.methods.calling import solve
+from symtop.measure.timing import Timing, timings
+from symtop.methods.adaptive import Adaptive
 from symtop.methods.fixed_step import inside
 from symtop.methods.plan import Plan
 from symtop.methods.registry import Integrator, integrator
+from symtop.model.charts import Array
 from symtop.model.closed_forms import ClosedForms
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.population import NUMBERS, population
@@ -25,54 +33,115 @@ from symtop.run.population import NUMBERS, population
 from .tops import FIRST
 
 TOGETHER, IN_TURN = 256, 16  # tops of a call: side by side in lanes, or one after another
-NUTATIONS, FINE = 20, 5  # of a timed run; FIRST 2^FINE steps a nutation
-TOLERANCE = 1e-8
-KIND = "slow"
+FINE = 5  # FIRST 2^FINE steps a nutation
+TOLERANCES = tuple(10.0**-decade for decade in range(2, 16, 2))
+TOLERANCE = 1e-8  # of rows whose order is the same at all
+KIND, CLEAR = "slow", 0.3  # rad between a pole and the axis of a top that is timed
+DRAWN = 8 * TOGETHER
 KINDS = ("alone", "together")
+LENGTHS = {"alone": (5, 50), "together": (2, 10)}  # nutations of the short run and of the long one
+Call = tuple[Callable[[], object], float]  # with its number of force evaluations
+
+
+class Pair(NamedTuple):
+    """A short run and a long one of a row."""
+
+    short: Call
+    long: Call
+
+    def slopes(self, short: Timing, long: Timing, rounds: int) -> Array:
+        """Seconds of an evaluation by the smallest samples of all rounds, and by those of either half of them, (3,)."""
+        (_, few), (_, most) = self
+        samples = [np.array(taken.samples[-rounds:]) for taken in (short, long)]
+        parts = slice(None), slice(0, None, 2), slice(1, None, 2)
+        return np.array([(samples[1][part].min() - samples[0][part].min()) / (most - few) for part in parts])
 
 
 @functools.cache
 def _tops() -> tuple[Any, Any]:
     """Numbers (TOGETHER, 9) and nutation periods of the tops that are timed."""
-    drawn = population(TOGETHER, seed=0, kind=KIND)
+    drawn = population(DRAWN, seed=0, kind=KIND)
     numbers = np.stack([drawn[name].values for name in NUMBERS], axis=1)
+    low, high = ClosedForms(numbers).theta_range.T
+    numbers = np.ascontiguousarray(numbers[(low > CLEAR) & (high < np.pi - CLEAR)][:TOGETHER])
     return numbers, np.array(ClosedForms(numbers).nutation_period)
 
 
-def calls(row: Integrator) -> dict[str, tuple[Callable[[], object], float]]:
-    """The timed calls of a row, "alone" and "together", each with its number of force evaluations."""
+def tolerances_of(row: Integrator) -> tuple[float, ...]:
+    """The tolerances at which a row is timed; one where its price does not hang on it, which a step makes no use of."""
+    return TOLERANCES if not row.fixed_step and row.order is None else (TOLERANCE,)
+
+
+def alone(row: Integrator, tolerance: float, nutations: int) -> Call:
+    """The run of one top."""
     (chart,), (numbers, period) = row.charts(), _tops()
-    top, start = SymmetricTop(*numbers[0, :3].tolist()), Angles(*numbers[0, 3:].tolist())
-    steps = round(NUTATIONS * FIRST * 2.0**FINE)
-    solver, marks, h = inside(row.solvers[chart]), np.array([steps // 2, steps]), period * (NUTATIONS / steps)
-    plan = Plan.steps(float(h[0]), marks)
+    top, start, solver = SymmetricTop(*numbers[0, :3].tolist()), Angles(*numbers[0, 3:].tolist()), row.solvers[chart]
+    steps = round(nutations * FIRST * 2.0**FINE)
+    plan = Plan.steps(float(period[0]) * (nutations / steps), np.array([steps // 2, steps]))
     if not row.fixed_step:
-        plan = Plan.until(np.array([0.5, 1.0]) * NUTATIONS * float(period[0]), TOLERANCE)
-    if solver is None:
-        run = solve(row, chart, top, start, plan)
-        return {"alone": (lambda: solve(row, chart, top, start, plan), float(run.force_evaluations))}
-    run, count = solver(top, start, plan), TOGETHER if solver.in_lanes else IN_TURN
-    given = numbers[:count], h[:count], np.tile(marks, (count, 1))
-    many = solver.many(*given)
-    return {
-        "alone": (lambda: solver(top, start, plan), float(run.force_evaluations)),
-        "together": (lambda: solver.many(*given), float(solver.counts(many.steps, many.work)[0].sum())),
-    }
+        plan = Plan.until(np.array([0.5, 1.0]) * nutations * float(period[0]), tolerance)
+    return lambda: solver(top, start, plan), float(solver(top, start, plan).force_evaluations)
+
+
+def together(row: Integrator, tolerance: float, nutations: int) -> Call | None:
+    """The runs of many tops in one call, as the ladder makes them; None where there is no such call."""
+    (chart,), (numbers, period) = row.charts(), _tops()
+    solver = row.solvers[chart]
+    if isinstance(solver, Adaptive):
+        times = np.array([0.5, 1.0]) * nutations * period[:IN_TURN, np.newaxis]
+        tops, same, samples = numbers[:IN_TURN], np.full(IN_TURN, tolerance), np.full(IN_TURN, 2)
+        made, _ = solver.many(tops, same, times, samples)
+        return lambda: solver.many(tops, same, times, samples), float(made.work.sum())
+    loop = inside(solver)
+    if loop is None:
+        return None
+    count, steps = TOGETHER if loop.in_lanes else IN_TURN, round(nutations * FIRST * 2.0**FINE)
+    given = numbers[:count], period[:count] * (nutations / steps), np.tile([steps // 2, steps], (count, 1))
+    many = loop.many(*given)
+    return lambda: loop.many(*given), float(loop.counts(many.steps, many.work)[0].sum())
+
+
+def pairs(row: Integrator) -> dict[tuple[str, float], Pair]:
+    """The timed runs of a row, "alone" and "together", at each tolerance."""
+    made = {}
+    for kind, call in zip(KINDS, (alone, together), strict=True):
+        for tolerance in tolerances_of(row):
+            short, long = (call(row, tolerance, nutations) for nutations in LENGTHS[kind])
+            if short is not None and long is not None:
+                made[kind, tolerance] = Pair(short, long)
+    return made
 
 
 def prices(names: Sequence[str], rounds: int, batch: float) -> xr.Dataset:
     """Seconds of a force evaluation: ``alone`` and ``together`` over ``integrator``, and ``spread`` of the samples.
 
-    The smallest sample counts, and that of every other round by itself (``alone_half``, ``together_half``): what is
-    said of a time must be so in both halves. A row whose tops share no loop has the price of a run alone in both.
+    The smallest samples count, and those of every other round by themselves (``alone_half``, ``together_half``): what
+    is said of a time must be so in both halves. ``alone_by`` and ``together_by`` have ``tolerance`` too, ``by_half``
+    behind it likewise; the others are at `TOLERANCE`. A row whose tops share no call has the price of a run alone in
+    both. The spread is the largest of the long runs.
     """
-    each = {(name, kind): call for name in names for kind, call in calls(integrator(name)).items()}
-    taken = dict(zip(each, timings([call for call, _ in each.values()], rounds, batch, warm=True), strict=True))
-    columns: dict[str, Any] = {}
+    each = {(name, *key): pair for name in names for key, pair in pairs(integrator(name)).items()}
+    taken = timings([call for pair in each.values() for call, _ in pair], rounds, batch, warm=True)
+    slopes = {
+        key: pair.slopes(short, long, rounds)
+        for (key, pair), short, long in zip(each.items(), taken[::2], taken[1::2], strict=True)
+    }
+    spreads = {name: max(long.spread for key, long in zip(each, taken[1::2], strict=True) if key[0] == name)
+               for name in names}  # fmt: skip
+    columns: dict[str, Any] = {"spread": ("integrator", [spreads[name] for name in names])}
     for kind in KINDS:
-        keys = [(name, kind if (name, kind) in each else "alone") for name in names]
-        samples = [np.array(taken[key].samples[-rounds:]) / each[key][1] for key in keys]
-        columns[kind] = "integrator", [one.min() for one in samples]
-        columns[f"{kind}_half"] = ("integrator", "half"), [[one[::2].min(), one[1::2].min()] for one in samples]
-    spread = [max(taken[key].spread for key in each if key[0] == name) for name in names]
-    return xr.Dataset(columns | {"spread": ("integrator", spread)}, coords={"integrator": list(names)})
+        values = np.array([[_of(slopes, name, kind, tolerance) for tolerance in TOLERANCES] for name in names])
+        same = values[:, TOLERANCES.index(TOLERANCE)]
+        columns |= {
+            kind: ("integrator", same[:, 0]),
+            f"{kind}_half": (("integrator", "half"), same[:, 1:]),
+            f"{kind}_by": (("integrator", "tolerance"), values[..., 0]),
+            f"{kind}_by_half": (("integrator", "tolerance", "half"), values[..., 1:]),
+        }
+    return xr.Dataset(columns, coords={"integrator": list(names), "tolerance": list(TOLERANCES)})
+
+
+def _of(slopes: dict[tuple[str, str, float], Array], name: str, kind: str, tolerance: float) -> Array:
+    """Of a row at a tolerance: of its one tolerance if it has but one, of a run alone if there is no other."""
+    there = kind if (name, kind, TOLERANCE) in slopes else "alone"
+    return slopes.get((name, there, tolerance), slopes[name, there, TOLERANCE])

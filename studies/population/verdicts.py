@@ -7,11 +7,14 @@ known of the tops, "prices" the seconds of a force evaluation of each row (see `
     alone         force evaluations x seconds of one in a run by itself
     together      force evaluations x seconds of one in one call for many tops
 
+The seconds are without those of the call, of every row (see `prices`), and at the tolerance that reaches the target on
+a top where a row has one.
+
 Rows are compared where they show the same quantity: the axis in every chart but the attitude chart of a method that has
 the axis chart, which steps the same axis, and the attitude in the charts that show it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,13 +26,13 @@ from symtop.model.charts import Array
 from symtop.run.guard import EXPECTED
 
 from .costs import Detection, Share, Winner, detection, quantiles, slowdowns, winner, wins
-from .ladder import KEPT, WRONG
+from .ladder import KEPT, TENTHS, WRONG
 
 HORIZONS = ("short", "long")
 UNITS = {
     "evaluations": "force evaluations",
-    "alone": "force evaluations x seconds of one, alone",
-    "together": "force evaluations x seconds of one, in a call for many tops",
+    "alone": "force evaluations x measured price of one, alone",
+    "together": "force evaluations x measured price of one, in a call for many tops",
 }
 ALL = "all"  # tops, whatever their stratum
 THRESHOLDS = {"foretold": EXPECTED, "watched": KEPT}
@@ -50,7 +53,7 @@ class Costs(NamedTuple):
 
     names: list[str]
     values: Array  # (rows, tops), inf where a row does not reach the target
-    halves: Array  # (2, rows): the price of an evaluation by half of the rounds of timing, over that by all
+    halves: Array  # (2, rows): price of an evaluation by half of the rounds of timing over that by all, in the median
 
     def of(self, name: str) -> Array:
         """The costs of one row."""
@@ -97,26 +100,40 @@ def stratum_of(data: xr.DataTree, horizon: str) -> Array:
     return np.asarray(data["tops"]["stratum_place"].values.ravel()[: members(data, horizon)])
 
 
-def price(data: xr.DataTree, names: list[str], unit: str) -> Array:
-    """What a force evaluation of each row costs in a unit, (3, rows): the least time, and that of each half."""
+def price(data: xr.DataTree, names: list[str], unit: str, tolerances: Array) -> Array:
+    """What a force evaluation costs in a unit, by all rounds and by each half, at tolerances (rows, n): (3, rows, n).
+
+    Between the tolerances that were timed it is interpolated in logarithms; NaN is a row with a step, or no tolerance.
+    """
     if unit == "evaluations":
-        return np.ones((3, len(names)))
+        return np.ones((3, *tolerances.shape))
     timed = data["prices"].to_dataset().isel(scene=0).sel(integrator=names)
-    return np.stack([timed[unit].values, *timed[f"{unit}_half"].transpose("half", "integrator").values])
+    halves = timed[f"{unit}_by_half"].transpose("half", "integrator", "tolerance").values
+    each = np.stack([timed[f"{unit}_by"].transpose("integrator", "tolerance").values, *halves])
+    seconds = np.repeat(each[:, :, :1], tolerances.shape[1], axis=2)
+    known, x = -np.log(timed["tolerance"].values), -np.log(tolerances)
+    for part, row in zip(*np.nonzero(np.ptp(each, axis=2)), strict=True):
+        at = np.where(np.isnan(x[row]), known[-1], x[row])
+        seconds[part, row] = np.exp(np.interp(at, known, np.log(each[part, row])))
+    return seconds
 
 
 @of_one_dataset
 def costs(data: xr.DataTree, cell: Cell, unit: str) -> Costs:
     """Costs of all rows that show a cell's quantity, on the tops that are asked."""
-    group = data[cell.horizon]["cost"].isel(scene=0)
-    values = group.sel(quantity=cell.quantity, target=cell.target).transpose("integrator", "member").values
+    group = data[cell.horizon].to_dataset()[["cost", "met_at"]].isel(scene=0)
+    asked = group.sel(quantity=cell.quantity, target=cell.target).transpose("integrator", "member")
+    values, met = asked["cost"].values, asked["met_at"].values
     if cell.stratum != ALL:
-        values = values[:, stratum_of(data, cell.horizon) == strata(data).index(cell.stratum)]
+        among = stratum_of(data, cell.horizon) == strata(data).index(cell.stratum)
+        values, met = values[:, among], met[:, among]
     rows, tops = ~np.isnan(values).all(axis=1), ~np.isnan(values).all(axis=0)
     names = [str(name) for name in group["integrator"].values[rows]]
-    seconds = price(data, names, unit)
-    values = np.where(np.isnan(values), np.inf, values)[np.ix_(rows, tops)]
-    return Costs(names, values * seconds[0][:, np.newaxis], seconds[1:] / seconds[0])
+    chosen = np.ix_(rows, tops)
+    values, met = np.where(np.isnan(values), np.inf, values)[chosen], met[chosen]
+    seconds = price(data, names, unit, np.where(met, 10.0 ** (-met.astype(float) / TENTHS), np.nan))
+    halves = np.median(seconds[1:] / seconds[0], axis=2) if tops.any() else np.ones((2, len(names)))
+    return Costs(names, values * seconds[0], halves)
 
 
 def standings(taken: Costs) -> list[Standing]:
@@ -136,6 +153,11 @@ def standings(taken: Costs) -> list[Standing]:
         for row, name in enumerate(taken.names)
     ]
     return sorted(listed, key=lambda one: (-one.won.count, -one.level.count, one.slowdown[1], -one.solved.count))
+
+
+def widest(listed: Sequence[Standing]) -> Standing:
+    """The row that solves the most tops; of those with as many the first."""
+    return max(listed, key=lambda one: one.solved.count)
 
 
 @of_one_dataset
@@ -168,6 +190,7 @@ class Health(NamedTuple):
     runs: Array
     wrong: Array
     silent: Array
+    by_kind: Array  # silent failures by stratum, (settings, strata)
 
     @property
     def hidden(self) -> float:
@@ -182,9 +205,9 @@ def health(data: xr.DataTree, name: str, horizon: str = "short") -> Health:
     count = float(data["tops"]["known"].values.ravel()[: members(data, horizon)].sum())
     judged = group["runs"].transpose("level", "stratum").values
     there = judged.sum(axis=1) >= WHOLE * count
-    numbers = (group[key].transpose("level", "stratum").values[there] for key in ("runs", "wrong", "silent"))
+    numbers = [group[key].transpose("level", "stratum").values[there] for key in ("runs", "wrong", "silent")]
     fixed = str(group["control"].values) == "step_size"
-    return Health(fixed, group["setting"].values[there], *(part.sum(axis=1) for part in numbers))
+    return Health(fixed, group["setting"].values[there], *(part.sum(axis=1) for part in numbers), numbers[-1])
 
 
 def judged_rows(data: xr.DataTree, horizon: str = "short") -> list[str]:

@@ -31,8 +31,10 @@ LEFT_OUT = {  # methods, by the reason
 HOW_TO_READ = (
     "A row is a method in one chart. The tops are drawn at random in six strata, or kinds: slow, fast, grazing a pole, "
     "near the separatrix, hanging and sleeping. On each top a row runs from coarse settings to fine ones, and its cost "
-    "for an error is that at which it begins to meet it for good. Seconds are force evaluations times the measured "
-    "time of one, in the bare compiled loop: alone, or in a call for many tops. The slowdown of a row on a top is its "
+    "for an error is that at which it begins to meet it for good. A cost in seconds is force evaluations times the "
+    "measured price of one, alone or in a call for many tops. No run of the tops was timed: the price is the slope "
+    "between a short and a long run, without the call, at the tolerance that meets the error where the order of a row "
+    "follows its tolerance. The slowdown of a row on a top is its "
     "cost over the least of all rows there. A row wins on a top if all others cost at least "
     f"{TIE:g} times as much. Shares have 95 % intervals (Wilson) for the draw of the tops; times that are measured "
     "again move a close contest by more. A winner is sure if its lead is three standard errors with the times of "
@@ -67,14 +69,15 @@ def budget(data: xr.DataTree, horizon: str) -> str:
     return f"{float(np.nanmax(group['budget'].values)) / verdicts.nutations(data, horizon):,.0f}"
 
 
-def winner_words(data: xr.DataTree, cell: Cell, unit: str = UNIT) -> str:
-    """Who wins a cell, on what share of the tops, and who is next; empty where nobody reaches the target."""
+def winner_words(data: xr.DataTree, cell: Cell, unit: str = UNIT, *, spoken: bool = False) -> str:
+    """Who wins a cell, on what share of the tops that a row solves, and who is next; empty where nobody does."""
     taken, won = verdicts.best(data, cell, unit)
     if won is None:
         return ""
     following = f", then {taken.names[won.next_row]} on {percent(won.next_share)}" if won.next_share.count else ""
     sure = "" if won.sure else ", a lead that may be chance or noise of the times"
-    return f"{taken.names[won.row]} on {percent(won.share)} ({interval(won.share)}){following}{sure}"
+    first = f"{taken.names[won.row]} on {percent(won.share)} ({interval(won.share)})"
+    return f"{first}{' of the tops that a row solves' if spoken else ''}{following}{sure}"
 
 
 def quantity_sentence(data: xr.DataTree, quantity: str) -> str:
@@ -95,7 +98,7 @@ def quantity_sentence(data: xr.DataTree, quantity: str) -> str:
     return (
         f"For the {quantity}, {first} is the cheapest row on the most tops in {most} of the "
         f"{sum(map(len, shares.values()))} combinations of run length and error that some row reaches, with {share} of "
-        f"the tops.{rest}"
+        f"the tops that a row solves.{rest}"
     )
 
 
@@ -135,6 +138,10 @@ class Hidden(NamedTuple):
     everywhere: float  # share of all wrong runs that look healthy
     fine: float  # among rows with a fixed step, of at least `FINE` steps a nutation
     wrong_fine: float  # runs of these
+    silent_fine: float  # of these, runs that look healthy
+    kind: str  # of top with the most of them
+    of_kind: float  # how many of them
+    drawn: float  # share of this kind in all tops
 
 
 def hidden(data: xr.DataTree) -> Hidden:
@@ -143,8 +150,12 @@ def hidden(data: xr.DataTree) -> Hidden:
     wrong, silent = sum(one.wrong.sum() for one in each), sum(one.silent.sum() for one in each)
     small = [one for one in each if one.fixed_step]
     missed = sum(one.wrong[one.setting >= FINE].sum() for one in small)
-    unseen = sum(one.silent[one.setting >= FINE].sum() for one in small)
-    return Hidden(float(wrong), float(silent / max(wrong, 1.0)), float(unseen / max(missed, 1.0)), float(missed))
+    kinds = verdicts.strata(data)
+    by_kind = sum((one.by_kind[one.setting >= FINE].sum(axis=0) for one in small), start=np.zeros(len(kinds)))
+    unseen, most = float(by_kind.sum()), int(np.argmax(by_kind))
+    shares = float(silent / max(wrong, 1.0)), unseen / max(missed, 1.0)
+    drawn = float((verdicts.stratum_of(data, "short") == most).mean())
+    return Hidden(float(wrong), *shares, float(missed), unseen, kinds[most], float(by_kind[most]), drawn)
 
 
 def hidden_by_steps(data: xr.DataTree) -> list[tuple[float, float, float]]:
@@ -160,11 +171,16 @@ def hidden_by_steps(data: xr.DataTree) -> list[tuple[float, float, float]]:
 def silent_sentence(data: xr.DataTree) -> str:
     """How many wrong runs nothing warns of, over all rows and among small steps."""
     share = hidden(data)
+    kind = (
+        f", {share.of_kind:,.0f} of them on {share.kind} tops, which are {share.drawn:.1%} of the tops"
+        if share.silent_fine
+        else ""
+    )
     return (
         f"{share.everywhere:.0%} of the {share.wrong:,.0f} wrong runs give no sign of it: they end without an error "
         f"and keep energy and momenta to {KEPT:.0%}. Of those with at least {FINE:g} steps a nutation it is "
-        f"{share.fine:.0%}. Wrong is an axis that is off by more than {WRONG:g} rad after "
-        f"{verdicts.nutations(data, 'short'):g} nutations."
+        f"{share.fine:.0%}, {share.silent_fine:,.0f} runs{kind}. Wrong is an axis that is off by more than {WRONG:g} "
+        f"rad within {verdicts.nutations(data, 'short'):g} nutations."
     )
 
 

@@ -192,8 +192,33 @@ def test_a_check_whose_coarser_run_fails_takes_the_finer_one():
     asked = {"integrators": ["series[axis]"] * 2, "settings": [[1.0, 35.0], [1.0, 1.1]], "quantity": "axis",
              "target": 1e-6, "horizon": 17.8}  # fmt: skip
     done = checks.check(asked)
-    assert done["evaluations"].values[0] == pytest.approx(35.0 * 16, rel=0.05)
-    assert np.isinf(done["evaluations"].values[1])
+    assert checks.cost(done, 0, np.ones(2)) == pytest.approx(35.0 * 16, rel=0.05)
+    assert checks.cost(done, 0, np.array([9.0, 2.0])) == pytest.approx(35.0 * 16 * 2, rel=0.05)  # its price counts
+    assert np.isinf(checks.cost(done, 1, np.ones(2)))
+
+
+def test_every_setting_has_its_own_price(data):
+    """Of a row whose order follows the tolerance; steps have one price."""
+    at = np.array([1e-2, 1e-5, 1e-12])
+    adaptive, fixed = (tables.price(data, name, at) for name in ("series-adaptive[axis]", "strang[axis]"))
+    assert adaptive.shape == fixed.shape == (3,)
+    assert adaptive[0] > adaptive[2]
+    assert np.ptp(fixed) == 0.0
+    one = tables.cell(data, "spheroid", "series-adaptive[axis]")
+    plain, level = tables.cost_of(one, "axis", np.ones(one.sizes["setting"]))
+    priced, same = tables.cost_of(one, "axis", np.arange(1.0, one.sizes["setting"] + 1.0))
+    assert np.array_equal(level, same)
+    reached = np.isfinite(plain)
+    ratio = priced[reached] / plain[reached]
+    assert (ratio <= level[reached] + 1.0 + 1e-9).all()  # between the prices of the two settings around it
+    assert (ratio >= np.maximum(level[reached], 1.0) - 1e-9).all()
+    assert np.ptp(ratio) > 1.0
+
+
+def test_a_cost_by_evaluations_is_not_called_measured(data):
+    assert "No run was timed" in words.spot_sentence(data)
+    assert not any("measured" in name for name in words.SPOTS)
+    assert len(words.spot_sentence(data)) <= 400
 
 
 def test_a_check_that_misses_counts_as_wrong():

@@ -1,13 +1,16 @@
 """The study of populations: scales and errors of many tops, the arithmetic of costs and shares, and its verdicts."""
 
+import dataclasses
 import math
 import re
+import time
 
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.population import costs, figures, ladder, messages, study, verdicts, words
+from symtop_studies.population import costs, figures, ladder, messages, prices as pricing, study, verdicts, words
 from symtop_studies.population.costs import Share, cost_to_reach, detection, quantiles, run_lengths, slowdowns, winner
+from symtop_studies.population.opening import unmet_sentence
 from symtop_studies.population.prices import prices
 from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, strata_of
 from symtop_studies.population.verdicts import Cell
@@ -17,6 +20,7 @@ from symtop import advise
 from symtop.base import datasets
 from symtop.measure.accuracy import error_row
 from symtop.measure.nearest import nearest
+from symtop.measure.timing import Timing
 from symtop.measure.work import TARGETS, nutation_width
 from symtop.methods.registry import integrator
 from symtop.model.scenes import Scene
@@ -263,25 +267,26 @@ def test_the_grid_has_every_compiled_row_and_says_what_it_leaves_out():
 # ---- verdicts --------------------------------------------------------------------------------------------------------
 
 
-def tree(costs_by_row, price=None):
-    """A dataset of the study with these costs (tops,) of the axis at 1e-3, all tops of one stratum."""
+def tree(costs_by_row, price=None, met_at=None):
+    """A dataset of the study with these costs (tops,) of the axis at 1e-3, all tops of one stratum.
+
+    A row has the prices (2,) of the halves, or those at the tolerances 1e-2 and 1e-6, (2, 2); `met_at` (tops,) by row.
+    """
     names, table = list(costs_by_row), np.array(list(costs_by_row.values()))
     price = dict.fromkeys(names, (1.0, 1.0)) | (price or {})
+    met = np.array([(met_at or {}).get(name, np.zeros(table.shape[1])) for name in names], dtype=np.uint8)
+    dims = "scene", "integrator", "quantity", "target", "member"
     short = xr.Dataset(
-        {
-            "cost": (
-                ("scene", "integrator", "quantity", "target", "member"),
-                table[np.newaxis, :, np.newaxis, np.newaxis],
-            )
-        },
+        {name: (dims, values[np.newaxis, :, np.newaxis, np.newaxis])
+         for name, values in (("cost", table), ("met_at", met))},
         coords={"scene": ["population"], "integrator": names, "quantity": ["axis"], "target": [1e-3]},
-    )
+    )  # fmt: skip
     about = xr.Dataset({"stratum_place": ("member", np.zeros(table.shape[1]))}, coords={"stratum": ["slow"]})
-    halves = np.array([price[name] for name in names])
+    halves = np.array([np.broadcast_to(price[name], (2, 2)) for name in names])  # rows, tolerances, halves
     prices = xr.Dataset(
-        {"alone": (("scene", "integrator"), halves.min(axis=1)[np.newaxis]),
-         "alone_half": (("scene", "integrator", "half"), halves[np.newaxis])},
-        coords={"scene": ["population"], "integrator": names},
+        {"alone_by": (("scene", "integrator", "tolerance"), halves.min(axis=2)[np.newaxis]),
+         "alone_by_half": (("scene", "integrator", "tolerance", "half"), halves[np.newaxis])},
+        coords={"scene": ["population"], "integrator": names, "tolerance": [1e-2, 1e-6]},
     )  # fmt: skip
     return xr.DataTree.from_dict({"short": short, "tops": about, "prices": prices})
 
@@ -292,6 +297,100 @@ def test_prices_that_are_measured_again_differ_in_times_alone():
     assert (one["together"] < 0.5 * one["alone"]).values.tolist() == [True, False]
     assert differences(one, other) == []
     assert differences(one.rename(alone="price"), other.rename(alone="price")) != []
+
+
+def test_a_price_is_a_slope_whatever_a_call_costs():
+    call, each = 3e-5, 6e-9
+    samples = [tuple(call * noise + each * n for noise in (1.0, 1.2, 1.0, 1.1)) for n in (1e3, 1e4)]
+    pair = pricing.Pair(*((lambda: None, n) for n in (1e3, 1e4)))
+    slopes = pair.slopes(*(Timing(one, NAN) for one in samples), 4)
+    assert slopes == pytest.approx([each] * 3)
+    assert samples[1][0] / 1e4 > 1.4 * each  # the time of the long run over its evaluations
+
+
+@pytest.mark.parametrize("name", ["series-adaptive[axis]", "strang[axis]"])
+def test_a_call_that_is_dearer_makes_no_evaluation_dearer(name, monkeypatch):
+    """A solver that waits for 0.2 ms before it runs, of a row with a tolerance and of one with a step."""
+
+    def waiting(*args):
+        end = time.perf_counter() + 2e-4
+        while time.perf_counter() < end:
+            pass
+        return solver(*args)
+
+    row = integrator(name)
+    solver = row.solvers["axis"]
+    plain = float(prices([name], 9, 2e-3)["alone"][0])
+    monkeypatch.setattr(pricing, "integrator", lambda _: dataclasses.replace(row, solvers={"axis": waiting}))
+    assert float(prices([name], 9, 2e-3)["alone"][0]) == pytest.approx(plain, rel=0.3)
+
+
+def test_the_runs_that_are_timed_go_on_to_their_end():
+    """Ten times the nutations take ten times the evaluations; tops that leave the chart of angles took fewer."""
+    for name in (*EACH, "stormer-verlet[angles]", "rk4[angles]"):
+        row = integrator(name)
+        for pair in pricing.pairs(row).values():
+            lengths = pricing.LENGTHS["alone"] if pair.short[1] < 2e3 else pricing.LENGTHS["together"]
+            assert pair.long[1] / pair.short[1] == pytest.approx(lengths[1] / lengths[0], rel=0.5)
+    timed = prices(["stormer-verlet[angles]", "strang[axis]"], 3, 1e-3)["alone"].values
+    assert timed[0] < 3.0 * timed[1]  # both make one evaluation a step
+
+
+def test_rows_whose_order_follows_the_tolerance_are_timed_at_several():
+    assert pricing.tolerances_of(integrator("series-adaptive[axis]")) == pricing.TOLERANCES
+    assert pricing.tolerances_of(integrator("rk45-compiled[axis]")) == (pricing.TOLERANCE,)
+    timed = prices(["series-adaptive[axis]", "rk45-compiled[axis]"], 5, 1e-3)
+    by = timed["alone_by"].values
+    assert by[0, 0] > 1.2 * by[0, -1]
+    assert np.ptp(by[1]) == 0.0
+    assert np.array_equal(timed["alone"].values, timed["alone_by"].sel({"tolerance": pricing.TOLERANCE}).values)
+    assert (timed["together"] != timed["alone"]).all()  # tops of such rows share a call
+
+
+def test_an_evaluation_costs_what_it_does_at_the_tolerance_that_meets_the_target():
+    """Prices of 8 and 2 at 1e-2 and 1e-6, in logarithms: 4 between them, and the nearest beyond."""
+    by = {"a": [[8.0, 8.0], [2.0, 2.0]], "b": [[3.0, 3.0], [3.0, 3.0]]}
+    costs_of = {"a": [10.0, 10.0, 10.0, 10.0, INF], "b": [1.0, 1.0, 1.0, NAN, 1.0]}
+    data = tree(costs_of, by, {"a": [20, 40, 60, 90, 0]})
+    taken = verdicts.costs(data, Cell("short", "axis", 1e-3), "alone")
+    assert taken.of("a") == pytest.approx([80.0, 40.0, 20.0, 20.0, INF])
+    assert taken.of("b") == pytest.approx([3.0, 3.0, 3.0, INF, 3.0])
+    counted = verdicts.costs(data, Cell("short", "axis", 1e-3), "evaluations")
+    assert counted.of("a") == pytest.approx([10.0, 10.0, 10.0, 10.0, INF])
+
+
+def test_the_stored_tolerance_meets_the_target(tops, strang):
+    row = integrator("series-adaptive[axis]")
+    done = table_of(row, tops, guarded=0)
+    for target in (1e-3, 1e-6):
+        one = done.sel(quantity="axis", target=target)
+        met, cost = one["met_at"].values.astype(float), one["cost"].values
+        assert np.array_equal(met > 0, np.isfinite(cost))
+        for member in np.flatnonzero(met)[:6]:
+            alone = error_row(scene_of(tops, member), row, 10.0 ** (-met[member] / 10.0), tops.times[member, -1])
+            assert alone["axis"] < 10.0 * target
+            if met[member] > 40:  # the control: a tolerance a thousand times as large
+                loose = error_row(scene_of(tops, member), row, 10.0 ** (3 - met[member] / 10.0), tops.times[member, -1])
+                assert loose["axis"] > target
+    assert not strang["met_at"].values.any()
+
+
+def test_the_opening_says_which_row_meets_the_error_on_more_tops():
+    held = {name: ("scene", [value]) for name, value in (("nutations", 10.0), ("budget", 1e3))}
+    wider = {"a": [1.0] * 6 + [INF] * 4, "b": [3.0] * 10}
+    many = {name: values * 3 for name, values in wider.items()}  # tops of a kind, enough to tell
+    for given, kind in ((wider, False), (many, True)):
+        data = tree(given)
+        data["short"] = data["short"].to_dataset().assign(held)
+        assert ("on 100.0% of slow tops, and a on 60.0%" in unmet_sentence(data)) == kind
+    for given, row in ((wider, "b"), (wider | {"b": [3.0] * 6 + [INF] * 4}, "")):
+        data = tree(given)
+        data["short"] = data["short"].to_dataset().assign(held)
+        said = unmet_sentence(data)
+        assert ("b meets 1e-03 rad over 10 nutations on 100.0% of all tops, and a on 60.0%" in said) == bool(row)
+        taken = verdicts.costs(data, Cell("short", "axis", 1e-3), "alone")
+        assert verdicts.widest(verdicts.standings(taken)).name == (row or "a")
+        assert "of the tops that a row solves" in words.quantity_sentence(data, "axis")
 
 
 def test_standings_of_known_costs():
@@ -409,7 +508,9 @@ def test_the_titles_say_what_their_figures_show(quick_results):
     assert "wins" not in titles["run-lengths-alone"]  # it shows who has solved how many tops
     drawn = figures.draw_run_lengths(data, "alone").figure
     said = {text.get_text().strip() for axis in drawn.axes for text in axis.texts}
-    named = re.findall(r" in (\S+)", titles["run-lengths-alone"].replace(style.FIRM, "_").replace(",", ""))
+    assert "µs of force evaluations" in titles["run-lengths-alone"].replace(style.FIRM, " ")  # no run was timed
+    assert {axis.get_xlabel() for axis in drawn.axes} - {""} == {"force evaluations × measured price of one (µs)"}
+    named = re.findall(r" for (\S+)", titles["run-lengths-alone"].replace(style.FIRM, "_").replace(",", ""))
     assert named
     assert all(number.replace("_", " ") in said for number in named)
     for horizon, length in (("short", "10"), ("long", "100")):
@@ -429,6 +530,26 @@ def test_the_titles_say_what_their_figures_show(quick_results):
     assert shares == [text.get_text() for text in axis.texts if "%" in text.get_text()][:2]
     for bar, text in zip(axis.patches, shares, strict=False):
         assert f"{bar.get_width():.0%}" == text
+
+
+def test_the_silent_runs_at_small_steps_are_told_by_kind_of_top(quick_results):
+    data = datasets.read_any(quick_results / "population.nc")
+    share, group = words.hidden(data), data["short"].to_dataset().isel(scene=0)
+    counts = dict.fromkeys(verdicts.strata(data), 0.0)
+    for name in verdicts.judged_rows(data):
+        one = group.sel(integrator=name)
+        if str(one["control"].values) == "step_size":
+            fine = one["silent"].isel(level=np.flatnonzero(one["setting"].values >= words.FINE))
+            for kind, count in zip(counts, fine.sum("level").values, strict=True):
+                counts[kind] += count
+    assert share.kind == max(counts, key=counts.get)
+    assert share.of_kind <= counts[share.kind]  # settings at which some tops were not judged are left out
+    assert share.of_kind <= share.silent_fine <= sum(counts.values())
+    assert share.silent_fine == pytest.approx(share.fine * share.wrong_fine)
+    said = words.silent_sentence(data)
+    assert f"{share.of_kind:,.0f} of them on {share.kind} tops" in said
+    assert "within 10 nutations" in said
+    assert len(said) <= 400
 
 
 def test_the_wrong_runs_by_steps_are_those_of_the_rows_with_a_fixed_step(quick_results):
