@@ -12,6 +12,7 @@ from pathlib import Path
 from symtop.base import fingerprint, imports
 from symtop.base.python_files import execute, python_file
 from symtop.base.strangers import door
+from symtop.base.validate import SymtopError
 from symtop.methods.registry import integrators, is_built_in, split_name
 from symtop.model.scenes import added_scenes, scenes
 
@@ -27,7 +28,10 @@ def load(path: str | Path) -> list[str]:
     before = [*integrators().values(), *scenes().values()]
     modules = set(sys.modules)
     with door(f"plugin {file.name}"):
-        execute(f"symtop_plugin_{file.stem}", file)
+        try:
+            execute(f"symtop_plugin_{file.stem}", file)
+        except SymtopError as error:  # the names in it are the file's, and no options of a command
+            raise SymtopError(f"plugin {file.name}: {error}") from error
     parts = sorted(_parts(file, set(sys.modules) - modules))
     labels = {path: f"file {path.relative_to(file.parent).as_posix()} of plug-in {file.name}" for path in parts}
     labels[file] = f"plug-in {file.name}"

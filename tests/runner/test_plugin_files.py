@@ -4,8 +4,10 @@ import subprocess
 import sys
 
 import pytest
+from click.testing import CliRunner
 
 from symtop.base.fingerprint import changes
+from symtop.cli.main import main
 from symtop.runner import plugins
 
 REGISTER = "import symtop\nsymtop.register(symtop.runge_kutta({name!r}, ((), (1.0,)), W, order=2))\n"
@@ -105,3 +107,12 @@ def test_two_plugins_of_one_name_are_told_apart(tmp_path):
     assert first != second
     both = plugins.reasons(["plug-files-1", "plug-files-2"])
     assert both["plug-in plug.py"] not in (*first.values(), *second.values())
+
+
+def test_a_mistake_in_a_plugin_is_told_with_its_name_and_as_no_option_of_the_command(tmp_path):
+    text = "import symtop\nsymtop.Integrator(name='m', family='other', summary='', solvers={'angles': print}, {})\n"
+    plugin = write(tmp_path, plug=text.replace("{})", "symplectic='yes')"))
+    done = CliRunner().invoke(main, ["integrators", "--plugin", str(plugin)])
+    assert (done.exit_code, done.output) == (
+        2, "symtop: plugin plug.py: symplectic must be True, False or None, not 'yes'\n"
+    )  # fmt: skip
