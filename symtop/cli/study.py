@@ -14,7 +14,7 @@ from symtop.cli.common import as_text, warn
 from symtop.methods.registry import integrator
 from symtop.runner import check, run, scripts, settled, status, store
 from symtop.runner.pools import Workers
-from symtop.runner.study import Study
+from symtop.runner.study import Study, StudyError
 
 MOST_NAMED = 8  # integrators and scenes in a line of the status
 
@@ -24,6 +24,7 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
 
     Of several studies those that have no case of these integrators are told of and left out.
     """
+    _agree(names, every=every)
     chosen = scripts.names() if every else list(dict.fromkeys(names))
     if not chosen:
         raise SymtopError(f"name a study or use --all; known: {', '.join(scripts.names())}")
@@ -46,11 +47,25 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
     return [study for study in narrowed if study.name not in without]
 
 
+def _agree(names: Sequence[str], *, every: bool) -> None:
+    """Refuse options of which one would be ignored without a word."""
+    if names and every:
+        raise SymtopError(f"name studies or use --all, not both: {' '.join(names)} --all")
+    context = click.get_current_context(silent=True)
+    given = {} if context is None else context.params
+    for other in ("check", "fresh"):
+        if given.get("status") and given.get(other):
+            raise SymtopError(f"--status and --{other} must not be given together: --status computes nothing")
+
+
 def conduct(task: Callable[[Workers], int], jobs: int | None, scheduler: str | None) -> int:
     """Do a task with workers; returns the exit code."""
     try:
         with ending_on_sigterm(), Workers(jobs, scheduler) as workers:
             return task(workers)
+    except StudyError as error:  # said here: the names in it are no options of the command
+        warn(str(error))
+        return 2
     except (KeyboardInterrupt, TerminatedError) as stop:
         word, code = ("interrupted", INTERRUPTED) if isinstance(stop, KeyboardInterrupt) else ("terminated", TERMINATED)
         warn(f"{word}; what was computed is kept, and the same command goes on from there")
@@ -107,7 +122,11 @@ def _in_order(
 
 def show_status(studies: list[Study], results: Path, why: bool, as_json: bool, **grid: bool) -> int:
     """Show the state of every case, and with `why` the reason; 1 if some have failed."""
-    states = {study.name: status.status(study, results, why=why, **grid) for study in studies}
+    try:
+        states = {study.name: status.status(study, results, why=why, **grid) for study in studies}
+    except StudyError as error:
+        warn(str(error))
+        return 2
     if as_json:
         click.echo(as_text(states))
     for name, rows in {} if as_json else states.items():

@@ -15,6 +15,7 @@ MOST_TOLD = 3  # sentences of a study that has run
 
 def study(findings: dict[str, Any], results: Path, *, as_json: bool) -> dict[str, Any]:
     """Say what a study found, unless it is said as JSON; returns its summary."""
+    _check(findings)
     summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
     summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
     if not as_json:
@@ -24,6 +25,15 @@ def study(findings: dict[str, Any], results: Path, *, as_json: bool) -> dict[str
     for failure in findings["failures"]:
         click.echo(f"  {failure}", err=True)
     return summary
+
+
+def _check(findings: dict[str, Any]) -> None:
+    """Refuse findings that are no sentences, which older versions have stored."""
+    verdict = findings["verdict"]
+    if not isinstance(verdict, list) or not all(isinstance(sentence, str) for sentence in verdict):
+        from symtop.runner.study import sentences  # xarray: half a second
+
+        sentences(findings["study"], lambda: verdict)
 
 
 def end(summaries: Sequence[dict[str, Any]], results: Path, *, as_json: bool) -> None:
@@ -36,10 +46,10 @@ def end(summaries: Sequence[dict[str, Any]], results: Path, *, as_json: bool) ->
 
 def _sentences(findings: dict[str, Any], results: Path) -> None:
     """The first sentences of what a study found, and where the rest is."""
-    sentences, name = findings["verdict"], findings["study"]
-    for sentence in sentences[:MOST_TOLD]:
+    verdict, name = findings["verdict"], findings["study"]
+    for sentence in verdict[:MOST_TOLD]:
         click.echo(indented(sentence, "  - "))
-    left = len(sentences) - MOST_TOLD
+    left = len(verdict) - MOST_TOLD
     more = f", {counted(left, 'more finding')} in {name}.json" if left > 0 else ""
     pictures = f"figures {results / 'figures' / name}-*{more}" if findings["pictures"] else more.lstrip(", ")
     for line in filter(None, (f"dataset {results / name}.nc", pictures)):

@@ -6,6 +6,7 @@ the last bit.
 """
 
 import base64
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -26,7 +27,10 @@ from symtop.run.simulation import simulate
 TOP = ("I1", "I3", "mgl")
 START = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
 MOST_STEPS = 2_000_000  # of one run; the common kernels take a quarter of a second for them
-MOST_WORK = {"compiled": 2e6, "python": 2e5}  # force evaluations of an adaptive run, two seconds at most
+MOST_WORK = {"compiled": 2e6, "python": 2e5}  # of an adaptive run: force evaluations or Taylor steps
+MOST_SECONDS = 2.0  # of an adaptive run, where that much work would take longer
+LONG_ENOUGH = 0.02  # seconds of a trial that says what work costs
+FIRST_TRIAL = 16.0
 SAMPLES_A_NUTATION = 60
 FEWEST_SAMPLES, MOST_SAMPLES = 601, 4001  # of one run, whatever its nutations
 PORTRAIT = 361  # points of the exact phase curve, over one nutation
@@ -43,7 +47,7 @@ class Setup:
     @property
     def budget(self) -> float | None:
         """The most work of an adaptive run, which ends there and says so; None for a fixed step."""
-        return MOST_WORK[self.method.implementation] if self.method.control == "tolerance" else None
+        return _budget(self) if self.method.control == "tolerance" else None
 
     @property
     def samples(self) -> int:
@@ -52,6 +56,44 @@ class Setup:
         resolved = np.isfinite(period) and period > 0.0
         wanted = SAMPLES_A_NUTATION * self.scene.horizon / period if resolved else FEWEST_SAMPLES
         return round(min(max(wanted, FEWEST_SAMPLES), MOST_SAMPLES))
+
+
+_budgets: dict[tuple[str, int], float] = {}  # by method and decade of the tolerance: the same for a run and its script
+
+
+def _budget(chosen: Setup) -> float:
+    """As much work as takes two seconds, from a trial of the run itself, and at most `MOST_WORK`.
+
+    An evaluation costs 0.03 us to 40 us, and a step of a Taylor method 0.2 us to 1 ms, which grows as the tolerance
+    shrinks: no field of an integrator says as much.
+    """
+    tolerance = chosen.setting or 1.0
+    key = chosen.method.name, math.floor(math.log10(tolerance))
+    most = MOST_WORK[chosen.method.implementation]
+    if key in _budgets:
+        return _budgets[key]
+
+    def trial(work: float) -> tuple[float, bool]:
+        before = time.thread_time()  # what other threads do meanwhile does not count
+        run = simulate(
+            chosen.scene, chosen.method, tolerance=chosen.setting, observe="attitude", samples=2, guard=False,
+            budget=work,
+        )  # fmt: skip
+        return time.thread_time() - before, run.attrs["outcome"] == "out_of_budget"
+
+    trial(FIRST_TRIAL)  # its kernels are compiled
+    work, (fixed, longer) = FIRST_TRIAL, trial(FIRST_TRIAL)
+    seconds = fixed
+    while longer and seconds - fixed < LONG_ENOUGH:
+        work *= 4.0
+        if work >= most:
+            break
+        seconds, longer = trial(work)
+    if not longer:
+        return most  # it ends before: nothing is to be learned, nor to be afraid of
+    cost = (seconds - fixed) / (work - FIRST_TRIAL) if work < most else 0.0
+    affordable = MOST_SECONDS / cost if cost > 0.0 else most
+    return _budgets.setdefault(key, float(f"{min(most, affordable):.2g}"))
 
 
 def setup(fields: Mapping[str, Any]) -> Setup:

@@ -1,6 +1,6 @@
 """The explorer's server: a page with its files, and four actions, for this machine only.
 
-    GET  /  /style.css  /*.js           the page and its modules
+    GET  /  /style.css  /*.js           the page and its modules (HEAD: without the body; a query is ignored)
     GET  /catalogue                     scenes and integrators
     POST /run  /netcdf  /script  /map   one run: as arrays, as a file, as a script; a grid of runs
 
@@ -87,20 +87,35 @@ class Handler(BaseHTTPRequestHandler):
         """The page, its files and the catalogue."""
         if not self._is_local():
             return
-        if self.path in PAGES:
-            name, kind = PAGES[self.path]
+        if self.place in PAGES:
+            name, kind = PAGES[self.place]
             self._reply(200, (STATIC / name).read_bytes(), kind)
-        elif self.path == "/catalogue":
+        elif self.place == "/catalogue":
             self._reply(200, json.dumps(answers.catalogue()).encode(), "application/json")
         else:
-            self._refuse(404, f"there is no {self.path} here")
+            self._refuse(404, f"there is no {self.place} here")
+
+    do_HEAD = do_GET  # `_reply` leaves the body out
+
+    @property
+    def place(self) -> str:
+        """What is asked for, without its query."""
+        return self.path.partition("#")[0].partition("?")[0]
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:  # noqa: ARG002
+        """What the standard library refuses, a method or a line that it cannot read, in plain text."""
+        self.close_connection = True
+        if code == 501:
+            code, message = 405, f"{self.command} is not answered here; GET, HEAD and POST are"
+        said = message or self.responses[code][0] if code in self.responses else message or "refused"
+        self._reply(int(code), f"{said}\n".encode(), "text/plain; charset=utf-8")
 
     def do_POST(self) -> None:
         """One of the actions."""
         if not self._is_local():
             return
-        if self.path not in ACTIONS:
-            self._refuse(404, f"there is no {self.path} here")
+        if self.place not in ACTIONS:
+            self._refuse(404, f"there is no {self.place} here")
             return
         if self.headers.get_content_type() != "application/json":
             self._refuse(415, "a question must be JSON")
@@ -111,7 +126,7 @@ class Handler(BaseHTTPRequestHandler):
             if length > LONGEST_BODY:
                 self._refuse(413, f"a question must be at most {LONGEST_BODY} bytes, not {length}")
                 return
-            read, action, kind = ACTIONS[self.path]
+            read, action, kind = ACTIONS[self.place]
             chosen = read(_parsed(self.rfile.read(length)))
             with _at_work:
                 if self._has_left():
@@ -120,7 +135,7 @@ class Handler(BaseHTTPRequestHandler):
                 body = action(chosen)
         except SymtopError as error:
             # The page shows the sentence in place of a run, as an ordinary answer; a file cannot be replaced by it.
-            self._refuse(200 if self.path in ("/run", "/map") else 400, str(error))
+            self._refuse(200 if self.place in ("/run", "/map") else 400, str(error))
         except Exception as error:  # noqa: BLE001  (the page shows it, and the server keeps running)
             self._refuse(500, f"the run failed: {type(error).__name__}: {' '.join(str(error).split())}")
         else:
@@ -153,10 +168,13 @@ class Handler(BaseHTTPRequestHandler):
         self.send_header("Cache-Control", "no-store")
         self.send_header("Content-Security-Policy", POLICY)
         self.send_header("X-Content-Type-Options", "nosniff")
+        if status == 405:
+            self.send_header("Allow", "GET, HEAD, POST")
         if self.close_connection:
             self.send_header("Connection", "close")
         self.end_headers()
-        self.wfile.write(body)
+        if self.command != "HEAD":
+            self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing for a request."""

@@ -8,9 +8,8 @@ know of a method is a field of its record.
 A method in one of its charts is a *row* of a comparison, ``rk4[axis]``: method and chart are two factors, and a
 comparison of ``rk4[angles]`` with ``strang[axis]`` changes both. `rows` lists them; `integrator` knows them by name.
 
-The maps of physics engines, family ``engine``, are registered as every integrator is, judged by the claims table and
-run by name. They are what people are given, not what one would choose: `methods`, and so `rows` and every comparison
-and recommendation, leaves them out.
+The maps of physics engines, family ``engine``, are registered, judged and run by name as every integrator is. They are
+what people are given, not what one would choose: `methods`, and so `rows` and every comparison, leaves them out.
 """
 
 import importlib
@@ -21,14 +20,14 @@ import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symtop.base.signals import is_of_user
 from symtop.base.strangers import words_of
-from symtop.base.validate import SymtopError, SymtopWarning, finite, label, one_of, positive, shown, whole
+from symtop.base.validate import SymtopError, SymtopWarning, finite, label, not_negative, one_of, positive, shown, whole
 from symtop.base.walk import by_name
 from symtop.methods.about import paragraphs
 from symtop.methods.plan import Plan, Run
@@ -45,15 +44,21 @@ FAMILIES = (
     "discrete-lagrangian", "splitting", "runge-kutta", "lie-group", "taylor", "library", "exact", ENGINE, "other",
 )  # fmt: skip
 IMPLEMENTATIONS = ("compiled", "python")
-CONTROLS = ("step_size", "tolerance", None)
 ENERGY_ERRORS = ("kept", "bounded", None)
+ALLOWED: dict[str, tuple[Any, ...]] = {
+    **dict.fromkeys(("explicit", "symplectic", "symmetric"), (True, False, None)), "exact_steps": (True, False),
+    "control": ("step_size", "tolerance", None), "energy_error": ENERGY_ERRORS,
+}  # fmt: skip
+KINDS: dict[str, tuple[Any, str]] = {
+    **dict.fromkeys(("summary", "reference", "about"), (str, "text")), "same_steps_as": (str | None, "a name or None"),
+    **dict.fromkeys(("modified_energy", "sleeps_from"), (Callable | None, "a function or None")),
+}  # fmt: skip
 CONSERVED = ("energy", "p_phi", "p_psi", "axis_length", "cayley_energy")  # what a method may claim to conserve
-SMALLEST_FIRST = {
-    "nutation": ("angles", "axis", "attitude"),
-    "axis": ("axis", "angles", "attitude"),
+SMALLEST_FIRST = {  # the charts that show it, in order of preference
+    "nutation": ("angles", "axis", "attitude"), "axis": ("axis", "angles", "attitude"),
     "attitude": ("angles", "attitude"),
-}  # the charts that show it, in order of preference
-_ROW = re.compile(r"(.+)\[(\w*)\]")
+}  # fmt: skip
+_ROW = re.compile(r"(.+)\[(\w+)\]")
 _CLAIM = {True: "yes", False: "no", None: "unknown"}
 
 
@@ -120,24 +125,33 @@ class Integrator:
             whole("order", self.order, 1)
         one_of("family", self.family, FAMILIES)
         one_of("implementation", self.implementation, IMPLEMENTATIONS)
-        if not isinstance(self.control, str | None) or self.control not in CONTROLS:
-            raise SymtopError(f"control must be 'step_size', 'tolerance' or None, not {shown(self.control)}")
-        if self.energy_error not in ENERGY_ERRORS:
-            raise SymtopError(f"energy_error must be 'kept', 'bounded' or None, not {self.energy_error!r}")
-        given = self.solvers if isinstance(self.solvers, Mapping) else {}
-        if not given or not set(given) <= {"angles", "axis", "attitude"} or not all(map(callable, given.values())):
-            raise SymtopError(
-                f"solvers must map one of angles, axis, attitude to a function, not {shown(self.solvers)}"
-            )
-        object.__setattr__(self, "solvers", MappingProxyType(dict(self.solvers)))
+        self._check_kinds()
+        given = dict(self.solvers) if isinstance(self.solvers, Mapping) else {}
+        if not given or not set(given) <= {*DIMENSIONS} or not all(map(callable, given.values())):
+            charts = ", ".join(DIMENSIONS)
+            raise SymtopError(f"solvers must map one of {charts} to a function, not {shown(self.solvers)}")
+        object.__setattr__(self, "solvers", MappingProxyType(given))
         positive("speed", self.speed)
         if self.exact_steps and (self.order is not None or not self.fixed_step):
             raise SymtopError("exact_steps must be False for a method that has an order or no step_size")
         if self.conserves is not None:
             if isinstance(self.conserves, str) or not isinstance(self.conserves, Collection):
                 raise SymtopError(f"conserves must be a set of names, not {self.conserves!r}")
-            names = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in self.conserves)
-            object.__setattr__(self, "conserves", names)
+            kept = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in self.conserves)
+            object.__setattr__(self, "conserves", kept)
+
+    def _check_kinds(self) -> None:
+        for name, allowed in ALLOWED.items():
+            value = getattr(self, name)
+            if not isinstance(value, str | bool | np.bool_ | None) or value not in allowed:
+                *first, last = map(repr, allowed)
+                raise SymtopError(f"{name} must be {', '.join(first)} or {last}, not {shown(value)}")
+        for name, (kind, words) in KINDS.items():
+            if not isinstance(getattr(self, name), kind):
+                raise SymtopError(f"{name} must be {words}, not {shown(getattr(self, name))}")
+        least, usual = not_negative("least_tolerance", self.least_tolerance), self.default_tolerance
+        if usual is not None and not max(least, 5e-324) <= finite("default_tolerance", usual) < 1.0:
+            raise SymtopError(f"default_tolerance must be above zero, at least {least:g} and below 1, not {usual!r}")
 
     def check_tolerance(self, tolerance: object) -> float:
         """The tolerance to use, refused where the arithmetic cannot reach it."""
@@ -280,8 +294,7 @@ class _Integrators(dict[str, Integrator]):
         import pandas as pd  # 0.2 s
 
         with pd.option_context("display.max_colwidth", None):
-            html: str = pd.DataFrame([entry.record() for entry in self.values()]).to_html(index=False)
-        return html
+            return str(pd.DataFrame([entry.record() for entry in self.values()]).to_html(index=False))
 
 
 def _method_and_chart(name: str, registered: Collection[str]) -> tuple[str, str]:
@@ -316,9 +329,8 @@ def engines() -> dict[str, Integrator]:
 def integrator(name: "str | Integrator") -> Integrator:
     """The integrator of that name, or the row: ``rk4[axis]`` works in no other chart, nor does ``rk4-axis``, the same.
 
-    An Integrator is returned as is.
-
-    Raises SymtopError for an unknown name, with the nearest ones, and for a chart that the method does not have.
+    An Integrator is returned as is. Raises SymtopError for an unknown name, with the nearest ones, and for a chart that
+    the method does not have.
     """
     if isinstance(name, Integrator):
         return name
@@ -334,9 +346,5 @@ def integrator(name: "str | Integrator") -> Integrator:
 def rows(observe: str | None = None) -> list[Integrator]:
     """Each of `methods` in each of its charts, or in those that show the "nutation", the "axis" or the "attitude"."""
     showing = None if observe is None else SMALLEST_FIRST[one_of("observe", observe, SMALLEST_FIRST)]
-    return [
-        entry.row(chart)
-        for entry in methods().values()
-        for chart in entry.charts()
-        if showing is None or chart in showing
-    ]
+    pairs = ((entry, chart) for entry in methods().values() for chart in entry.charts())
+    return [entry.row(chart) for entry, chart in pairs if showing is None or chart in showing]

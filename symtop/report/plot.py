@@ -69,7 +69,7 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         ax.set(yscale="log", ylabel=QUANTITIES[quantity])
     else:
         shown = {name: variable for name, variable in data.data_vars.items() if variable.dims == ("time",)}
-        values = data[one_of("quantity", quantity, [*QUANTITIES, *map(str, shown)])]
+        values = data[one_of("quantity", quantity, dict.fromkeys([*QUANTITIES, *map(str, shown)]))]
         unit = values.attrs.get("units", "")
         ax.plot(times, values.values, color=color, lw=1.2)
         ax.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
@@ -83,9 +83,15 @@ def _unit(data: xr.Dataset) -> str:
 
 
 def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
-    one_of("quantity", quantity, QUANTITIES)
-    controls = [name for name in ("step_size", "tolerance") if data[name].notnull().any()]
-    x = one_of("x", x or (controls[0] if len(controls) == 1 else "force_evaluations"), map(str, data.data_vars))
+    one_of("quantity", quantity, [name for name in QUANTITIES if name in data])
+    for dim in ("scene", "integrator"):
+        if dim not in data.coords:
+            raise SymtopError(f"a sweep must have the {dim}s that it compares, as sweep gives them, not lack {dim}")
+        if dim not in data.dims:  # of one alone, as isel leaves it
+            data = data.expand_dims(dim)
+    controls = [name for name in ("step_size", "tolerance") if name in data and data[name].notnull().any()]
+    x = x or (controls[0] if len(controls) == 1 else "force_evaluations")
+    x = one_of("x", x, [str(name) for name, values in data.data_vars.items() if _can_be_x(values)])
     for number, scene in enumerate(data["scene"].values):
         for name in data["integrator"].values:
             cell = data.sel(scene=scene, integrator=name)
@@ -102,6 +108,11 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
             )  # fmt: skip
     ax.set(xscale="log", yscale="log", ylabel=f"largest {QUANTITIES[quantity]}", xlabel=x.replace("_", " "))
     ax.legend(fontsize=8, frameon=False)
+
+
+def _can_be_x(values: xr.DataArray) -> bool:
+    """Has it a number for each run of a sweep?"""
+    return values.dtype.kind in "iuf" and {*values.dims} == {"scene", "integrator", "setting"}
 
 
 def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None:

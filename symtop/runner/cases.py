@@ -11,12 +11,11 @@ from tqdm import tqdm
 
 from symtop.base.cache import is_terminal
 from symtop.base.progress import beating
-from symtop.base.validate import SymtopError
 from symtop.runner import plugins, store
 from symtop.runner.execute import execute
 from symtop.runner.pools import Workers
 from symtop.runner.scripts import file_of
-from symtop.runner.study import Case, Combined, Study
+from symtop.runner.study import Case, Combined, Study, StudyError, door
 from symtop.runner.work import Result, Task
 
 
@@ -53,7 +52,18 @@ class Round:
     def named(self, cases: Iterable[Case]) -> dict[Path, Case]:
         """Cases by their files, which this round now has."""
         asked = list(cases)
-        new = dict(zip(store.case_paths(self.results, self.study, asked), asked, strict=True))
+        try:
+            paths = store.case_paths(self.results, self.study, asked)
+        except Exception as error:
+            flawed = self.study.flawed(asked)
+            if flawed is not None:
+                raise flawed from error
+            if self.study.uses is not None:
+                with door(self.study.name, "uses"):
+                    for case in asked:
+                        self.study.uses(case)
+            raise
+        new = dict(zip(paths, asked, strict=True))
         self.paths |= new
         return new
 
@@ -65,7 +75,7 @@ class Round:
 
     def follow_up(self, *, fresh: bool) -> dict[Path, Case]:
         """Take the second round in, made from what the first one found; returns those that have to be computed."""
-        return {} if self.study.follow_up is None else self.add(self.study.follow_up(self.combined()), fresh=fresh)
+        return {} if self.study.follow_up is None else self.add(self.study.later(self.combined()), fresh=fresh)
 
     def look(self, paths: Iterable[Path]) -> None:
         """Read the files that are there and whole."""
@@ -105,5 +115,6 @@ class Round:
         """One dataset of all that was measured, or a tree of one for each group of cases."""
         if not self.done:
             why = self.failures[0] if self.failures else "the grid is empty"
-            raise SymtopError(f"study {self.study.name}: no case could be measured; {why}")
-        return store.combine([self.done[path] for path in self.paths if path in self.done])
+            raise StudyError(f"study {self.study.name}: no case could be measured; {why}")
+        with door(self.study.name, "combining what measure returned"):
+            return store.combine([self.done[path] for path in self.paths if path in self.done])

@@ -5,15 +5,15 @@ own, from the files of its cases, while the workers compute untimed cases of the
 done if it has begun, and if it has not, it waits for them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from symtop.base import datasets, locks
-from symtop.base.validate import label
+from symtop.base.validate import label, shown
 from symtop.runner import depends, plugins, scripts, seen, store
 from symtop.runner.cases import Round
-from symtop.runner.study import Case, Combined, Picture, Study
+from symtop.runner.study import Case, Chart, Combined, Opening, Picture, Study, StudyError, Table, door, sentences
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,18 +73,20 @@ def findings_of(
     study: Study, data: Combined, results: Path, save: Save | None, *, failures: list[str], cases: int
 ) -> dict[str, Any]:
     """Draw a dataset and say what it shows, as the report wants it."""
-    pictures = [] if save is None else [_save(results, study, picture, save) for picture in study.pictures(data)]
-    first = None
-    if study.opening is not None:
-        opening = study.opening(data)
-        first = opening._asdict() | {"table": opening.table._asdict(), "explained": dict(opening.explained)}
+    said = sentences(study.name, lambda: study.verdict(data))
+    tables = door(study.name, "tables").each(lambda: study.tables(data), Table, "a list of Table")
+    charts = door(study.name, "charts").each(lambda: study.charts(data), Chart, "a list of Chart")
+    rest = {
+        "tables": [table._asdict() for table in tables],
+        "charts": [chart._asdict() for chart in charts],
+        "opening": _opening(study, data),
+    }
+    pictures = [] if save is None else [_save(results, study, picture, save) for picture in _pictures(study, data)]
     return {
         "study": study.name,
         **{name: getattr(study, name) for name in ("title", "question", "how_to_read")},
-        "verdict": study.verdict(data),
-        "tables": [table._asdict() for table in study.tables(data)],
-        "charts": [chart._asdict() for chart in study.charts(data)],
-        "opening": first,
+        "verdict": said,
+        **rest,
         "pictures": pictures,
         "failures": failures,
         "cases": cases,
@@ -93,8 +95,34 @@ def findings_of(
     }
 
 
+def _opening(study: Study, data: Combined) -> dict[str, Any] | None:
+    if study.opening is None:
+        return None
+    asked = door(study.name, "opening")
+    with asked:
+        opening = study.opening(data)
+        if not isinstance(opening, Opening):
+            raise asked.refuse("an Opening", opening)
+        return opening._asdict() | {"table": opening.table._asdict(), "explained": dict(opening.explained)}
+
+
+def _pictures(study: Study, data: Combined) -> Iterator[Picture]:
+    """The pictures one by one; StudyError for what is none."""
+    for picture in door(study.name, "pictures").each(lambda: study.pictures(data), Picture, "or yield Pictures"):
+        wrong = [key for key in ("name", "caption", "alt", "lead") if not isinstance(getattr(picture, key), str)]
+        if wrong:
+            what = f"{wrong[0]} that is text, not {shown(getattr(picture, wrong[0]))}"
+            raise StudyError(f"study {study.name}: a Picture must have a {what}")
+        if not hasattr(picture.figure, "savefig"):
+            kind = type(picture.figure).__name__
+            raise StudyError(f"study {study.name}: the figure of a Picture must be one of matplotlib, not a {kind}")
+        with door(study.name, "pictures"):
+            label("name of a picture", picture.name)
+        yield picture
+
+
 def _save(results: Path, study: Study, picture: Picture, save: Save) -> dict[str, str]:
     suffix = getattr(picture.figure, "suffix", "png")  # a film is a GIF
-    file = f"{study.name}-{label('name of a picture', picture.name)}.{suffix}"
+    file = f"{study.name}-{picture.name}.{suffix}"
     save(picture.figure, results / "figures" / file)
     return {"file": file} | {key: getattr(picture, key) for key in ("name", "caption", "alt", "lead")}

@@ -1,17 +1,23 @@
-"""Plug-ins: a user's Python file that registers integrators and scenes of its own."""
+"""Plug-ins: a user's Python file that registers integrators and scenes of its own.
 
-from collections.abc import Iterable
+A plug-in counts with the files of its folder that it imports, each by a label of its own: by import statements,
+wherever they stand, and by what was loaded while it ran, under a name that is made at run time. Another file beside it
+counts for nothing. If the folder is a package, names that begin with the package's are found, too.
+"""
+
+import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from symtop.base import fingerprint
+from symtop.base import fingerprint, imports
 from symtop.base.python_files import execute, python_file
 from symtop.base.strangers import door
+from symtop.base.validate import SymtopError
 from symtop.methods.registry import integrators, is_built_in, split_name
 from symtop.model.scenes import added_scenes, scenes
 
-MOST_NEIGHBOURS = 100  # files beside a plug-in that count, because it may import them
-_loaded: dict[Path, str] = {}  # files of plug-ins in use, and their hashes
-_owners: dict[str, tuple[str, str]] = {}  # of an integrator or a scene: the label and hash of its plug-in
+_loaded: dict[Path, fingerprint.Reasons] = {}  # files of plug-ins in use, with what they were made of
+_owners: dict[str, Path] = {}  # of an integrator or a scene: its plug-in
 
 
 def load(path: str | Path) -> list[str]:
@@ -20,19 +26,71 @@ def load(path: str | Path) -> list[str]:
     if file in _loaded:
         return _registered_by(file)
     before = [*integrators().values(), *scenes().values()]
+    modules = set(sys.modules)
     with door(f"plugin {file.name}"):
-        execute(f"symtop_plugin_{file.stem}", file)
-    beside = [file, *sorted(file.parent.glob("*.py"))[:MOST_NEIGHBOURS]]
-    _loaded[file] = fingerprint.hashed(*(fingerprint.file_hash(path) for path in beside))
-    made_of = f"plug-in {file.name}", _loaded[file]
+        try:
+            execute(f"symtop_plugin_{file.stem}", file)
+        except SymtopError as error:  # the names in it are the file's, and no options of a command
+            raise SymtopError(f"plugin {file.name}: {error}") from error
+    parts = sorted(_parts(file, set(sys.modules) - modules))
+    labels = {path: f"file {path.relative_to(file.parent).as_posix()} of plug-in {file.name}" for path in parts}
+    labels[file] = f"plug-in {file.name}"
+    _loaded[file] = {label: fingerprint.file_hash(path) for path, label in labels.items()}
     for name, entry in (*integrators().items(), *scenes().items()):
         if not any(entry is known for known in before):
-            _owners[name] = made_of
+            _owners[name] = file
     return _registered_by(file)
 
 
+def _parts(plugin: Path, new: Iterable[str]) -> set[Path]:
+    """The files of a plug-in's folder that it imports, those that they import, and so on, and the plug-in."""
+    parts: set[Path] = set()
+    ahead = {plugin, *(path for name in new for path in _file_of(name, plugin.parent))}
+    while ahead:
+        parts |= ahead
+        ahead = {path for file in ahead for path in _imported(file, plugin.parent)} - parts
+    return parts
+
+
+def _imported(file: Path, folder: Path) -> Iterator[Path]:
+    """The files of a folder that a file of it imports: loaded modules, or files where the statements say."""
+    above = [place for place in (file.parent, *file.parent.parents) if folder in (place, *place.parents)]
+    if (folder / "__init__.py").is_file():
+        above.append(folder.parent)
+    try:
+        statements = imports.imported(file)
+    except (OSError, ValueError):
+        return
+    for module, names in statements:
+        for dotted in (module, *(f"{module}.{name}".lstrip(".") for name in names)):
+            yield from _file_of(dotted, folder)
+            steps = [step for step in dotted.split(".") if step]
+            for place in above:
+                for k in range(len(steps)):
+                    path = place.joinpath(*steps[: k + 1])
+                    yield from (one for one in (path.with_name(f"{path.name}.py"), path / "__init__.py")
+                                if _counts(one, folder))  # fmt: skip
+
+
+def _file_of(module: str, folder: Path) -> Iterator[Path]:
+    """The file of a loaded module, if it is one of the folder's."""
+    file = getattr(sys.modules.get(module), "__file__", None)
+    if isinstance(file, str) and file.endswith(".py") and _counts(path := Path(file).resolve(), folder):
+        yield path
+
+
+def _counts(file: Path, folder: Path) -> bool:
+    """Is it a file of the folder, and of no package that counts in another way, or by its version?"""
+    if folder not in file.parents or not file.is_file() or imports.root_of(file.resolve()):
+        return False
+    return "site-packages" not in file.parts and not any(
+        Path(prefix) in file.parents and Path(prefix) not in (folder, *folder.parents)
+        for prefix in (sys.prefix, sys.base_prefix)
+    )
+
+
 def _registered_by(file: Path) -> list[str]:
-    return [name for name, made_of in _owners.items() if made_of == (f"plug-in {file.name}", _loaded[file])]
+    return [name for name, owner in _owners.items() if owner == file]
 
 
 def loaded() -> list[str]:
@@ -42,7 +100,7 @@ def loaded() -> list[str]:
 
 def reasons(names: Iterable[str]) -> fingerprint.Reasons:
     """Hashes of the plug-ins that registered some integrators and scenes."""
-    return fingerprint.merged(dict([_owners[name]]) for name in names if name in _owners)
+    return fingerprint.merged(_loaded[_owners[name]] for name in names if name in _owners)
 
 
 def is_local(name: str) -> bool:

@@ -4,14 +4,17 @@ A study is a question, a grid of cases, a function that measures one case, and f
 dataset into figures, tables and sentences. It holds no numerics of its own.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+import json
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from types import MappingProxyType, TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import xarray as xr
 
-from symtop.base.validate import SymtopError, label
+from symtop.base.signals import is_of_user
+from symtop.base.strangers import words_of
+from symtop.base.validate import SymtopError, label, shown
 from symtop.methods.registry import split_name
 
 if TYPE_CHECKING:
@@ -19,6 +22,59 @@ if TYPE_CHECKING:
 
 REFERENCE = "exact"  # the integrator that is the closed form
 Combined = xr.Dataset | xr.DataTree  # what a study measured: a tree if its cases are in groups
+LONGEST = 120  # characters of a value that is told
+
+
+class StudyError(SymtopError):
+    """A function of a study failed or returned what it must not; the names in the sentence are the study's own."""
+
+
+class door:
+    """Within it, whatever a function of a study raises becomes a StudyError that names both."""
+
+    __slots__ = ("function", "study")
+
+    def __init__(self, study: str, function: str) -> None:
+        self.study, self.function = study, function
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is not None and not isinstance(error, StudyError) and not is_of_user(error):
+            words = error if isinstance(error, SymtopError) else words_of(error)
+            raise StudyError(f"study {self.study}: {self.function} failed: {words}") from error
+
+    def refuse(self, wanted: str, given: object) -> StudyError:
+        """The sentence on what the function returned."""
+        text = " ".join(shown(given).split())
+        told = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
+        return StudyError(f"study {self.study}: {self.function} must return {wanted}, not {told}")
+
+    def each(self, make: Callable[[], Any], kind: type, wanted: str) -> Iterator[Any]:
+        """What the function returns or yields, one by one, each of which must be of that kind."""
+        with self:
+            made = make()
+        if isinstance(made, (str, bytes, Mapping, kind)) or not isinstance(made, Iterable):
+            raise self.refuse(wanted, made)
+        entries, nothing = iter(made), object()
+        while True:
+            with self:
+                entry = next(entries, nothing)
+            if entry is nothing:
+                return
+            if not isinstance(entry, kind):
+                raise StudyError(
+                    f"study {self.study}: {self.function} must return {wanted}; an entry is a {type(entry).__name__}"
+                )
+            yield entry
+
+
+def sentences(study: str, verdict: Callable[[], Any]) -> list[str]:
+    """The findings that the verdict of a study returns. Raises StudyError if they are no list of sentences."""
+    return list(door(study, "verdict").each(verdict, str, "a list of sentences"))
 
 
 class Picture(NamedTuple):
@@ -98,6 +154,23 @@ class Case:
         """The scene and the integrators."""
         return self.scene, *self.integrators
 
+    def flaw(self) -> str:
+        """What of it cannot be stored or compared, in words; empty if nothing is wrong."""
+        for name in ("scene", "integrator", "group"):
+            if not isinstance(value := getattr(self, name), str):
+                return f"{name} must be a name, not {shown(value)[:LONGEST]}"
+        if not isinstance(self.settings, Mapping):
+            return f"settings must be a mapping of names to values, not {shown(self.settings)[:LONGEST]}"
+        for key, value in self.settings.items():
+            if not isinstance(key, str):
+                return f"the name of a setting must be text, not {shown(key)[:LONGEST]}"
+            try:
+                json.dumps(value)
+            except (TypeError, ValueError, RecursionError):
+                held = "numbers of Python, text, lists or mappings, which JSON can hold"
+                return f"setting {key!r} must be {held}, not {shown(value)[:LONGEST]}"
+        return ""
+
     @property
     def label(self) -> str:
         """A name that is safe in a file: ``spheroid--rk4@axis`` for the row rk4[axis]."""
@@ -136,7 +209,24 @@ class Study:
 
     def grid(self, *, quick: bool = False, full: bool = False) -> list[Case]:
         """The cases of the first round: the coarse grid, the ordinary one, or the longest there is."""
-        return self.full() if full and self.full is not None else self.cases(quick)
+        longest = self.full if full else None
+        return self.listed("cases", lambda: self.cases(quick)) if longest is None else self.listed("full", longest)
+
+    def later(self, data: Combined) -> list[Case]:
+        """The cases of the second round."""
+        follow_up = self.follow_up
+        return [] if follow_up is None else self.listed("follow_up", lambda: follow_up(data))
+
+    def listed(self, function: str, make: Callable[[], list[Case]]) -> list[Case]:
+        """The cases that one of its functions returns. Raises StudyError if they are no list of cases."""
+        return list(door(self.name, function).each(make, Case, "a list of Case"))
+
+    def flawed(self, cases: Iterable[Case]) -> StudyError | None:
+        """The sentence on the first case that cannot be stored, if there is one."""
+        for case in cases:
+            if flaw := case.flaw():
+                return StudyError(f"study {self.name}: a Case of {case.integrator} on {case.scene} is wrong: {flaw}")
+        return None
 
     def only(self, names: Collection[str]) -> "Study":
         """The same study with the cases of some methods, or rows, alone; SymtopError if it has none of them.
@@ -147,13 +237,16 @@ class Study:
         wanted = {*names, REFERENCE}
 
         def asked(cases: list[Case]) -> list[Case]:
-            return [case for case in cases if any({name, split_name(name)[0]} & wanted for name in case.integrators)]
+            whole = [*door(self.name, "cases").each(lambda: cases, Case, "a list of Case")]
+            if (error := self.flawed(whole)) is not None:
+                raise error
+            return [case for case in whole if any({name, split_name(name)[0]} & wanted for name in case.integrators)]
 
         def first(quick: bool) -> list[Case]:
             kept = asked(self.cases(quick))
             alone = all({*case.integrators} <= {REFERENCE} for case in kept)
             if not kept or (alone and REFERENCE not in names):
-                raise SymtopError(f"study {self.name} has no case of {', '.join(names)}")
+                raise StudyError(f"study {self.name} has no case of {', '.join(names)}")
             return kept
 
         def able(answer: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -161,8 +254,10 @@ class Study:
                 try:
                     return answer(data)
                 except Exception as error:
+                    if isinstance(error, StudyError):
+                        raise
                     sentence = f"study {self.name} compares methods and has no answer with {', '.join(names)} alone"
-                    raise SymtopError(f"{sentence}; name more of them") from error
+                    raise StudyError(f"{sentence}; name more of them") from error
 
             return answered
 

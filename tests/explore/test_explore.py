@@ -225,6 +225,75 @@ def test_an_adaptive_run_that_takes_too_long_ends_and_says_so():
     assert f"budget={chosen.budget!r}" in answers.script(chosen)
 
 
+@pytest.mark.parametrize(
+    ("method", "tolerance"),
+    [("taylor-quad", 1e-30), ("taylor-quad", 1e-6), ("taylor-longdouble", 1e-12), ("radau", 1e-6), ("rk45", 1e-9)],
+)
+def test_a_run_to_its_budget_takes_two_seconds_within_a_factor_of_two(method, tolerance):
+    """Processor time of this thread: other processes do not count."""
+    answers._budgets.clear()
+    chosen = answers.setup(fields(integrator=method, tolerance=tolerance, horizon=1e6))
+    before = time.thread_time()
+    assert chosen.budget <= answers.MOST_WORK[chosen.method.implementation]
+    learnt = time.thread_time()
+    assert learnt - before < 2.0
+    run = answers.dataset(chosen, str)
+    assert time.thread_time() - learnt < 2.0 * answers.MOST_SECONDS
+    assert run.attrs["outcome"] == "out_of_budget"
+    again = answers.setup(fields(integrator=method, tolerance=tolerance, horizon=1e6))
+    assert again.budget == chosen.budget  # a script has the same
+    assert f"budget={chosen.budget!r}" in answers.script(again)
+
+
+def test_a_cheap_method_and_a_short_run_have_the_whole_budget():
+    for method, horizon in (("rk45-compiled", 1e6), ("taylor-quad", 0.5)):
+        answers._budgets.clear()
+        chosen = answers.setup(fields(integrator=method, tolerance=1e-9, horizon=horizon))
+        assert chosen.budget == answers.MOST_WORK["compiled"]
+    assert answers.setup(fields()).budget is None
+    assert answers.answer(chosen)["outcome"] == "ok"
+
+
+def test_two_runs_that_never_end_do_not_keep_a_small_one_waiting(site):
+    """Both places of a machine of two cores, by clients that leave."""
+    hard = json.dumps(fields(integrator="taylor-quad", tolerance=1e-30, horizon=1e6)).encode()
+    head = f"POST /run HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {len(hard)}"
+    for _ in range(2):
+        with socket.create_connection(site.server_address) as browser:
+            browser.sendall(f"{head}\r\n\r\n".encode() + hard)
+            time.sleep(0.3)  # it has begun
+    began = time.monotonic()
+    status, body, _ = request(site, "POST", "/run", json.dumps(fields()), **JSON)
+    assert (status, json.loads(body)["outcome"]) == (200, "ok")
+    assert time.monotonic() - began < 25.0  # 5 s on two free cores
+
+
+def test_a_query_is_ignored(site):
+    assert request(site, "GET", "/?x=1")[1] == request(site, "GET", "/")[1]
+    assert request(site, "GET", "/catalogue?")[0] == 200
+    assert request(site, "GET", "/no?/catalogue")[0] == 404
+    assert "energy" in json.loads(request(site, "POST", "/run?x=1", json.dumps(fields()), **JSON)[1])["largest"]
+
+
+@pytest.mark.parametrize(("path", "status"), [("/", 200), ("/explore.js?x", 200), ("/catalogue", 200), ("/no", 404)])
+def test_head_is_get_without_a_body(site, path, status):
+    whole, bare = request(site, "GET", path), request(site, "HEAD", path)
+    assert (whole[0], bare[0], bare[1]) == (status, status, b"")
+    assert int(bare[2]["Content-Length"]) == len(whole[1])
+    assert request(site, "HEAD", path, Host="evil.example")[0] == 403
+
+
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "PATCH", "NONSENSE"])
+def test_other_methods_are_refused_in_plain_text(site, method):
+    status, body, headers = request(site, method, "/run", "{}" if method != "OPTIONS" else None)
+    assert (status, body.decode()) == (405, f"{method} is not answered here; GET, HEAD and POST are\n")
+    assert headers["Content-Type"].startswith("text/plain")
+    assert headers["Allow"] == "GET, HEAD, POST"
+    with socket.create_connection(site.server_address) as browser:
+        browser.sendall(b"rubbish\r\n\r\n")
+        assert b"<" not in browser.recv(65536)
+
+
 def test_nothing_on_the_page_comes_from_elsewhere():
     for path in STATIC.iterdir():
         assert not re.search(r"https?://|//cdn|@import|eval\(", path.read_text()), path.name

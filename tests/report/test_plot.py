@@ -72,3 +72,44 @@ def test_failed_runs_are_named_and_angles_end_at_pi(quantity, most):
         assert drawn.max() <= most
         assert (drawn.max() == most) == fail
         plt.close(ax.figure)
+
+
+@pytest.fixture(scope="module")
+def sweep():
+    options = {"step_size": [0.1, 0.05], "tolerance": [1e-3, 1e-6], "horizon": 4.0, "quiet": True}
+    return symtop.sweep(["spheroid", "goldstein"], ["rk4", "rk45"], **options)
+
+
+@pytest.mark.parametrize("x", ["outcome", "message", "chart", "scene", "no-such", 3])
+def test_what_is_no_number_of_each_run_is_no_x_of_a_sweep(sweep, x):
+    with pytest.raises(
+        SymtopError, match=r"^x .* is unknown; (known: step_size, tolerance, steps|did you mean)"
+    ) as said:
+        symtop.plot(sweep, plt.figure().gca(), x=x)
+    assert "outcome," not in str(said.value)
+    ax = symtop.plot(sweep, plt.figure().gca(), x="steps")
+    assert len(ax.get_lines()) == 4
+    plt.close("all")
+
+
+def test_one_integrator_or_scene_of_a_sweep_is_drawn(sweep):
+    whole = {line.get_label(): line for line in symtop.plot(sweep, plt.figure().gca(), x="steps").get_lines()}
+    for part in (sweep.isel(integrator=0), sweep.isel(scene=1), sweep.isel(integrator=0, scene=1)):
+        lines = symtop.plot(part, plt.figure().gca(), x="steps").get_lines()
+        assert len(lines) == (2 if "scene" in part.dims else 1) * (2 if "integrator" in part.dims else 1)
+        labels = [line.get_label() for line in lines]
+        if "scene" not in part.dims:
+            labels = [f"{label} on goldstein" for label in labels]
+        for label, line in zip(labels, lines, strict=True):
+            assert np.array_equal(line.get_ydata(), whole[label].get_ydata())
+    with pytest.raises(SymtopError, match="a sweep must have the scenes that it compares"):
+        symtop.plot(sweep.isel(scene=0, drop=True), plt.figure().gca())
+    plt.close("all")
+
+
+def test_names_of_quantities_are_told_once(run):
+    for data in (run, symtop.errors(run)):
+        with pytest.raises(SymtopError, match="is unknown; did you mean") as said:
+            symtop.plot(data, plt.figure().gca(), quantity="thet")
+        assert str(said.value).count(" theta ") == 1
+    plt.close("all")

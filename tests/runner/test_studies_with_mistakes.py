@@ -1,0 +1,176 @@
+"""A mistake in a study of one's own is told in one sentence that names the study and its function; cases are kept."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+from symtop.base.validate import SymtopError
+from symtop.cli.main import main
+from symtop.runner import run as runner
+from symtop.runner.study import Case, StudyError, sentences
+
+SCRIPT = """\
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+import symtop
+from symtop import Case, Picture, Study, Table
+
+def cases(quick):
+    return [Case("spheroid", name, {{"step_size": 0.1}}) for name in ("rk4", "strang")]
+
+def measure(case):
+    return xr.Dataset({{"err": 1.0}})
+
+def pictures(data):
+    figure = Figure()
+    figure.subplots()
+    yield Picture("one", figure, "caption", "alt")
+
+def verdict(data):
+    return ["a sentence"]
+
+more = {{}}
+{change}
+STUDY = Study(name="mine", title="t", question="q", how_to_read="h", cases=cases, measure=measure, pictures=pictures,
+              verdict=verdict, **more)
+"""
+
+
+def ran(folder, change, *words):
+    """Exit code and output of a study that is right but for a change."""
+    script = folder / "mine.py"
+    script.write_text(SCRIPT.format(change=change))
+    sys.modules.pop("symtop_study_mine", None)  # of an earlier text
+    command = ["study", str(script), "--jobs", "1", "--results", str(folder / "results"), *words]
+    done = CliRunner().invoke(main, command)
+    assert done.exception is None or isinstance(done.exception, SystemExit), repr(done.exception)
+    return done.exit_code, done.output
+
+
+def test_the_study_itself_is_right(tmp_path):
+    code, output = ran(tmp_path, "")
+    assert code == 0, output
+    assert "2 of 2 cases computed, 1 figure" in output
+    assert "  - a sentence\n" in output
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ("cases = lambda quick: None", "cases must return a list of Case, not None"),
+        ("cases = lambda quick: ['rk4']", "cases must return a list of Case; an entry is a str"),
+        ("cases = lambda quick: 1 / 0", "cases failed: ZeroDivisionError"),
+        ("cases = lambda quick: [Case('spheroid', 'rk4', {'a': np.arange(3.0)})]", "setting 'a' must be numbers"),
+        ("cases = lambda quick: [Case('spheroid', 'rk4', {'step_size': object()})]", "setting 'step_size' must be"),
+        ("cases = lambda quick: [Case('spheroid', 'rk4', [0.1])]", "settings must be a mapping"),
+        ("cases = lambda quick: [Case(3, 'rk4', {})]", "scene must be a name, not 3"),
+        ("more = {'uses': lambda case: 1 / 0}", "uses failed: ZeroDivisionError"),
+    ],
+)
+@pytest.mark.parametrize("words", [(), ("--status",), ("--check",), ("--only", "rk4")])
+def test_a_grid_that_is_none_is_refused(tmp_path, change, says, words):
+    code, output = ran(tmp_path, change, *words)
+    assert code == 2, output
+    assert output.startswith("symtop: study mine: ")
+    assert output.count("\n") == 1
+    assert says in output
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ("verdict = lambda data: None", "verdict must return a list of sentences, not None"),
+        ("verdict = lambda data: 'one sentence'", "verdict must return a list of sentences, not 'one sentence'"),
+        ("verdict = lambda data: [1.0]", "verdict must return a list of sentences; an entry is a float"),
+        ("verdict = lambda data: data['no']", "verdict failed: KeyError"),
+        ("verdict = lambda data: [symtop.simulate('spheroid', 'rk4', step_size=np.nan).title]",
+         "verdict failed: step_size must be a finite number"),
+        ("pictures = lambda data: None", "pictures must return or yield Pictures, not None"),
+        ("pictures = lambda data: iter([Figure()])", "pictures must return or yield Pictures; an entry is a Figure"),
+        ("pictures = lambda data: [Picture('a', 'a.png', 'caption', 'alt')]", "must be one of matplotlib, not a str"),
+        ("pictures = lambda data: [Picture('a', Figure(), None, 'alt')]", "must have a caption that is text, not None"),
+        ("pictures = lambda data: [Picture('../a', Figure(), 'caption', 'alt')]", "name of a picture must be"),
+        ("pictures = lambda data: (1 / 0 for _ in 'x')", "pictures failed: ZeroDivisionError"),
+        ("more = {'tables': lambda data: Table('t', ['a'], [['b']])}", "tables must return a list of Table, not Table"),
+        ("more = {'charts': lambda data: None}", "charts must return a list of Chart, not None"),
+        ("more = {'opening': lambda data: None}", "opening must return an Opening, not None"),
+        ("more = {'follow_up': lambda data: None}", "follow_up must return a list of Case, not None"),
+    ],
+)  # fmt: skip
+def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path, change, says):
+    code, output = ran(tmp_path, change)
+    assert code == 2, output
+    assert output.startswith("symtop: study mine: ")
+    assert output.count("\n") == 1
+    assert says in output
+    assert len(list(tmp_path.rglob("cases/mine/*.nc"))) == 2
+    code, output = ran(tmp_path, "")
+    assert code == 0, output
+    assert "0 of 2 cases computed, 1 figure" in output
+
+
+def test_a_step_that_is_nan_in_a_measure_is_no_option_of_the_command(tmp_path):
+    change = "measure = lambda case: symtop.simulate(case.scene, case.integrator, step_size=float('nan'))"
+    code, output = ran(tmp_path, change)
+    assert code == 2
+    assert "study mine: no case could be measured; rk4 on spheroid failed: step_size must be a finite" in output
+
+
+def test_measures_that_do_not_fit_together_are_told_of(tmp_path):
+    shape = "('k', [1.0]) if case.integrator == 'rk4' else 1.0"
+    code, output = ran(tmp_path, f"measure = lambda case: xr.Dataset({{'err': {shape}}})")
+    assert code in (0, 2), output  # what fits is the store's matter; a traceback it is not
+
+
+def test_findings_of_an_older_version_are_not_told_letter_by_letter(tmp_path):
+    assert ran(tmp_path, "")[0] == 0
+    file = tmp_path / "results" / "mine.json"
+    for verdict in (None, "one sentence"):
+        file.write_text(json.dumps(json.loads(file.read_text()) | {"verdict": verdict}))
+        code, output = ran(tmp_path, "")
+        assert (code, output) == (2, f"symtop: study mine: verdict must return a list of sentences, not {verdict!r}\n")
+
+
+def test_sentences_may_come_in_any_order_of_things():
+    assert sentences("mine", lambda: ("a", "b")) == ["a", "b"]
+    assert sentences("mine", lambda: iter(["a"])) == ["a"]
+    assert sentences("mine", list) == []
+    for bad in ("a", b"a", {"a": 1}, 3, [None]):
+        with pytest.raises(StudyError, match="study mine: verdict must return a list of sentences"):
+            sentences("mine", lambda bad=bad: bad)
+
+
+@pytest.mark.parametrize("settings", [{}, {"a": [1, 2.0, None, "x", {"b": True}]}, {"a": np.float64(0.1)}, {"a": (1,)}])
+def test_settings_that_json_can_hold_are_right(settings):
+    assert Case("spheroid", "rk4", settings).flaw() == ""
+
+
+def test_what_python_raises_is_kept_as_the_cause(tmp_path):
+    script = tmp_path / "mine.py"
+    script.write_text(SCRIPT.format(change="verdict = lambda data: 1 / 0"))
+    sys.modules.pop("symtop_study_mine", None)
+    with pytest.raises(SymtopError, match="verdict failed: ZeroDivisionError") as caught:
+        runner.run(runner.load(str(script)), tmp_path / "results", jobs=1, quiet=True)
+    assert isinstance(caught.value.__cause__, ZeroDivisionError)
+    assert xr.open_dataset(tmp_path / "results" / "mine.nc").sizes["integrator"] == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--status", "--check"), "--status and --check must not be given together"),
+        (("--status", "--fresh"), "--status and --fresh must not be given together"),
+        (("--all",), "name studies or use --all, not both"),
+    ],
+)
+def test_options_that_would_be_ignored_are_refused(tmp_path, words, says):
+    code, output = ran(tmp_path, "", *words)
+    assert code == 2
+    assert says in output
+    assert not (tmp_path / "results").exists()
+    assert ran(tmp_path, "", "--status")[0] == 0
