@@ -9,7 +9,7 @@ import xarray as xr
 from symtop.methods.registry import integrator, rows
 from symtop.runner.study import Case, Study
 
-from ..population.prices import prices
+from ..population.prices import PROCESSES, prices
 from . import figures, words
 from .checks import check, chosen
 from .runs import POPULATION, ladder, tops_of
@@ -42,7 +42,7 @@ def grid(quick: bool) -> list[Case]:
     return [
         *(Case(tops, name, {**settings, "seed": SEED}, group=LADDERS)
           for tops, settings in asked.items() for name in names),
-        Case(POPULATION, "together", timing, timed=True, group=PRICES),
+        *(Case(process, "together", timing, timed=True, group=PRICES) for process in PROCESSES),
     ]  # fmt: skip
 
 

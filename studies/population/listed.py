@@ -11,7 +11,7 @@ from symtop.runner.study import Table
 from . import verdicts, words
 from .costs import Share
 from .ladder import KEPT, WRONG
-from .prices import TOLERANCE
+from .prices import TOLERANCE, of_processes
 from .verdicts import ALL, UNITS, Cell
 from .words import interval, percent, ratio, span
 
@@ -161,7 +161,7 @@ def guarded_rows(data: xr.DataTree, horizon: str) -> dict[str, list[str]]:
 
 
 def _prices(data: xr.DataTree) -> Table:
-    group = data["prices"].to_dataset().isel(scene=0)
+    group = of_processes(data["prices"].to_dataset())
     lines = []
     for name in map(str, group["integrator"].values):
         alone, together, spread = (float(group[key].sel(integrator=name)) for key in ("alone", "together", "spread"))
@@ -174,7 +174,7 @@ def _prices(data: xr.DataTree) -> Table:
 
 
 def _prices_by_tolerance(data: xr.DataTree) -> Table:
-    group = data["prices"].to_dataset().isel(scene=0)
+    group = of_processes(data["prices"].to_dataset())
     by = group["alone_by"].transpose("integrator", "tolerance").values
     names = [str(name) for name in group["integrator"].values]
     lines = [[name, *(f"{1e9 * price:.3g}" for price in row)]

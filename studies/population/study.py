@@ -14,7 +14,7 @@ from symtop.runner.study import Case, Study
 from . import figures, listed, words
 from .ladder import table
 from .opening import opening
-from .prices import prices
+from .prices import PROCESSES, prices
 from .tops import Tops, strata_of
 
 SEED = 1
@@ -54,7 +54,7 @@ def grid(*, quick: bool = False, full: bool = False) -> list[Case]:
     drawn = {"members": members["short"], "seed": SEED, "nutations": horizons["short"]}
     cases.append(Case("population", "exact", drawn, group=TOPS))
     timing = {"integrators": names, "rounds": 3 if quick else 9, "batch": 0.001 if quick else 0.002}
-    return [*cases, Case("population", "together", timing, timed=True, group=PRICES)]
+    return [*cases, *(Case(process, "together", timing, timed=True, group=PRICES) for process in PROCESSES)]
 
 
 def measure(case: Case) -> xr.Dataset:

@@ -27,6 +27,7 @@ from symtop.run.guard import EXPECTED
 
 from .costs import Detection, Share, Winner, detection, quantiles, slowdowns, winner, wins
 from .ladder import KEPT, TENTHS, WRONG
+from .prices import of_processes
 
 HORIZONS = ("short", "long")
 UNITS = {
@@ -53,7 +54,7 @@ class Costs(NamedTuple):
 
     names: list[str]
     values: Array  # (rows, tops), inf where a row does not reach the target
-    halves: Array  # (2, rows): price of an evaluation by half of the rounds of timing over that by all, in the median
+    halves: Array  # (2, rows): price of an evaluation by each process that timed it over the least, in the median
 
     def of(self, name: str) -> Array:
         """The costs of one row."""
@@ -101,13 +102,13 @@ def stratum_of(data: xr.DataTree, horizon: str) -> Array:
 
 
 def price(data: xr.DataTree, names: list[str], unit: str, tolerances: Array) -> Array:
-    """What a force evaluation costs in a unit, by all rounds and by each half, at tolerances (rows, n): (3, rows, n).
+    """What a force evaluation costs in a unit, at the least and by each process, at tolerances (rows, n): (3, rows, n).
 
     Between the tolerances that were timed it is interpolated in logarithms; NaN is a row with a step, or no tolerance.
     """
     if unit == "evaluations":
         return np.ones((3, *tolerances.shape))
-    timed = data["prices"].to_dataset().isel(scene=0).sel(integrator=names)
+    timed = of_processes(data["prices"].to_dataset()).sel(integrator=names)
     halves = timed[f"{unit}_by_half"].transpose("half", "integrator", "tolerance").values
     each = np.stack([timed[f"{unit}_by"].transpose("integrator", "tolerance").values, *halves])
     seconds = np.repeat(each[:, :, :1], tolerances.shape[1], axis=2)
@@ -162,7 +163,7 @@ def widest(listed: Sequence[Standing]) -> Standing:
 
 @of_one_dataset
 def best(data: xr.DataTree, cell: Cell, unit: str) -> tuple[Costs, Winner | None]:
-    """Costs of a cell, and its winner, which is sure if it is with the times of either half of the rounds."""
+    """Costs of a cell, and its winner, which is sure if it is with the prices of either process that timed them."""
     taken = costs(data, cell, unit)
     won = winner(taken.values) if taken.names else None
     if won is not None and won.sure:

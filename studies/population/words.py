@@ -37,8 +37,8 @@ HOW_TO_READ = (
     "follows its tolerance. The slowdown of a row on a top is its "
     "cost over the least of all rows there. A row wins on a top if all others cost at least "
     f"{TIE:g} times as much. Shares have 95 % intervals (Wilson) for the draw of the tops; times that are measured "
-    "again move a close contest by more. A winner is sure if its lead is three standard errors with the times of "
-    "either half of the rounds. The last table has the rules of the runs and what is left out."
+    "again move a close contest by more. A winner is sure if its lead is three standard errors with the prices of "
+    "either of two processes that timed them. The last table has the rules of the runs and what is left out."
 )
 
 

@@ -61,7 +61,7 @@ def limits(part: xr.Dataset) -> str:
     neither = [name for name in rows_with(part, Column.SOUGHT_PHASE) if name not in known]
     rest = f" {counted(len(neither))} cannot be followed." if neither else ""
     return (
-        f"Small nutations about a steady precession, of frequency omega, first grow or lose it {'; '.join(parts)}."
+        f"Small nutations about a steady precession, of frequency omega, first grow, or it is lost, {'; '.join(parts)}."
         f"{rest} Without symmetry growth counts from {GROWING:g} a step."
     )
 

@@ -93,7 +93,7 @@ def _counted(data: xr.DataTree, numbers: np.ndarray, quantity: str, accuracy: fl
     if quantity not in group["quantity"]:
         return None
     target = min(group["target"].values.tolist(), key=lambda value: abs(math.log(value / accuracy)))
-    price = data["prices"].to_dataset().isel(scene=0)["alone"].sel(integrator=group["integrator"].values)
+    price = data["prices"].to_dataset()["alone"].min("scene").sel(integrator=group["integrator"].values)
     cost = group["cost"].sel(quantity=quantity, target=target).transpose("integrator", "member").values
     cost *= price.values[:, np.newaxis]
     rows = ~np.isnan(cost).all(axis=1)

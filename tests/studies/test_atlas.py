@@ -143,7 +143,7 @@ def mechanism(limit, third):
 def test_a_method_without_a_linear_limit_is_said_to_have_none():
     free = mechanism(math.nan, 3.4641)
     said = words.limits(free.sel(scene="steady-fast"))
-    assert "first grow or lose it at none of 300 steps up to h omega = 10 with midpoint." in said
+    assert "first grow, or it is lost, at none of 300 steps up to h omega = 10 with midpoint." in said
     assert words.tables(free)[-1].rows[0][1] == "none of 300 steps up to 10"
     bound = mechanism(1.9999, 1.7321)
     assert "none of" not in words.limits(bound.sel(scene="steady-fast"))
@@ -155,7 +155,7 @@ def test_a_method_without_a_linear_limit_is_said_to_have_none():
     assert "none of" not in said
     assert words.tables(narrow)[-1].rows[0][1:3] == ["none of 300 steps up to 10", "6.280"]
     both = narrow.assign({Column.LIMIT_PHASE: narrow[Column.WINDOW_START] + 2.0})  # strang is of this kind
-    assert "first grow or lose it at h omega at 6.28 (midpoint)" in words.limits(both.sel(scene="steady-fast"))
+    assert "first grow, or it is lost, at h omega at 6.28 (midpoint)" in words.limits(both.sel(scene="steady-fast"))
     assert words.tables(both)[-1].rows[0][1:3] == ["8.2800", "6.280"]
     unknown = mechanism(math.nan, math.nan)  # not symmetric: nothing is claimed
     assert words.limits(unknown.sel(scene="steady-fast")) == ""

@@ -291,6 +291,34 @@ def tree(costs_by_row, price=None, met_at=None):
     return xr.DataTree.from_dict({"short": short, "tops": about, "prices": prices})
 
 
+def test_the_cheaper_of_two_processes_counts_and_both_must_agree():
+    """One process had `series` at 4.5 ns an evaluation in all its rounds, where others have 3.6."""
+    one, other = (
+        xr.Dataset(
+            {
+                "alone": ("integrator", [value, 3.0]),
+                "together": ("integrator", [value, 1.0]),
+                "spread": ("integrator", [0.02, 0.03]),
+            },
+            coords={"integrator": ["a", "b"]},
+        )
+        for value in (4.5, 3.6)
+    )
+    for data in (one, other):
+        for kind in ("alone", "together"):
+            data[f"{kind}_half"] = data[kind].expand_dims(half=2, axis=1)
+            data[f"{kind}_by"] = data[kind].expand_dims(tolerance=[1e-8], axis=1)
+            data[f"{kind}_by_half"] = data[f"{kind}_by"].expand_dims(half=2, axis=2)
+    both = xr.concat([one, other], xr.Variable("scene", list(pricing.PROCESSES)))
+    taken = pricing.of_processes(both)
+    assert taken["alone"].values.tolist() == [3.6, 3.0]
+    assert taken["alone_half"].transpose("integrator", "half").values.tolist() == [[4.5, 3.6], [3.0, 3.0]]
+    assert taken["alone_by_half"].transpose("integrator", "tolerance", "half").values[0, 0].tolist() == [4.5, 3.6]
+    assert taken["spread"].values == pytest.approx([0.25, 0.03])
+    alone = pricing.of_processes(both.isel(scene=[0]))
+    assert alone["alone"].values.tolist() == [4.5, 3.0]  # the control: one process knows nothing of others
+
+
 def test_prices_that_are_measured_again_differ_in_times_alone():
     """A row in lanes and one without; a check of stored results looks at everything but times."""
     one, other = (prices(["strang[axis]", "kahan[axis]"], 9, 2e-3) for _ in range(2))
