@@ -175,9 +175,9 @@ def _prices(data: xr.DataTree) -> Table:
 
 def _prices_by_tolerance(data: xr.DataTree) -> Table:
     group = of_processes(data["prices"].to_dataset())
-    by = group["alone_by"].transpose("integrator", "tolerance").values
+    by = group["alone_by"].transpose("integrator", "priced_at").values
     names = [str(name) for name in group["integrator"].values]
     lines = [[name, *(f"{1e9 * price:.3g}" for price in row)]
              for name, row in zip(names, by, strict=True) if np.ptp(row)]  # fmt: skip
-    header = ["row", *(f"{tolerance:.0e}" for tolerance in group["tolerance"].values)]
+    header = ["row", *(f"{tolerance:.0e}" for tolerance in group["priced_at"].values)]
     return Table("Price of a force evaluation alone (ns), by tolerance, of rows whose order follows it", header, lines)

@@ -12,8 +12,8 @@ ends early, stand for all: the arithmetic of a step does not hang on the top, bu
 methods, which are counted. It hangs on the tolerance where the order does: an evaluation of a Taylor series costs the
 more the fewer there are of a step. Such rows have a price at each of `TOLERANCES`.
 
-It hangs on the process, too: of 14 processes that timed `series[axis]` 13 had 3.4 to 3.7 ns and one 4.5, in all rounds,
-as its memory happened to lie. So two processes time all rows; the smaller price counts, and what is said of a time must
+It hangs on the process, too: of 16 processes that timed `series[axis]` 14 had 3.4 to 3.7 ns, one 4.2 and one 4.5, each
+in all its rounds. So two processes time all rows; the smaller price counts, and what is said of a time must
 be so with the prices of either.
 """
 
@@ -136,9 +136,9 @@ def prices(names: Sequence[str], rounds: int, batch: float) -> xr.Dataset:
     """Seconds of a force evaluation: ``alone`` and ``together`` over ``integrator``, and ``spread`` of the samples.
 
     The smallest samples count, and those of every other round by themselves (``alone_half``, ``together_half``): what
-    is said of a time must be so in both halves. ``alone_by`` and ``together_by`` have ``tolerance`` too, ``by_half``
-    behind it likewise; the others are at `TOLERANCE`. A row whose tops share no call has the price of a run alone in
-    both. The spread is the largest of the long runs.
+    is said of a time must be so in both halves. ``alone_by`` and ``together_by`` have the tolerance ``priced_at`` too,
+    ``by_half`` behind it likewise; the others are at `TOLERANCE`. A row whose tops share no call has the price of a run
+    alone in both. The spread is the largest of the long runs.
     """
     each = {(name, *key): pair for name in names for key, pair in pairs(integrator(name)).items()}
     taken = timings([call for pair in each.values() for call, _ in pair], rounds, batch, warm=True)
@@ -155,10 +155,10 @@ def prices(names: Sequence[str], rounds: int, batch: float) -> xr.Dataset:
         columns |= {
             kind: ("integrator", same[:, 0]),
             f"{kind}_half": (("integrator", "half"), same[:, 1:]),
-            f"{kind}_by": (("integrator", "tolerance"), values[..., 0]),
-            f"{kind}_by_half": (("integrator", "tolerance", "half"), values[..., 1:]),
+            f"{kind}_by": (("integrator", "priced_at"), values[..., 0]),
+            f"{kind}_by_half": (("integrator", "priced_at", "half"), values[..., 1:]),
         }
-    return xr.Dataset(columns, coords={"integrator": list(names), "tolerance": list(TOLERANCES)})
+    return xr.Dataset(columns, coords={"integrator": list(names), "priced_at": list(TOLERANCES)})
 
 
 def _of(slopes: dict[tuple[str, str, float], Array], name: str, kind: str, tolerance: float) -> Array:

@@ -109,10 +109,10 @@ def price(data: xr.DataTree, names: list[str], unit: str, tolerances: Array) -> 
     if unit == "evaluations":
         return np.ones((3, *tolerances.shape))
     timed = of_processes(data["prices"].to_dataset()).sel(integrator=names)
-    halves = timed[f"{unit}_by_half"].transpose("half", "integrator", "tolerance").values
-    each = np.stack([timed[f"{unit}_by"].transpose("integrator", "tolerance").values, *halves])
+    halves = timed[f"{unit}_by_half"].transpose("half", "integrator", "priced_at").values
+    each = np.stack([timed[f"{unit}_by"].transpose("integrator", "priced_at").values, *halves])
     seconds = np.repeat(each[:, :, :1], tolerances.shape[1], axis=2)
-    known, x = -np.log(timed["tolerance"].values), -np.log(tolerances)
+    known, x = -np.log(timed["priced_at"].values), -np.log(tolerances)
     for part, row in zip(*np.nonzero(np.ptp(each, axis=2)), strict=True):
         at = np.where(np.isnan(x[row]), known[-1], x[row])
         seconds[part, row] = np.exp(np.interp(at, known, np.log(each[part, row])))

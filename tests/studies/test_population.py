@@ -284,9 +284,9 @@ def tree(costs_by_row, price=None, met_at=None):
     about = xr.Dataset({"stratum_place": ("member", np.zeros(table.shape[1]))}, coords={"stratum": ["slow"]})
     halves = np.array([np.broadcast_to(price[name], (2, 2)) for name in names])  # rows, tolerances, halves
     prices = xr.Dataset(
-        {"alone_by": (("scene", "integrator", "tolerance"), halves.min(axis=2)[np.newaxis]),
-         "alone_by_half": (("scene", "integrator", "tolerance", "half"), halves[np.newaxis])},
-        coords={"scene": ["population"], "integrator": names, "tolerance": [1e-2, 1e-6]},
+        {"alone_by": (("scene", "integrator", "priced_at"), halves.min(axis=2)[np.newaxis]),
+         "alone_by_half": (("scene", "integrator", "priced_at", "half"), halves[np.newaxis])},
+        coords={"scene": ["population"], "integrator": names, "priced_at": [1e-2, 1e-6]},
     )  # fmt: skip
     return xr.DataTree.from_dict({"short": short, "tops": about, "prices": prices})
 
@@ -307,13 +307,13 @@ def test_the_cheaper_of_two_processes_counts_and_both_must_agree():
     for data in (one, other):
         for kind in ("alone", "together"):
             data[f"{kind}_half"] = data[kind].expand_dims(half=2, axis=1)
-            data[f"{kind}_by"] = data[kind].expand_dims(tolerance=[1e-8], axis=1)
+            data[f"{kind}_by"] = data[kind].expand_dims(priced_at=[1e-8], axis=1)
             data[f"{kind}_by_half"] = data[f"{kind}_by"].expand_dims(half=2, axis=2)
     both = xr.concat([one, other], xr.Variable("scene", list(pricing.PROCESSES)))
     taken = pricing.of_processes(both)
     assert taken["alone"].values.tolist() == [3.6, 3.0]
     assert taken["alone_half"].transpose("integrator", "half").values.tolist() == [[4.5, 3.6], [3.0, 3.0]]
-    assert taken["alone_by_half"].transpose("integrator", "tolerance", "half").values[0, 0].tolist() == [4.5, 3.6]
+    assert taken["alone_by_half"].transpose("integrator", "priced_at", "half").values[0, 0].tolist() == [4.5, 3.6]
     assert taken["spread"].values == pytest.approx([0.25, 0.03])
     alone = pricing.of_processes(both.isel(scene=[0]))
     assert alone["alone"].values.tolist() == [4.5, 3.0]  # the control: one process knows nothing of others
@@ -371,7 +371,7 @@ def test_rows_whose_order_follows_the_tolerance_are_timed_at_several():
     by = timed["alone_by"].values
     assert by[0, 0] > 1.2 * by[0, -1]
     assert np.ptp(by[1]) == 0.0
-    assert np.array_equal(timed["alone"].values, timed["alone_by"].sel({"tolerance": pricing.TOLERANCE}).values)
+    assert np.array_equal(timed["alone"].values, timed["alone_by"].sel(priced_at=pricing.TOLERANCE).values)
     assert (timed["together"] != timed["alone"]).all()  # tops of such rows share a call
 
 
