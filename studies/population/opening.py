@@ -12,7 +12,7 @@ from .costs import TIE
 from .verdicts import Standing
 
 HEADER = [
-    "run length", "axis error (rad)", "cheapest most often", "wins, of the tops that a row solves",
+    "nutations", "axis error (rad)", "cheapest most often", "wins, of the tops that a row solves",
     "cost over the cheapest: median (90% quantile)", "next", "meets it, of all tops", "met on most tops by",
 ]  # fmt: skip
 EXPLAINED = {
@@ -69,7 +69,7 @@ def opening(data: xr.DataTree) -> Opening:
     met: list[tuple[float, str]] = []  # the share of the tops that the first row solves, and the same in words
     for cell in verdicts.cells(data, "axis", (verdicts.ALL,)):
         taken, won = verdicts.best(data, cell, words.UNIT)
-        start = [f"{verdicts.nutations(data, cell.horizon):g} nutations", f"{cell.target:.0e}"]
+        start = [f"{verdicts.nutations(data, cell.horizon):g}", f"{cell.target:.0e}"]
         if won is None:
             rows.append([*start, "none", "", "", "", "", ""])
             continue
@@ -86,7 +86,7 @@ def opening(data: xr.DataTree) -> Opening:
              following, words.percent(first.solved), f"{widest.name} {words.percent(widest.solved)}"]
         )  # fmt: skip
         second = f", and {others[0].name} on {words.percent(others[0].won)}" if others else ""
-        task = f"{start[1]} rad over {start[0]}"
+        task = f"{start[1]} rad over {start[0]} nutations"
         more = f", and {widest.name} on {words.percent(widest.solved)}" if behind(first, widest) else ""
         said = f"{first.name} meets {task} on {words.percent(first.solved)} of all tops{more}"
         met.append((first.solved.value, said))
