@@ -16,6 +16,7 @@ from symtop.runner import store
 from symtop.runner.cases import Round
 from symtop.runner.pools import Workers
 from symtop.runner.study import Combined, Study
+from symtop.runner.work import TOLD
 
 SAMPLE = 5  # cases of each study
 # in the names of variables of measured times, or of such a time over a count
@@ -54,7 +55,7 @@ def _differences(stored: xr.Dataset, again: xr.Dataset) -> list[str]:
             differing.append(f"{name} has another shape: {dict(one.sizes)} and {dict(other.sizes)}")
         elif not any(word in name for word in CLOCKED) and not _same(one, other):
             differing.append(f"{name} differs{_how_much(one, other)}")
-    kept = sorted((set(stored.attrs) | set(again.attrs)) - set(datasets.provenance()) - {"content"})
+    kept = sorted((set(stored.attrs) | set(again.attrs)) - set(datasets.provenance()) - {"content", *TOLD.values()})
     pairs = [(key, stored.attrs.get(key), again.attrs.get(key)) for key in kept]
     return [
         *differing,

@@ -41,6 +41,7 @@ class Company(NamedTuple):
 
 
 ALONE = Company(1, math.nan)
+TOLD = {name: f"timed_{name}" for name in Company._fields}  # the attributes of a file that tell it
 
 
 class Task(NamedTuple):
@@ -104,7 +105,7 @@ def _compute(study: Study, task: Task, path: Path) -> Result:
         store.save_failure(path, task.case, message, traceback.format_exc())
         return Result("failed", message)
     if task.company is not None:
-        data = data.assign_attrs({f"timed_{name}": value for name, value in task.company._asdict().items()})
+        data = data.assign_attrs({TOLD[name]: value for name, value in task.company._asdict().items()})
     store.save_case(data, path, study, task.case)
     return Result("computed")
 
