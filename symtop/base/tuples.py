@@ -27,12 +27,19 @@ def _times(typing, values, by):  # type: ignore[no-untyped-def]
 
 def times(values: Any, by: float) -> Any:
     """A row of doubles, each multiplied by the number `by`: a new tuple, or the same array."""
-    raise NotImplementedError  # for kernels
+    if isinstance(values, tuple):
+        return tuple(value * by for value in values)
+    for i in range(len(values)):
+        values[i] = values[i] * by
+    return values
 
 
 def with_item(values: Any, i: int, value: float) -> Any:
     """A row with number i replaced: a new tuple, or the same array."""
-    raise NotImplementedError  # for kernels
+    if isinstance(values, tuple):
+        return (*values[:i], value, *values[i + 1 :])
+    values[i] = value
+    return values
 
 
 @overload(times, jit_options=INLINED, strict=False)

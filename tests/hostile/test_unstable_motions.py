@@ -92,17 +92,17 @@ def test_conditioning_is_the_growth_of_the_motion():
 @pytest.mark.parametrize(("name", "time"), [("separatrix", 100.0), ("spheroid", 1e15), ("spheroid", 1e25)])
 def test_where_one_rounding_moves_the_axis_anywhere_the_answer_says_so(name, time):
     """A distance ends at pi: divided by a change that departs as far it is far below the growth."""
-    where = symtop.scene(name)
-    said = symtop.reference(where, [time]).attrs["conditioning"]
-    factor = conditioning(where, time)
+    chosen = symtop.scene(name)
+    said = symtop.reference(chosen, [time]).attrs["conditioning"]
+    factor = conditioning(chosen, time)
     assert said.startswith("at least ")
     assert "or more: nothing is known of the axis" in said
     times = np.linspace(0.0, time, 101)[1:]
-    starts = [where.start]
+    starts = [chosen.start]
     for rate in ("phi_dot", "psi_dot"):
-        ulp_more = math.nextafter(getattr(where.start, rate), math.inf)
-        starts.append(dataclasses.replace(where.start, **{rate: ulp_more}))
-    true, *others = (ClosedForm(where.top, start).axis(times) for start in starts)
+        ulp_more = math.nextafter(getattr(chosen.start, rate), math.inf)
+        starts.append(dataclasses.replace(chosen.start, **{rate: ulp_more}))
+    true, *others = (ClosedForm(chosen.top, start).axis(times) for start in starts)
     moved = max(charts.axis_distance(other, true).max() for other in others)
     assert moved > 0.3
     assert factor * np.finfo(float).eps > moved / 10.0
@@ -111,12 +111,12 @@ def test_where_one_rounding_moves_the_axis_anywhere_the_answer_says_so(name, tim
 @pytest.mark.parametrize("time", [64.0, 68.0])
 def test_where_a_small_change_departs_far_a_smaller_one_shows_the_growth(time):
     """Against a change of 1e-25 in 50 digits: that of 64 roundings shows 0.78 and 0.12 of its growth."""
-    where, change = symtop.scene("separatrix"), Fraction(1, 10**25)
-    start = [Fraction(value) for value in flat(where.top, where.start)[3:]]
+    chosen, change = symtop.scene("separatrix"), Fraction(1, 10**25)
+    start = [Fraction(value) for value in flat(chosen.top, chosen.start)[3:]]
     other = start[:3] + [rate * (1 + change) for rate in start[3:]]
-    here, there = (PreciseForm(where.top, at, 50).axis(time) for at in (start, other))
+    here, there = (PreciseForm(chosen.top, at, 50).axis(time) for at in (start, other))
     growth = math.hypot(*(float((a - b) * 10**25) for a, b in zip(here, there, strict=True)))
-    assert conditioning(where, time) == pytest.approx(growth, rel=0.1)
+    assert conditioning(chosen, time) == pytest.approx(growth, rel=0.1)
 
 
 def test_a_motion_that_departs_little_is_told_as_before():
