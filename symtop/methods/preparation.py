@@ -84,11 +84,11 @@ class Preparation:
 
 
 @functools.cache
-def _on_numbers(scale: Callable[..., Any], kind: Any) -> Any:
-    """`scale` by itself, compiled: between plain numbers and a rule."""
+def _on_numbers(scale: Callable[..., Any], opened: Callable[[Any], Any]) -> Any:
+    """`scale` by itself, compiled: between plain numbers, from which `opened` makes a table, and a rule."""
 
-    def scaled(body, start, rule, h):  # type: ignore[no-untyped-def]
-        return scale(kind(*rule), Body(*body), Start(*start), h)
+    def scaled(body, start, numbers, h):  # type: ignore[no-untyped-def]
+        return scale(opened(numbers), Body(*body), Start(*start), h)
 
     return compile_kernel(scaled)
 
@@ -109,10 +109,9 @@ class Scaled:
 
     def __call__(self, top: SymmetricTop, at: Angles, h: float) -> Any:
         """The rule of one run."""
-        kind: Any = type(self.rule)
-        compiled = _on_numbers(self.scale, kind)
+        opened, table = (self.pack or as_fields)(self.rule)
         numbers = flat(top, at)
-        return compiled(numbers[:3], numbers[3:], tuple(self.rule), h)
+        return _on_numbers(self.scale, opened)(numbers[:3], numbers[3:], table, h)
 
 
 @dataclass(frozen=True)

@@ -53,15 +53,6 @@ def _opened(n: int) -> Callable[[Any], Composition]:
     return making
 
 
-def packed(rule: tuple[Any, ...]) -> tuple[Callable[[Any], Composition], NDArray[np.float64]]:
-    """How the fields of a composition travel into compiled code: what opens an array of numbers, and the array.
-
-    numba looks at every number of a tuple, 20 ns each, and at an array as a whole, 0.1 us.
-    """
-    drift, kick, gradient = rule[:3]
-    return _opened(len(drift)), np.array([*drift, *kick, *gradient, *rule[3:]], dtype=float)
-
-
 @register_jitable
 def _of_any_length(row: Any) -> Composition:
     row, n = row.copy(), (len(row) - 5) // 3  # a copy of its own: `times` multiplies in place
@@ -69,22 +60,30 @@ def _of_any_length(row: Any) -> Composition:
     return Composition(row[:n], row[n:m], row[m:end], int(row[end]), int(row[end + 1]), row[end + 2])
 
 
-def packed_for_lanes(rule: Any) -> tuple[Callable[[Any], Any], Any]:
-    """The same of many members. Long tables are rows of an array there, for which one kernel is compiled, 0.8 s.
+def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]]:
+    """How a composition travels into compiled code: what opens an array of numbers, and the array.
 
-    That costs 0.15 us a member, less than a step; of short tables it would be a hundredth of an ensemble.
+    numba looks at every number of a tuple, 20 ns each, and at an array as a whole, 0.1 us. Short tables are tuples
+    inside, longer ones are rows of the array, so that one kernel is compiled for all of them, 1 to 2 s: their steps
+    take as long as with tuples, to 1 %.
     """
-    if type(rule) is not Composition or len(rule.drift) <= SHORT:
-        return as_fields(rule)
-    return _of_any_length, packed(rule)[1]
+    drift, kick, gradient = rule[:3]
+    opened = _opened(len(drift)) if len(drift) <= SHORT else _of_any_length
+    return opened, np.array([*drift, *kick, *gradient, *rule[3:]], dtype=float)
+
+
+def packed_for_lanes(rule: Any) -> tuple[Callable[[Any], Any], Any]:
+    """The same of many members: short tables travel as they are, for to open an array costs 0.15 us a member."""
+    short = type(rule) is not Composition or len(rule.drift) <= SHORT
+    return as_fields(rule) if short else packed(rule)
 
 
 class Stages(NamedTuple):
-    """What one run of a kernel drifts and kicks by; a kernel compiles once for each length."""
+    """What one run of a kernel drifts and kicks by, in tuples, or in arrays where the table is long."""
 
-    drift: tuple[float, ...]
-    kick: tuple[float, ...]
-    bend: tuple[float, ...]
+    drift: Any
+    kick: Any
+    bend: Any
     forces: int
     turn: int  # which rotation a drift is
     boost: float  # parameter of the processor
