@@ -18,6 +18,7 @@ Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, 
 
 import functools
 import importlib.util
+import sys
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
@@ -165,7 +166,7 @@ def solver(chart: str, precision: str, read: Read | None = None) -> Solver:
     """
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        most = max(1, int(plan.most(MOST_STEPS[precision])))
+        most = max(1, int(min(plan.most(MOST_STEPS[precision]), sys.maxsize)))  # infinity is a budget, too
         flight = propagate(chart, precision, plan.tolerance, top, start, plan.times, most)
         count, size = len(flight.states), plan.times.size
         states = _padded(flight.states, size)

@@ -56,6 +56,16 @@ def test_members_have_the_bits_of_runs_alone(name, budget):
     assert "ok" in outcomes
 
 
+@pytest.mark.parametrize("row", [row for row in rows() if row.control == "tolerance"], ids=lambda row: row.name)
+def test_an_infinite_budget_ends_no_run(row):
+    """Of a Taylor method it was no number of steps: an OverflowError."""
+    scene, times = symtop.scene("goldstein"), np.linspace(0.0, 0.5, 3)
+    free, bound = (row.solvers[row.charts()[0]](scene.top, scene.start, Plan.until(times, 1e-6, budget))
+                   for budget in (None, np.inf))  # fmt: skip
+    assert free.outcome == bound.outcome == "ok"
+    np.testing.assert_array_equal(free.states, bound.states)
+
+
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_budget_is_passed_by_less_than_a_step(name):
     numbers, tolerance, times, _ = members(20)
