@@ -96,28 +96,38 @@ def _in_order(
 ) -> Iterator[dict[str, Any]]:
     """The findings of studies in their order, while later ones are computed; then what stopped one, if any."""
     begun: deque[tuple[Study, run.Begun]] = deque()
-    refused: SymtopError | None = None
+    refused: list[SymtopError] = []
     try:
         for study in studies:
             try:
                 begun.append((study, run.begin(study, results, workers, **options)))
             except SymtopError as error:
-                refused = error
+                refused.append(error)
                 break
             while len(begun) > 1 and begun[0][1].ready():
-                yield begun[0][1]()
+                yield from _findings(begun[0][1], refused)
                 begun.popleft()
         workers.finish()
         while begun:
-            yield begun[0][1]()
+            yield from _findings(begun[0][1], refused)
             begun.popleft()
     except BaseException:
         workers.close()
         for study, _ in begun:
             store.tidy(results.resolve(), study)
         raise
-    if refused is not None:
-        raise refused
+    if refused:
+        raise refused[0]
+
+
+def _findings(ended: run.Begun, refused: list[SymtopError]) -> Iterator[dict[str, Any]]:
+    """The findings of a study; if it has none, as one that compares methods and was given one, the next ones go on."""
+    try:
+        findings = ended()
+    except StudyError as error:
+        refused.append(error)
+    else:
+        yield findings
 
 
 def show_status(studies: list[Study], results: Path, why: bool, as_json: bool, **grid: bool) -> int:

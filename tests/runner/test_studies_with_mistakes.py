@@ -174,3 +174,15 @@ def test_options_that_would_be_ignored_are_refused(tmp_path, words, says):
     assert says in output
     assert not (tmp_path / "results").exists()
     assert ran(tmp_path, "", "--status")[0] == 0
+
+
+def test_a_study_without_findings_does_not_keep_the_next_from_theirs(tmp_path):
+    """Both are computed; the second has its findings, and the first its sentence, last, and the exit code."""
+    second = tmp_path / "other.py"
+    second.write_text(SCRIPT.format(change="").replace('name="mine"', 'name="other"'))
+    code, output = ran(tmp_path, "verdict = lambda data: None", str(second))
+    assert code == 2, output
+    assert "other: 2 of 2 cases computed, 1 figure" in output
+    assert output.splitlines()[-1].startswith("symtop: study mine: verdict must return")
+    assert (tmp_path / "results" / "other.json").is_file()
+    assert not (tmp_path / "results" / "mine.json").exists()
