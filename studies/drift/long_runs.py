@@ -24,7 +24,16 @@ from symtop.methods.loop import Loop
 from symtop.methods.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import flat
-from symtop.run.long_run import QUANTITIES, chart_of, long_run, scattered, summary, watch, windows as windows_until
+from symtop.run.long_run import (
+    QUANTITIES,
+    Gauge,
+    chart_of,
+    long_run,
+    scattered,
+    summary,
+    watch,
+    windows as windows_until,
+)
 
 SPACING = 0.01  # rad, between the starts of an ensemble
 MEAN = 2  # place of the mean among least, largest and mean
@@ -44,12 +53,19 @@ def members(scene: Scene, count: int) -> list[Scene]:
     return [Scene(f"{scene.name}-{k}", scene.top, start, scene.horizon) for k, start in enumerate(starts)]
 
 
+def gauges_of(scenes: Sequence[Scene], method: Integrator, per_nutation: float) -> list[Gauge]:
+    """What watches each long run: one fit to a run's beginning, whatever sums go on from there."""
+    return [watch(one, method, one.nutation_period / per_nutation) for one in scenes]
+
+
 def side_by_side(
-    scenes: Sequence[Scene], method: Integrator, steps: int, per_nutation: float, *, compensated: bool
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    scenes: Sequence[Scene], gauges: Sequence[Gauge], method: Integrator, steps: int, per_nutation: float, *,
+    compensated: bool,
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:  # fmt: skip
     """Long runs of one method in one call, in lanes where its sums have them; each has the bits of `long_run`.
 
-    The steps at which windows end (windows,), and the least, largest and mean (members, windows, 3) of the quantities.
+    Each scene has its gauge. The steps at which windows end (windows,), and the least, largest and mean (members,
+    windows, 3) of the quantities.
     """
     _, solver = chart_of(method)
     if not compensated:
@@ -61,8 +77,7 @@ def side_by_side(
     marks, cuts = np.concatenate(stretches), np.cumsum([0, *map(len, stretches)])
     done = solver.many(np.array([flat(one.top, one.start) for one in scenes]), h, np.tile(marks, (len(scenes), 1)))
     rows = np.empty((len(scenes), len(ends), len(QUANTITIES), 3))
-    for i, one in enumerate(scenes):
-        gauge = watch(one, method, float(h[i]))
+    for i, gauge in enumerate(gauges):
         for k, (first, last) in enumerate(pairwise(cuts)):
             part = gauge(done.states[i, first:last], done.momenta[i, first:last], shown=True)
             rows[i, k] = np.reshape(summary(part), (-1, 3))
@@ -87,8 +102,11 @@ def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, 
     ``gain`` is their ratio. All that is said of what compensated sums gain rests on these three.
     """
     columns: dict[str, Any] = {}
-    for prefix, compensated, many in (("", True, count), ("plain_", False, min(PLAIN_MEMBERS, count))):
-        ends, seen = side_by_side(members(scene, many), method, steps, per_nutation, compensated=compensated)
+    scenes = members(scene, count)
+    gauges = gauges_of(scenes, method, per_nutation)
+    for prefix, compensated, many in (("", True, count), ("plain_", False, PLAIN_MEMBERS)):
+        chosen = scenes[:many], gauges[:many]
+        ends, seen = side_by_side(*chosen, method, steps, per_nutation, compensated=compensated)
         elapsed, drifts = elapsed_steps(ends), seen["modified_energy"][..., MEAN]
         grown = ensemble_growth(elapsed, drifts, ends[0])
         columns["elapsed"] = ("window", elapsed)

@@ -25,7 +25,7 @@ Variables over `quantity`, `target`, `member`, `level`, `stratum`, `guarded`:
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,12 +106,13 @@ def run_level(row: Integrator, tops: Tops, chosen: Members, level: int, budget: 
         marks = np.broadcast_to(tops.marks << level, (len(chosen), tops.marks.size))
         return stepped(row, tops.numbers[chosen], h, marks)
     tolerance, solver = setting_of(row, level), row.solvers[row.charts()[0]]
-    numbers, times = tops.numbers[chosen], tops.times[chosen]
+    times = tops.times[chosen]
     if isinstance(solver, Adaptive):
         n, samples = times.shape
-        done, _ = solver.many(numbers, np.full(n, tolerance), times, np.full(n, samples), budget)
+        done, _ = solver.many(tops.numbers[chosen], np.full(n, tolerance), times, np.full(n, samples), budget)
         return Level(done.states, done.momenta, done.work.astype(float), done.outcome)
-    return in_turn(row, numbers, [Plan.until(row_times, tolerance, budget) for row_times in times])
+    plans = [Plan.until(row_times, tolerance, budget) for row_times in times]
+    return one_by_one(row, tops.members(chosen), plans)
 
 
 def stepped(row: Integrator, numbers: Array, h: Array, marks: NDArray[np.int64]) -> Level:
@@ -125,21 +126,20 @@ def stepped(row: Integrator, numbers: Array, h: Array, marks: NDArray[np.int64])
 
 
 def in_turn(row: Integrator, numbers: Array, plans: Sequence[Plan]) -> Level:
-    """Runs one after another, with equally many samples each."""
+    """Runs of tops in rows of nine numbers one after another, with equally many samples each."""
+    return one_by_one(row, members_of(numbers), plans)
+
+
+def one_by_one(row: Integrator, members: Iterable[tuple[SymmetricTop, Angles]], plans: Sequence[Plan]) -> Level:
+    """The same of tops and starts."""
     (chart,), shape = row.charts(), (len(plans), plans[0].times.size)
     states, momenta = np.full((*shape, DIMENSIONS[chart]), np.nan), np.full((*shape, 2), np.nan)
     work, outcome = np.empty(len(plans)), np.empty(len(plans), dtype=np.int64)
-    for k, ((top, start), plan) in enumerate(zip(members_of(numbers), plans, strict=True)):
+    for k, ((top, start), plan) in enumerate(zip(members, plans, strict=True)):
         run = solve(row, chart, top, start, plan)
         states[k], momenta[k, :, 0], momenta[k, :, 1] = run.states, run.p_phi, run.p_psi
         work[k], outcome[k] = run.force_evaluations, OUTCOMES.index(run.outcome)
     return Level(states, momenta, work, outcome)
-
-
-def bodies(tops: Tops, chosen: Members) -> Iterator[tuple[SymmetricTop, Angles]]:
-    """The top and the start of each chosen member."""
-    for numbers in tops.numbers[chosen].tolist():
-        yield SymmetricTop(*numbers[:3]), Angles(*numbers[3:])
 
 
 def climb(row: Integrator, tops: Tops, asked: dict[str, NDArray[np.bool_]], budget: float) -> Climb:
@@ -258,7 +258,7 @@ def guarded_runs(row: Integrator, tops: Tops, done: Climb, guarded: int) -> dict
     (chart,) = row.charts()
     seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
     chosen = np.flatnonzero(tops.known)[:guarded]
-    for place, (top, start) in enumerate(bodies(tops, chosen)):
+    for place, (top, start) in enumerate(tops.members(chosen)):
         member = chosen[place]
         scene = Scene(f"member-{member}", top, start, horizon=float(tops.times[member, -1]))
         for level in range(GUARDED_LEVELS):

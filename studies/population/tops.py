@@ -12,7 +12,9 @@ they see 93 to 100 % in the median run, and half in one of twenty; it is the sam
 coarse because a step of 14 stages meets 1e-6 at four a nutation.
 """
 
+import functools
 import math
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
@@ -20,10 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.base.numbers import EPSILON, GOLDEN, TINY
+from symtop.methods.many import members_of
 from symtop.model import charts, scales
 from symtop.model.charts import Array
 from symtop.model.closed_forms import ClosedForms
 from symtop.model.effective import effective_potential
+from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import axis_of, space_energy
 from symtop.run.bounds import ROUNDING
 from symtop.run.population import NUMBERS, STRATA, population
@@ -33,6 +37,7 @@ SAMPLES = 12
 ASKED = ("axis", "attitude", "energy")  # quantities that have targets
 MOMENTA = "momenta"
 CLEAR = 0.1  # a target is asked where the truth's bound is at most this part of it
+TOGETHER = 512  # members whose errors are computed at a time: what is between states and errors stays in the cache
 
 
 class Body(NamedTuple):
@@ -61,16 +66,17 @@ class Tops:
     def __init__(self, numbers: Array, nutations: float) -> None:
         self.numbers, self.nutations = np.ascontiguousarray(numbers), nutations
         self.forms = ClosedForms(self.numbers)
+        self._members: dict[int, tuple[SymmetricTop, Angles]] = {}
         self.period = np.array(self.forms.nutation_period)
         self.steps = math.ceil(nutations * FIRST)  # of the coarsest run
         places = np.arange(1.0, SAMPLES + 1.0) + np.append(np.mod(GOLDEN * np.arange(1.0, SAMPLES), 1.0) - 0.5, 0.0)
         self.marks = np.unique(np.maximum(np.rint(places * self.steps / SAMPLES).astype(np.int64), 1))
         self.times = self.marks * (self.period / FIRST)[:, np.newaxis]
 
-    @classmethod
-    def drawn(cls, members: int, seed: int, nutations: float) -> "Tops":
-        """The first members of the population of that seed."""
-        return cls(numbers_of(members, seed), nutations)
+    @staticmethod
+    def drawn(members: int, seed: int, nutations: float) -> "Tops":
+        """The first members of the population of that seed; made once and kept, for every row runs the same."""
+        return _drawn(members, seed, nutations)
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -139,13 +145,27 @@ class Tops:
         wide = (levels < self.width) & self.known
         return {name: wide & (bound <= CLEAR * levels) for name, bound in self.bounds().items()}
 
+    def members(self, chosen: NDArray[np.int64]) -> Iterator[tuple[SymmetricTop, Angles]]:
+        """The top and the start of each chosen member, made once and kept."""
+        for k in chosen.tolist():
+            member = self._members.get(k)
+            if member is None:
+                (member,) = members_of(self.numbers[k : k + 1])
+                self._members[k] = member
+            yield member
+
     def errors(self, chart: str, shown: Shown, chosen: NDArray[np.int64]) -> dict[str, Array]:
         """Largest error of each quantity of the chosen members' runs, (chosen,); inf after a failure.
 
         `attitude` is left out where the chart does not show it.
         """
-        states, body = shown.states, Body(*(part[chosen] for part in self.body))
-        p_phi, p_psi = shown.momenta[..., 0], shown.momenta[..., 1]
+        parts = [slice(begin, begin + TOGETHER) for begin in range(0, max(len(chosen), 1), TOGETHER)]
+        each = [self._errors(chart, shown.states[part], shown.momenta[part], chosen[part]) for part in parts]
+        return {name: np.concatenate([part[name] for part in each]) for name in each[0]}
+
+    def _errors(self, chart: str, states: Array, momenta: Array, chosen: NDArray[np.int64]) -> dict[str, Array]:
+        """The errors of a few members."""
+        body, p_phi, p_psi = Body(*(part[chosen] for part in self.body)), momenta[..., 0], momenta[..., 1]
         with np.errstate(all="ignore"):  # a run may have blown up
             axis = axis_of(chart, states)
             each = {"axis": charts.axis_distance(axis, self.truth[0][chosen])}
@@ -172,7 +192,15 @@ def numbers_of(members: int, seed: int) -> Array:
     return np.stack([drawn[name].values for name in NUMBERS], axis=1)
 
 
+@functools.lru_cache(maxsize=2)
+def _drawn(members: int, seed: int, nutations: float) -> Tops:
+    return Tops(numbers_of(members, seed), nutations)
+
+
+@functools.lru_cache(maxsize=2)
 def strata_of(members: int, seed: int) -> NDArray[np.int64]:
-    """Places of the members' strata in `STRATA`."""
+    """Places of the members' strata in `STRATA`; kept, and not to be written to."""
     names = list(STRATA)
-    return np.array([names.index(name) for name in population(members, seed=seed)["stratum"].values])
+    places = np.array([names.index(name) for name in population(members, seed=seed)["stratum"].values])
+    places.flags.writeable = False
+    return places

@@ -186,6 +186,9 @@ def solver(chart: str, precision: str, read: Read | None = None) -> Solver:
 
 def _padded(values: Any, size: int) -> Array:
     """Values as doubles, and NaN for the times that were not reached."""
+    if len(values) == size and values.dtype == np.float64:
+        whole: Array = values  # of a run's own, 2 us sooner
+        return whole
     padded = np.full((size, *values.shape[1:]), np.nan)
     padded[: len(values)] = values
     return padded

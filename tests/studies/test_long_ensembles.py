@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from symtop_studies.drift import study
-from symtop_studies.drift.long_runs import members, side_by_side
+from symtop_studies.drift.long_runs import gauges_of, members, side_by_side
 from symtop_studies.drift.tables import ROUNDINGS
 
 from symtop.methods.blocks import LEAST
@@ -21,7 +21,8 @@ PARTS = ("least", "largest", "mean")
 @pytest.mark.parametrize("name", ["midpoint[angles]", "cayley[axis]"])
 def test_each_has_the_bits_of_a_long_run(name, compensated):
     method, scenes = integrator(name), members(scene("spheroid"), 6)  # enough for lanes
-    ends, seen = side_by_side(scenes, method, 20_000, PER_NUTATION, compensated=compensated)
+    gauges = gauges_of(scenes, method, PER_NUTATION)
+    ends, seen = side_by_side(scenes, gauges, method, 20_000, PER_NUTATION, compensated=compensated)
     for i, one in ((0, scenes[0]), (5, scenes[5])):
         h = one.nutation_period / PER_NUTATION
         alone = long_run(one, method, steps=20_000, step_size=h, compensated=compensated, quiet=True)

@@ -8,11 +8,21 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.population import costs, figures, ladder, messages, prices as pricing, study, verdicts, words
+from symtop_studies.population import (
+    costs,
+    figures,
+    ladder,
+    messages,
+    prices as pricing,
+    study,
+    tops as tops_module,
+    verdicts,
+    words,
+)
 from symtop_studies.population.costs import Share, cost_to_reach, detection, quantiles, run_lengths, slowdowns, winner
 from symtop_studies.population.opening import unmet_sentence
 from symtop_studies.population.prices import prices
-from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, strata_of
+from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, numbers_of, strata_of
 from symtop_studies.population.verdicts import Cell
 
 import symtop
@@ -24,7 +34,7 @@ from symtop.measure.timing import Timing
 from symtop.measure.work import TARGETS, nutation_width
 from symtop.methods.registry import integrator
 from symtop.model.scenes import Scene
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.report import style
 from symtop.report.style import look
 from symtop.run.guard import EXPECTED
@@ -168,6 +178,30 @@ def test_runs_in_turn_are_those_of_a_shared_loop(tops, monkeypatch):
     monkeypatch.setattr(ladder, "inside", lambda _: None)
     for one, other in zip(shared, ladder.run_level(row, tops, chosen, 5, 1e6), strict=True):
         assert np.array_equal(one, other, equal_nan=True)
+
+
+def test_errors_do_not_hang_on_how_many_are_computed_together(tops, monkeypatch):
+    chosen = np.arange(60)
+    for name in ("strang[attitude]", "midpoint[angles]", "strang[axis]"):
+        row = integrator(name)
+        shown = ladder.run_level(row, tops, chosen, 4, 1e6)
+        at_once = tops.errors(row.charts()[0], shown, chosen)
+        monkeypatch.setattr(tops_module, "TOGETHER", 7)
+        in_pieces = tops.errors(row.charts()[0], shown, chosen)
+        monkeypatch.undo()
+        assert at_once.keys() == in_pieces.keys()
+        for quantity, values in at_once.items():
+            assert np.array_equal(values, in_pieces[quantity])
+
+
+def test_tops_are_drawn_once_and_their_members_are_made_once():
+    drawn = Tops.drawn(20, 7, 5.0)
+    assert Tops.drawn(20, 7, 5.0) is drawn
+    assert np.array_equal(Tops(numbers_of(20, 7), 5.0).numbers, drawn.numbers)
+    chosen = np.array([3, 0, 11])
+    members = list(drawn.members(chosen))
+    assert np.array_equal([flat(*one) for one in members], drawn.numbers[chosen])
+    assert all(one is other for one, other in zip(members, drawn.members(chosen), strict=True))
 
 
 def test_a_failed_run_has_an_infinite_error(tops):
