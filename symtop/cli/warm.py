@@ -6,13 +6,13 @@ out to a process a core.
 """
 
 import concurrent.futures
-import multiprocessing
 from collections.abc import Callable
 from typing import Any
 
 from tqdm import tqdm
 
 from symtop.base.cache import cache_root
+from symtop.base.processes import context
 from symtop.base.progress import beating
 from symtop.base.strangers import words_of
 from symtop.base.threads import cores
@@ -88,8 +88,7 @@ def kernels() -> int:
 def warm(jobs: int | None = None) -> tuple[int, list[str]]:
     """Compile what is not on disk; returns how many kernels came to the cache, and which runs could not be done."""
     before, todo = kernels(), tasks()
-    context = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context) as pool:
+    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context()) as pool:
         done = pool.map(_run, todo)
         with beating(tqdm(desc="compiling", total=len(todo), unit="run", disable=None, leave=False)) as bar:
             failed = []

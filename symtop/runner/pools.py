@@ -5,13 +5,12 @@ cluster's workers need this version of symtop, the scripts of the studies, and t
 """
 
 import contextlib
-import multiprocessing
 import os
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from typing import Any
 
-from symtop.base import cluster
+from symtop.base import cluster, processes
 from symtop.base.threads import cores
 from symtop.runner import trial, work
 from symtop.runner.sideline import Beside, Sideline
@@ -55,8 +54,7 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
 
     @staticmethod
     def _spawned(size: int) -> ProcessPoolExecutor:
-        context = multiprocessing.get_context("spawn")
-        return ProcessPoolExecutor(size, context, work.begin_worker, (os.getpid(),))
+        return ProcessPoolExecutor(size, processes.context(), work.begin_worker, (os.getpid(),))
 
     def _idle(self) -> Executor:
         """Workers that have nothing to compute: those that are open, if there are several."""
