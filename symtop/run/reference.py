@@ -32,7 +32,7 @@ from symtop.run.bounds import closed_bounds, closed_values
 from symtop.run.certificate import KINDS, certificate
 from symtop.run.departure import conditioning, unbounded
 from symtop.run.kept import kept, place
-from symtop.run.witnesses import CHECKS, DIGITS, SAFETY, Checks, envelope, have_heyoka, integrated
+from symtop.run.witnesses import CHECKS, DIGITS, SAFETY, Checks, Flown, envelope, flown, have_heyoka, integrated
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
 MOST_CACHED = 200_000  # times; larger results are not kept on disk
@@ -151,8 +151,12 @@ def _dataset(
 
 
 def _integration(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
-    """Values, low halves and bounds at increasing, distinct times."""
-    values, checks = integrated(scene, times, precision)
+    return judged_integration(scene, times, precision, flown(scene, times, precision))
+
+
+def judged_integration(scene: Scene, times: charts.Array, precision: str, run: Flown) -> xr.Dataset:
+    """Values, low halves and bounds at the times of a run, increasing and distinct, as `reference` has them."""
+    values, checks = integrated(scene, run)
     grain = 8.0 * max(taylor.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
     columns: dict[str, charts.Array] = {}
     for name, (high, low) in {name: _split(value) for name, value in values.items()}.items():

@@ -161,14 +161,32 @@ def _unwrapped(angle: Any, near: charts.Array) -> Any:
     return angle + turns.astype(angle.dtype) * kind("6.283185307179586476925286766559005768394")
 
 
-def integrated(scene: Scene, times: charts.Array, precision: str) -> tuple[dict[str, Any], Checks]:
-    """heyoka's quantities at the times, and their errors at the check times, from one run."""
+class Flown(NamedTuple):
+    """heyoka's run through the times that were asked for and those of the checks."""
+
+    grid: charts.Array  # all of them, increasing
+    asked: Any  # places of the former in the grid
+    checked: Any  # and of the latter
+    states: Any  # of the attitude, in the working precision
+
+    @property
+    def axes(self) -> Any:
+        """The axis at the times that were asked for."""
+        return charts.axis_from_quaternion(self.states[self.asked, :4])
+
+
+def flown(scene: Scene, times: charts.Array, precision: str) -> Flown:
+    """The integration behind `integrated`, and nothing of what judges it."""
     check = check_times(scene, float(times[-1]))
     grid, place = np.unique(np.concatenate([times, check]), return_inverse=True)
-    states, _ = integrate(scene, grid, precision)
-    attitude = states[:, :4]
+    return Flown(grid, place[: times.size], place[times.size :], integrate(scene, grid, precision)[0])
+
+
+def integrated(scene: Scene, run: Flown) -> tuple[dict[str, Any], Checks]:
+    """heyoka's quantities at the times of a run, and their errors at its checks."""
+    attitude = run.states[:, :4]
     theta, phi, psi = charts.angles_from_quaternion(attitude)
-    motion = closed_form(scene)(grid)
+    motion = closed_form(scene)(run.grid)
     shown = {
         "theta": theta,
         "phi": _unwrapped(phi, motion.phi),
@@ -176,6 +194,6 @@ def integrated(scene: Scene, times: charts.Array, precision: str) -> tuple[dict[
         "axis": charts.axis_from_quaternion(attitude),
         "quaternion": attitude,
     }
-    asked_for, at_checks = place[: times.size], place[times.size :]
-    checks = seen(scene, check, attitude[at_checks], shown["phi"][at_checks], shown["psi"][at_checks])
-    return {name: values[asked_for] for name, values in shown.items()}, checks
+    at = run.checked
+    checks = seen(scene, run.grid[at], attitude[at], shown["phi"][at], shown["psi"][at])
+    return {name: values[run.asked] for name, values in shown.items()}, checks

@@ -14,11 +14,11 @@ import pytest
 from mpmath import mp, mpf, workdps
 
 import symtop
-from symtop.model import closed_form
+from symtop.model import charts, closed_form
 from symtop.model.precise_form import PreciseForm
 from symtop.run.certificate import Certificate
 from symtop.run.reference import UNCERTIFIED, _cache_path, reference as reference_function
-from symtop.run.witnesses import check_times
+from symtop.run.witnesses import check_times, flown, integrate
 
 
 @pytest.fixture
@@ -132,6 +132,16 @@ def test_an_integration_that_differs_from_the_closed_form_has_the_distance_as_it
     assert np.all(module._integration(where, times, "longdouble")["theta_error_bound"] >= 0.99e-9)
     monkeypatch.setattr(module, "closed_values", honest)
     assert np.all(module._integration(where, times, "longdouble")["theta_error_bound"] < 1e-15)
+
+
+def test_the_times_at_which_an_integration_is_read_change_no_bit():
+    """The study of the truth reads an error and its bound off one integration."""
+    run = symtop.scene("goldstein")
+    for precision in ("double", "longdouble", "quad"):
+        times = np.array([3.0, 11.0, 20.0])
+        both, alone = flown(run, times, precision), integrate(run, times, precision)[0]
+        assert (both.states[both.asked] == alone).all()
+        assert (both.axes == charts.axis_from_quaternion(alone[:, :4])).all()
 
 
 def test_a_certificate_that_contradicts_the_bounds_raises_them(monkeypatch, cache):
