@@ -1,5 +1,6 @@
 """The sources of truth, what is measured and stored of each on one scene, and how close their bounds are."""
 
+import functools
 import time
 from typing import Any
 
@@ -8,10 +9,9 @@ import xarray as xr
 
 from symtop.base.multiprecision import context
 from symtop.model import charts
-from symtop.model.precise_form import PreciseForm
 from symtop.model.scenes import Scene, closed_form
 from symtop.run.reference import PRECISIONS, judged_integration, reference
-from symtop.run.witnesses import flown, integrate, iterated
+from symtop.run.witnesses import flown, integrate, iterated, precise_form
 
 # name: precision, chart
 SOURCES = {
@@ -38,7 +38,6 @@ def source_errors(scene: Scene, source: str, horizons: list[float]) -> xr.Datase
     One integration shows the error and, at its checks, what bounds it: the times at which a run is read change no step.
     """
     precision, chart = SOURCES[source]
-    precise = PreciseForm(scene.top, scene.start, digits=DIGITS)
     columns: dict[str, list[float]] = {ERROR: [], BOUND: [], SECONDS: []}
     for horizon in horizons:
         times = horizon - min(scene.nutation_period, 0.9 * horizon) * np.linspace(0.0, 0.93, PROBES)[::-1]
@@ -47,7 +46,7 @@ def source_errors(scene: Scene, source: str, horizons: list[float]) -> xr.Datase
         run = flown(scene, times, precision) if claims and precision != "closed-form" else None
         path = axes(scene, times, precision, chart) if run is None else run.axes
         columns[SECONDS].append(time.perf_counter() - start)
-        distances = (distance(axis, precise.axis(float(t))) for axis, t in zip(path, times, strict=True))
+        distances = (distance(axis, true_axis(scene, float(t))) for axis, t in zip(path, times, strict=True))
         columns[ERROR].append(max(distances))
         if claims:
             judged = reference(scene, times) if run is None else judged_integration(scene, times, precision, run)
@@ -64,6 +63,12 @@ def axes(scene: Scene, times: charts.Array, precision: str, chart: str) -> Any:
         return charts.axis_from_quaternion(iterated(scene, times)[0])
     states, _ = integrate(scene, times, precision, chart)
     return states[:, :3] if chart == "axis" else charts.axis_from_quaternion(states[:, :4])
+
+
+@functools.lru_cache(maxsize=1024)  # 10 ms each; every source of a scene is read at the same times
+def true_axis(scene: Scene, t: float) -> Any:
+    """The axis of the closed form in `DIGITS` digits."""
+    return precise_form(scene.top, scene.start, DIGITS).axis(t)
 
 
 def distance(axis: Any, true: Any) -> float:

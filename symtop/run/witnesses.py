@@ -10,6 +10,7 @@ integral over the motion. Its own error is what becomes of a last place of mgl a
 witness vouches for it.
 """
 
+import functools
 import math
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -24,6 +25,7 @@ from symtop.methods.plan import Plan
 from symtop.methods.registry import integrator
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
+from symtop.model.top import Angles, SymmetricTop
 
 CHECKS = 16
 DIGITS = 40
@@ -109,14 +111,26 @@ def check_times(scene: Scene, horizon: float) -> charts.Array:
     return np.unique(np.concatenate([even, fastest[fastest > 0.0]]))
 
 
-def seen(scene: Scene, times: charts.Array, quaternions: Any, phis: Any, psis: Any) -> Checks:
-    """Running maxima of the errors of given attitudes and angles, against the closed form in `DIGITS` digits."""
+@functools.lru_cache(maxsize=8)
+def precise_form(top: SymmetricTop, start: Angles, digits: int) -> Any:
+    """The closed form in so many digits."""
     from symtop.model.precise_form import PreciseForm
 
-    precise, mp = PreciseForm(scene.top, scene.start, DIGITS), context(DIGITS + 10)
-    rows = []
+    return PreciseForm(top, start, digits)
+
+
+@functools.lru_cache(maxsize=2048)  # 10 ms each; integrations in three precisions have the same checks
+def precise_attitude(top: SymmetricTop, start: Angles, digits: int, t: float) -> tuple[Any, ...]:
+    """Its attitude at one time."""
+    return tuple(precise_form(top, start, digits).quaternion(t))
+
+
+def seen(scene: Scene, times: charts.Array, quaternions: Any, phis: Any, psis: Any) -> Checks:
+    """Running maxima of the errors of given attitudes and angles, against the closed form in `DIGITS` digits."""
+    mp, rows = context(DIGITS + 10), []
     for t, *components, phi, psi in zip(times, *quaternions.T, phis, psis, strict=True):
-        true = w, x, y, z = tuple(map(mp.convert, precise.quaternion(float(t))))  # all digits, in this arithmetic
+        precise = precise_attitude(scene.top, scene.start, DIGITS, float(t))
+        true = w, x, y, z = tuple(map(mp.convert, precise))  # all digits, in this arithmetic
         attitude = [_read(mp, value) for value in components]
         if sum(a * b for a, b in zip(attitude, true, strict=True)) < 0:
             attitude = [-value for value in attitude]
