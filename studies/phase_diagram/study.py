@@ -22,8 +22,8 @@ CANDIDATES = (  # what can win: the cheapest rows of each family in `population`
     "gauss-8[axis]", "gauss-12[axis]", "rk4[axis]", "rk45-compiled[axis]", "series[axis]", "series-adaptive[axis]",
     "taylor[axis]",
 )  # fmt: skip
-FULL = {"members": 16, "levels": 13, "steps": 2.4e6, "budget": 5e6}
-FULL_SCENE = {"members": 1, "levels": 13, "steps": 1e7, "budget": 1e7}
+FULL = {"members": 16, "levels": 13, "steps": 1.2e6, "budget": 2.5e6}
+FULL_SCENE = {"members": 1, "levels": 13, "steps": 5e6, "budget": 5e6}
 QUICK = {"members": 4, "levels": 10, "steps": 1e5, "budget": 2e5}
 CHECKED = {False: 1e8, True: 4e6}  # force evaluations of one run of a check, by quick
 
