@@ -73,7 +73,7 @@ def cases(quick: bool) -> list[Case]:
     Methods in lanes have ten times the cells, 632 by 379 and 228 by 152, and take about as long with them. An attitude
     chart beside an axis chart is left out: a map is judged by the axis, which both step alike.
     """
-    steps = np.geomspace(0.01, 2.0, 24 if quick else 200)
+    steps = np.geomspace(0.005, 2.0, 24 if quick else 200)
     spins = np.geomspace(0.1, 30.0, 16 if quick else 120)
     passes, gaps = np.geomspace(5e-4, 0.1, 12 if quick else 72), np.geomspace(1e-6, 0.3, 12 if quick else 48)
     phases = np.linspace(0.5, 4.0, 8 if quick else 71).tolist()
