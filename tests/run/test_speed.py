@@ -27,25 +27,30 @@ def test_implicit_kernels_cost_at_most_three_verlet_steps():
 
 
 @pytest.mark.slow
-def test_a_run_costs_what_it_computes():
-    """400 steps with all columns, in times of the steps alone: 8, and 13 with the guard but for its closed form.
+@pytest.mark.parametrize(("name", "most"), [("goldstein", 18.0), ("spheroid", 30.0)])
+def test_a_run_costs_what_it_computes(name, most):
+    """400 steps with all columns, in times of the steps alone: 9, and 13 with the guard but for its closed form.
 
-    They were 45 and 65 while xarray checked every dataset and the plan sorted every mark.
+    They were 45 and 65 while xarray checked every dataset and the plan sorted every mark. On spheroid the guard warns
+    and tries the step that it advises, which is another of its probes: 22.
     """
-    where, row = symtop.scene("spheroid"), symtop.integrator("stormer-verlet[angles]")
-    h = where.horizon / 400
-    steps = bare_run(where, row, "angles", h, where.horizon)
-    plan, _ = make_plan(where, row, h, horizon=where.horizon, samples=501)
+    where, row = symtop.scene(name), symtop.integrator("stormer-verlet[angles]")
+    horizon = min(where.horizon, 3.0 * where.nutation_period) if name == "goldstein" else where.horizon
+    h = horizon / 400
+    steps = bare_run(where, row, "angles", h, horizon)
+    plan, _ = make_plan(where, row, h, horizon=horizon, samples=501)
     form, warned = closed_form(where), list[str]()
+    asked = {"step_size": h, "horizon": horizon}
     calls = [
         steps,
-        lambda: symtop.simulate(where, row, step_size=h, guard=False),
-        lambda: symtop.simulate(where, row, step_size=h, guard=warned.append),
+        lambda: symtop.simulate(where, row, **asked, guard=False),
+        lambda: symtop.simulate(where, row, **asked, guard=warned.append),
         lambda: form.axis(plan.times[:300]),
     ]
     kernel, bare, whole, truth = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
+    assert bool(warned) == (name == "spheroid")
     assert bare / kernel < 12.0
-    assert (whole - truth) / kernel < 18.0
+    assert (whole - truth) / kernel < most
 
 
 @pytest.mark.slow
