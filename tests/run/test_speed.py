@@ -7,6 +7,7 @@ import symtop
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.plan import Plan
 from symtop.model.scenes import closed_form
+from symtop.run.forecast import forecast
 from symtop.run.simulation import make_plan
 
 STEPS = 20_000
@@ -27,12 +28,12 @@ def test_implicit_kernels_cost_at_most_three_verlet_steps():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "most"), [("goldstein", 18.0), ("spheroid", 30.0)])
-def test_a_run_costs_what_it_computes(name, most):
+@pytest.mark.parametrize("name", ["goldstein", "spheroid"])
+def test_a_run_costs_what_it_computes(name):
     """400 steps with all columns, in times of the steps alone: 9, and 13 with the guard but for its closed form.
 
     They were 45 and 65 while xarray checked every dataset and the plan sorted every mark. On spheroid the guard warns
-    and tries the step that it advises, which is another of its probes: 22.
+    and tries the step that it advises: one more forecast, whose time is taken off.
     """
     where, row = symtop.scene(name), symtop.integrator("stormer-verlet[angles]")
     horizon = min(where.horizon, 3.0 * where.nutation_period) if name == "goldstein" else where.horizon
@@ -46,11 +47,12 @@ def test_a_run_costs_what_it_computes(name, most):
         lambda: symtop.simulate(where, row, **asked, guard=False),
         lambda: symtop.simulate(where, row, **asked, guard=warned.append),
         lambda: form.axis(plan.times[:300]),
+        lambda: forecast(where, row, "angles", plan._replace(step_size=0.5 * h)),
     ]
-    kernel, bare, whole, truth = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
+    kernel, bare, whole, truth, tried = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
     assert bool(warned) == (name == "spheroid")
     assert bare / kernel < 12.0
-    assert (whole - truth) / kernel < most
+    assert (whole - truth - (tried if warned else 0.0)) / kernel < 18.0
 
 
 @pytest.mark.slow
