@@ -6,16 +6,16 @@ from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
-from symtop.base.processes import VARIABLES, context
+from symtop.base.processes import VARIABLES, context as one_thread
 
 
 def looked_up(name):
     return os.environ.get(name)
 
 
-def seen_by(where):
+def seen_by(context):
     """What a process that is started so finds in its environment."""
-    with ProcessPoolExecutor(1, where) as pool:
+    with ProcessPoolExecutor(1, context) as pool:
         return [pool.submit(looked_up, name).result() for name in VARIABLES]
 
 
@@ -27,12 +27,12 @@ def unset(monkeypatch):
 
 def test_a_process_has_one_thread_and_this_one_keeps_its_environment():
     before = dict(os.environ)
-    assert seen_by(context()) == ["1"] * len(VARIABLES)
+    assert seen_by(one_thread()) == ["1"] * len(VARIABLES)
     assert dict(os.environ) == before
     assert seen_by(multiprocessing.get_context("spawn")) == [None] * len(VARIABLES), "nobody else is told"
 
 
 def test_what_the_user_has_set_is_obeyed(monkeypatch):
     monkeypatch.setenv(VARIABLES[0], "3")
-    assert seen_by(context()) == ["3", "1", "1"]
+    assert seen_by(one_thread()) == ["3", "1", "1"]
     assert os.environ[VARIABLES[0]] == "3"

@@ -15,12 +15,12 @@ STEPS = 20_000
 
 @pytest.mark.slow
 def test_implicit_kernels_cost_at_most_three_verlet_steps():
-    where = symtop.scene("spheroid")
-    h = where.nutation_period / 400.37
+    chosen = symtop.scene("spheroid")
+    h = chosen.nutation_period / 400.37
     plan = Plan(np.array([STEPS * h]), STEPS * h, h, np.array([STEPS]), np.nan)
     names = ("stormer-verlet", "midpoint", "trapezoidal")
     solvers = [symtop.integrator(name).solvers["angles"] for name in names]
-    calls = [lambda solve=solve: solve(where.top, where.start, plan) for solve in solvers]
+    calls = [lambda solve=solve: solve(chosen.top, chosen.start, plan) for solve in solvers]
     found = timings(calls, batches=60, batch=1e-3)
     verlet, *others = (timing.best for timing in found)
     for other in others:
@@ -35,19 +35,19 @@ def test_a_run_costs_what_it_computes(name):
     They were 45 and 65 while xarray checked every dataset and the plan sorted every mark. On spheroid the guard warns
     and tries the step that it advises: one more forecast, whose time is taken off.
     """
-    where, row = symtop.scene(name), symtop.integrator("stormer-verlet[angles]")
-    horizon = min(where.horizon, 3.0 * where.nutation_period) if name == "goldstein" else where.horizon
+    chosen, row = symtop.scene(name), symtop.integrator("stormer-verlet[angles]")
+    horizon = min(chosen.horizon, 3.0 * chosen.nutation_period) if name == "goldstein" else chosen.horizon
     h = horizon / 400
-    steps = bare_run(where, row, "angles", h, horizon)
-    plan, _ = make_plan(where, row, h, horizon=horizon, samples=501)
-    form, warned = closed_form(where), list[str]()
+    steps = bare_run(chosen, row, "angles", h, horizon)
+    plan, _ = make_plan(chosen, row, h, horizon=horizon, samples=501)
+    form, warned = closed_form(chosen), list[str]()
     asked = {"step_size": h, "horizon": horizon}
     calls = [
         steps,
-        lambda: symtop.simulate(where, row, **asked, guard=False),
-        lambda: symtop.simulate(where, row, **asked, guard=warned.append),
+        lambda: symtop.simulate(chosen, row, **asked, guard=False),
+        lambda: symtop.simulate(chosen, row, **asked, guard=warned.append),
         lambda: form.axis(plan.times[:300]),
-        lambda: forecast(where, row, "angles", plan._replace(step_size=0.5 * h)),
+        lambda: forecast(chosen, row, "angles", plan._replace(step_size=0.5 * h)),
     ]
     kernel, bare, whole, truth, tried = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
     assert bool(warned) == (name == "spheroid")
@@ -58,12 +58,12 @@ def test_a_run_costs_what_it_computes(name):
 @pytest.mark.slow
 def test_a_run_of_one_step_costs_less_than_a_hundred_and_fifty_steps():
     """In steps of Stormer-Verlet: 80, and 175 with a table of 35 stages. It was 370, and 600."""
-    where = symtop.scene("spheroid")
+    chosen = symtop.scene("spheroid")
     verlet = symtop.integrator("stormer-verlet")
     names = ("stormer-verlet", "midpoint", "strang", "rk4", "gauss-4", "srkn-14-6", "sofroniou-spaletta-10")
     methods = [symtop.integrator(name) for name in names]
-    calls = [bare_run(where, verlet, "angles", 0.001, 20.0)]
-    calls += [bare_run(where, one, chart, 0.01, 0.01) for one in methods for chart in one.charts()]
+    calls = [bare_run(chosen, verlet, "angles", 0.001, 20.0)]
+    calls += [bare_run(chosen, one, chart, 0.01, 0.01) for one in methods for chart in one.charts()]
     base, *singles = (timing.best for timing in timings(calls, batches=60, batch=1e-3))
     labels = [(one.name, chart) for one in methods for chart in one.charts()]
     for (name, chart), seconds in zip(labels, singles, strict=True):
@@ -74,7 +74,7 @@ def test_memory_and_results_do_not_depend_on_how_the_steps_are_batched(monkeypat
     """A run that returns to Python every few steps gives the same bits as one that does not."""
     from symtop.methods import loop as drive
 
-    where = symtop.scene("spheroid")
-    whole = symtop.simulate(where, "midpoint", step_size=0.01, samples=11, guard=False)
+    chosen = symtop.scene("spheroid")
+    whole = symtop.simulate(chosen, "midpoint", step_size=0.01, samples=11, guard=False)
     monkeypatch.setattr(drive, "BLOCK", 7)
-    assert symtop.simulate(where, "midpoint", step_size=0.01, samples=11, guard=False).equals(whole)
+    assert symtop.simulate(chosen, "midpoint", step_size=0.01, samples=11, guard=False).equals(whole)
