@@ -17,7 +17,7 @@ import xarray as xr
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, JUDGED, VERDICTS
 from symtop.methods.registry import Integrator, integrator, integrators, split_name
 
-from .outcome_maps import NOT_RUN
+from .outcome_maps import NOT_RUN, SETTLED
 from .tables import MECHANISMS, Column
 
 SLOW, FAST = 1.0, 3.0  # relative spin
@@ -42,10 +42,11 @@ class Failure(NamedTuple):
 class OutcomeMap(NamedTuple):
     """One integrator's map as the dataset has it, without unused margins."""
 
-    outcome: np.ndarray  # (parameters, settings), index into VERDICTS
+    outcome: np.ndarray  # (parameters, settings), index into VERDICTS; accurate where nothing was run
     parameter: np.ndarray
     settings: np.ndarray  # steps in nutation periods, or tolerances
     control: str  # step_size, tolerance or none
+    made: np.ndarray  # (parameters, settings): was it run, or had the scene settled (`outcome_maps`)?
 
     @property
     def reach(self) -> np.ndarray:
@@ -107,7 +108,9 @@ def map_of(cell: xr.Dataset) -> OutcomeMap | None:
     if not rows.any():
         return None
     parameter, settings = cell[Column.PARAMETER].values[rows], cell[Column.SETTING].values[columns]
-    return OutcomeMap(outcome[rows][:, columns], parameter, settings, str(cell[Column.CONTROL].values))
+    outcome = outcome[rows][:, columns]
+    made = outcome != SETTLED
+    return OutcomeMap(np.where(made, outcome, np.uint8(0)), parameter, settings, str(cell[Column.CONTROL].values), made)
 
 
 def common(shown: Mapping[str, OutcomeMap]) -> dict[str, OutcomeMap]:
@@ -122,6 +125,7 @@ def common(shown: Mapping[str, OutcomeMap]) -> dict[str, OutcomeMap]:
         return dict(shown)
     return {
         name: one._replace(outcome=one.outcome[inside[name][0]][:, inside[name][1]],
+                           made=one.made[inside[name][0]][:, inside[name][1]],
                            parameter=one.parameter[inside[name][0]], settings=one.settings[inside[name][1]])
         for name, one in shown.items()
     }  # fmt: skip

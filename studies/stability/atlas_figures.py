@@ -32,6 +32,8 @@ HATCHES = {  # of the legend, and in the map: which pixels, by row, counted upwa
     "step_too_small": ("....", lambda row, column: (row % 5 == 0) & (column % 5 == 0)),
     "out_of_budget": ("||||", lambda row, column: (column % 6 == 0) & (row >= 0)),
 }
+SETTLED = "accurate above, not run"  # of tops that were accurate at all settings of a stretch above (`outcome_maps`)
+PALE_GREEN = "#9FDAC8"
 SEEN = 0.004  # of a small map: an outcome with less cannot be seen in it and has no entry in the key
 LINES = {  # over the maps: label and dashes
     "limit": ("small nutations grow beyond", "-"),
@@ -50,16 +52,19 @@ def said(word: str) -> str:
     return {"left_chart": "left its chart"}.get(word, word.replace("_", " "))
 
 
-def sampled(outcome: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint8]:
+def sampled(values: Any, height: int, width: int) -> Any:
     """A map with this many rows and columns: the cells in the middle of each."""
     row, column = (
-        (2 * np.arange(n) + 1) * size // (2 * n) for n, size in zip((height, width), outcome.shape, strict=True)
+        (2 * np.arange(n) + 1) * size // (2 * n) for n, size in zip((height, width), values.shape, strict=True)
     )
-    return outcome[row][:, column]
+    return values[row][:, column]
 
 
-def painted(outcome: NDArray[np.uint8], size: str = "enlarged") -> NDArray[np.float64]:
-    """A map of outcomes, shape (rows, columns), as an image (height, width, 3) with hatches; `size` is of `RASTER`."""
+def painted(outcome: NDArray[np.uint8], made: NDArray[np.bool_], size: str = "enlarged") -> NDArray[np.float64]:
+    """A map of outcomes, shape (rows, columns), as an image (height, width, 3) with hatches; `size` is of `RASTER`.
+
+    It is pale where nothing was run.
+    """
     from matplotlib.colors import to_rgb
 
     big = sampled(outcome, *RASTER[size])
@@ -69,6 +74,7 @@ def painted(outcome: NDArray[np.uint8], size: str = "enlarged") -> NDArray[np.fl
         image[region] = to_rgb(OUTCOME_COLORS[word])
         if word in HATCHES:
             image[region & HATCHES[word][1](*np.indices(big.shape))] *= SHADE
+    image[~sampled(made, *RASTER[size])] = to_rgb(PALE_GREEN)
     return image
 
 
@@ -120,7 +126,7 @@ def draw_map(
     an axis every cell still holds its own value.
     """
     x, y = (extent[:2], extent[2:]) if extent else (_edges(one.settings), _edges(one.parameter))
-    image = painted(one.outcome, size)
+    image = painted(one.outcome, one.made, size)
     axis.imshow(image, origin="lower", extent=(*x, *y), aspect="auto", interpolation="nearest")
     axis.grid(visible=False)
     most = 5 if size == "enlarged" else 3
@@ -192,6 +198,7 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
         one = shown[name]
         parts = zip(VERDICTS, one.shares, strict=False)
         drawn |= dict.fromkeys(word for word, share in parts if share >= SEEN)
+        drawn |= {} if one.made.all() else {SETTLED: None}
         draw_map(axis, one, "small", None if one.control == "none" else (*across, *upwards))
         if one.control != "none":
             axis.set_xticks(*_ticks(inner, 3))
@@ -250,6 +257,7 @@ def enlarged(data: xr.Dataset, family: str, name: str, message: str) -> Any:
         one = shown[name]
         drawn |= dict.fromkeys(VERDICTS[index] for index in np.unique(sampled(one.outcome, *RASTER["enlarged"])))
         draw_map(axis, one)
+        drawn |= {} if one.made.all() else {SETTLED: None}
         drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, integrator=name), one, over))
         axis.set(xlabel=CONTROLS[one.control], ylabel=AXES[over])
         axis.set_title(f"scene {scene}, {'its spin changed' if over == 'spin' else 'a fall past a pole'}")
@@ -259,7 +267,7 @@ def enlarged(data: xr.Dataset, family: str, name: str, message: str) -> Any:
 
 
 def _key(figure: Any, drawn: Mapping[str, None]) -> None:
-    shown = [name for name in (*VERDICTS, *LINES) if name in drawn]
+    shown = [name for name in (VERDICTS[0], SETTLED, *VERDICTS[1:], *LINES) if name in drawn]
     columns = (4 if set(drawn).isdisjoint(("limit", "third")) else 3) if figure.get_figwidth() > 5.0 else 2
     figure.legend(handles=list(map(_handle, shown)), loc="outside lower center", ncols=columns, frameon=False)
 
@@ -271,5 +279,7 @@ def _handle(name: str) -> Any:
 
     if name in LINES:
         return Line2D([], [], color="black", lw=1.1, ls=LINES[name][1], label=LINES[name][0])
+    if name == SETTLED:
+        return Patch(facecolor=PALE_GREEN, label=SETTLED, edgecolor=GREY, lw=0.4)
     hatch = HATCHES[name][0] if name in HATCHES else None
     return Patch(facecolor=OUTCOME_COLORS[name], label=said(name), hatch=hatch, edgecolor=GREY, lw=0.4)

@@ -13,6 +13,7 @@ from symtop.report.sentences import counted, few
 from symtop.runner.study import Table
 
 from .atlas import COMMON, NOTABLE, OutcomeMap, accurate_everywhere, closed_forms, common, maps, pole_effect
+from .outcome_maps import SETTLED_STEPS, SETTLED_TOLERANCES
 from .tables import CURVE_STEPS, PERIODS, Column
 
 FAILURES = {
@@ -230,7 +231,23 @@ def summary(data: xr.Dataset, family: str) -> list[str]:
             f"{ends_well}. That a run ends without an error says little: what energy, momenta and the guard notice is "
             "in Populations."
         )
+        sentences += [said for said in (_settled(data.sel(scene=family), by_name),) if said]
     return sentences
+
+
+def _settled(part: xr.Dataset, by_name: Mapping[str, OutcomeMap]) -> str:
+    """How many cells were not run, and what the runs say that check them; empty if all were run."""
+    cells = sum(one.made.size for one in by_name.values())
+    left = cells - sum(int(one.made.sum()) for one in by_name.values())
+    if not left:
+        return ""
+    checks, refuted = (int(part[name].sum()) for name in (Column.CHECKS, Column.REFUTED))
+    ended = "none is inaccurate" if not refuted else f"{counted(refuted, 'top')} failed it and ran at every setting"
+    return (
+        f"Of the {cells} cells of these maps {left / cells:.0%} were not run: their tops had been accurate at every "
+        f"step over a factor of {SETTLED_STEPS:g} above, or at every tolerance over a factor of "
+        f"{SETTLED_TOLERANCES:g}. Of {checks} runs that check this {ended}."
+    )
 
 
 def _reaches(data: xr.Dataset, family: str, by_name: Mapping[str, OutcomeMap]) -> str:

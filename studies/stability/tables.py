@@ -1,7 +1,8 @@
 """The tables of the stability study: one dataset for each mechanism of failure and each integrator.
 
-Outcomes are stored as bytes, an index into `VERDICTS`; 255 means that nothing was run. Steps are in nutation periods of
-the scene they belong to; phases are h omega, the step times the angular frequency of small nutations.
+Outcomes are stored as bytes, an index into `VERDICTS`; 254 means that a scene had settled (`outcome_maps`) and was not
+run, 255 that there is no such cell. Steps are in nutation periods of the scene they belong to; phases are h omega, the
+step times the angular frequency of small nutations.
 """
 
 import math
@@ -18,7 +19,7 @@ from symtop.model.scenes import Scene
 from symtop.run.linear_stability import linear_limits, sleeping_threshold, with_momenta
 
 from .failures import sampled_energy_error, separatrix_horizon, surviving_displacements
-from .outcome_maps import family, outcome_map
+from .outcome_maps import SETTLED, family, outcome_map
 from .solver_tolerance import solver_sweep, textbook_midpoint
 from .windows import narrow_window
 
@@ -34,6 +35,8 @@ class Column:
     # maps of outcomes; parameter (relative spin or gap delta), setting (steps in nutation periods, or tolerances)
     OUTCOME, PARAMETER, SETTING = "outcome", "parameter_value", "control"
     CONTROL, GRID = "knob_name", "grid"  # step_size, tolerance or none; settings x parameters
+    # runs of scenes that had settled, and scenes that had and were then not accurate
+    CHECKS, REFUTED = "checks", "refuted"
     # limits of a step along a map over spin; curve
     LIMIT_PARAMETER, LINEAR_LIMIT, THIRD_TURN = "limit_parameter", "linear_limit", "third_turn"
     # one column of the map over the gap to a pole; parameter
@@ -67,7 +70,9 @@ def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.
         shown = [int(np.argmin(nearest)) if method.control else 0]
     runs = outcome_map(name, parameters, method, ladder, settings["periods"], shown)
     table: dict[str, Any] = {
-        Column.OUTCOME: (("parameter", "setting"), runs.verdict),
+        Column.OUTCOME: (("parameter", "setting"), np.where(runs.made, runs.verdict, np.uint8(SETTLED))),
+        Column.CHECKS: float(runs.checks),
+        Column.REFUTED: float(runs.refuted),
         Column.PARAMETER: ("parameter", np.asarray(parameters, float)),
         Column.SETTING: ("setting", np.asarray(ladder, float)),
         Column.CONTROL: method.control or "none",

@@ -16,14 +16,17 @@ from symtop.runner.study import Table
 from .atlas import NEAR, families, map_of, methods_of, pole_effect
 from .atlas_words import atlas_tables, summary
 from .failures import LONGEST, LOST, SEEN
+from .outcome_maps import CHECKED, SETTLED_STEPS, SETTLED_TOLERANCES
 from .resonance_words import VERLET, limits, only_windows, resonances, rows_with, unlimited
 from .tables import CURVE_STEPS, SOUGHT_PHASE, SOUGHT_STEPS, Column
 
 HOW_TO_READ = (
     "A row is a method in one chart, method[chart], as rk4[axis]. A map has one cell a run. To the right the step or "
-    "the tolerance grows; upwards the spin r, or the gap delta between path and pole. Green is accurate. Yellow has "
-    "bounded energy and a wrong phase. Hatched cells fail: they lose energy, cross a turning point of the true motion, "
-    "or end early. Solid lines: the linear limit, where small nutations about a steady precession first grow or the "
+    "the tolerance grows; upwards the spin r, or the gap delta between path and pole. Green is accurate. Pale green "
+    f"was not run: the top was accurate at every step over a factor of {SETTLED_STEPS:g} above, or at every tolerance "
+    f"over a factor of {SETTLED_TOLERANCES:g}; runs at {CHECKED} settings of a map check it. Yellow has bounded energy "
+    "and a wrong phase. Hatched cells fail: they lose energy, cross a turning point of the true motion, or end early. "
+    "Solid lines: the linear limit, where small nutations about a steady precession first grow or the "
     f"precession is lost, sought at {CURVE_STEPS} steps; without one there is none, or none that can be followed. "
     "Dashed lines: the step that advances such a nutation by a third of a turn. A limit for fast tops (r > 3) or slow "
     "tops (r < 1) holds for nine spins in ten. A method fails from a step or tolerance on if at least half of all "

@@ -37,7 +37,7 @@ class Judged(NamedTuple):
     @classmethod
     def begun(cls, scenes: int, settings: int) -> "Judged":
         """Room for so many."""
-        return cls(np.empty((scenes, settings), np.uint8), np.full((scenes, settings), math.nan))
+        return cls(np.zeros((scenes, settings), np.uint8), np.full((scenes, settings), math.nan))
 
 
 class Truths(NamedTuple):
@@ -51,7 +51,7 @@ class Truths(NamedTuple):
         """Nutation periods (m,)."""
         return self.scenes[:, 3]
 
-    def part(self, scenes: slice) -> "Truths":
+    def part(self, scenes: NDArray[np.int64]) -> "Truths":
         """The same for some of the scenes."""
         return Truths(self.constants[scenes], self.scenes[scenes])
 

@@ -54,6 +54,16 @@ def test_a_map_says_what_single_runs_say(name):
                 assert runs.axis_error[place, column] >= 0.3 * error.max()
 
 
+def together_in(plan, n, alone=()):
+    """The settings of each call of a map of n scenes, from the last to the first."""
+    pieces, end = [], len(plan.settings)
+    while end:
+        first = outcome_maps.group_below(plan, end, n, alone)
+        pieces.append(slice(first, end))
+        end = first
+    return pieces
+
+
 @pytest.mark.parametrize("name", ["strang", "stormer-verlet", "midpoint"])
 def test_columns_that_are_run_together_have_the_bits_of_runs_one_by_one(name, monkeypatch):
     """Runs of few steps, which show every step, and runs that fail among them."""
@@ -63,14 +73,14 @@ def test_columns_that_are_run_together_have_the_bits_of_runs_one_by_one(name, mo
     alone = [outcome_maps.one_by_one(plan, chart, scene_) for scene_ in tops]
     numbers = np.array([flat(scene_.top, scene_.start) for scene_ in tops])
     periods = np.array([scene_.nutation_period for scene_ in tops])
-    for columns in outcome_maps.columns_together(plan, len(tops)):
+    for columns in together_in(plan, len(tops)):
         made = outcome_maps.together(plan, method.solvers[chart], columns, numbers, periods)
         for one, part in zip(alone, zip(made.states, made.momenta, made.outcome, strict=True), strict=True):
             for values, others in zip(one, part, strict=True):
                 seen = values[0, columns][:, : made.states.shape[2]] if others.ndim > 1 else values[0, columns]
                 np.testing.assert_array_equal(seen, others)
     monkeypatch.setattr(outcome_maps, "MOST", plan.phases.size)  # other columns together
-    assert len(list(outcome_maps.columns_together(plan, len(tops)))) == len(steps)
+    assert len(together_in(plan, len(tops))) == len(steps)
     for values, others in zip(whole, outcome_map("cusp", spins, method, steps, 2.0), strict=True):
         np.testing.assert_array_equal(values, others)
 
@@ -84,6 +94,69 @@ def test_errors_are_followed_where_they_are_asked_for():
     np.testing.assert_array_equal(whole.axis_error[whole.verdict == 0], one.axis_error[whole.verdict == 0])
     assert (one.axis_error <= whole.axis_error).all()
     assert (one.axis_error < whole.axis_error).any()
+
+
+SETTLING = {"strang": np.geomspace(0.01, 2.0, 40), "gauss-4": np.geomspace(0.02, 2.0, 30),
+            "stormer-verlet": np.geomspace(0.01, 0.5, 30), "rk45-compiled": np.geomspace(1e-9, 0.1, 30)}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SETTLING)
+def test_what_is_not_run_would_have_been_accurate(name):
+    """The same map run as a whole: equal cell by cell, with every top run at the settings that check it."""
+    spins, steps = np.geomspace(0.1, 30.0, 40).tolist(), SETTLING[name].tolist()
+    some, all_of_it = (outcome_map("cusp", spins, integrator(name), steps, 10.0, chosen) for chosen in ([], None))
+    np.testing.assert_array_equal(some.verdict, all_of_it.verdict)
+    np.testing.assert_array_equal(some.axis_error[some.made & (some.verdict == 0)],
+                                  all_of_it.axis_error[some.made & (some.verdict == 0)])  # fmt: skip
+    assert all_of_it.made.all()
+    assert 0.05 < np.mean(~some.made) < 0.9
+    assert some.made[:, [0, -1]].all()
+    assert some.checks > 0
+    assert some.refuted == 0
+    assert np.isnan(some.axis_error[~some.made]).all()
+    factor = 10.0 if name == "rk45-compiled" else 2.0
+    for row, made in enumerate(some.made):  # from the longest step that is left out, accurate over a factor above
+        if not made.all():
+            last = np.flatnonzero(~made)[-1]
+            above = (SETTLING[name] > steps[last]) & (SETTLING[name] <= factor * steps[last])
+            assert (all_of_it.verdict[row, above] == 0).all()
+
+
+def test_a_top_that_had_settled_and_is_not_accurate_is_run_at_every_setting(monkeypatch):
+    """The verdicts of one spin at the two shortest steps are turned; the others are left as they are."""
+    steps, spins = np.geomspace(0.01, 0.5, 30).tolist(), [0.3, 3.0, 8.0]
+    before, run = outcome_map("cusp", spins, integrator("gauss-4"), steps, 10.0, []), outcome_maps._Descent._run
+
+    def run_and_turn(self, rows, columns):
+        run(self, rows, columns)
+        self.judged.verdict[1, :2] = VERDICTS.index("drifting")
+
+    monkeypatch.setattr(outcome_maps._Descent, "_run", run_and_turn)
+    after = outcome_map("cusp", spins, integrator("gauss-4"), steps, 10.0, [])
+    assert (before.refuted, after.refuted) == (0, 1)
+    assert not before.made[1].all()
+    assert after.made[1].all()
+    np.testing.assert_array_equal(after.made[[0, 2]], before.made[[0, 2]])
+    assert (after.verdict[1] == VERDICTS.index("drifting")).sum() == 2
+
+
+def test_cells_that_were_not_run_are_pale_and_counted():
+    spins, steps = [0.3, 3.0, 8.0, 20.0], np.geomspace(0.01, 0.5, 30).tolist()
+    settings = {"parameters": spins, "ladder": steps, "periods": 10.0}
+    data = store.combine([(Case("cusp", name), map_table("cusp", integrator(name), settings))
+                          for name in ("gauss-4[axis]", "strang[axis]")])  # fmt: skip
+    one = atlas.maps(data, "cusp")["gauss-4[axis]"]
+    assert set(np.unique(data[Column.OUTCOME].values)) > {0, outcome_maps.SETTLED}
+    assert one.made.mean() < 0.8
+    assert (one.outcome[~one.made] == 0).all()
+    pale = np.isclose(atlas_figures.painted(one.outcome, one.made), to_rgb(atlas_figures.PALE_GREEN)).all(axis=-1)
+    assert pale.mean() == pytest.approx(1.0 - one.made.mean(), abs=0.02)
+    said = atlas_words.summary(data, "cusp")[-1]
+    left = sum((~each.made).sum() for each in atlas.maps(data, "cusp").values())
+    assert said.startswith(f"Of the 240 cells of these maps {left / 240:.0%} were not run")
+    assert said.endswith(f"Of {int(data[Column.CHECKS].sum())} runs that check this none is inaccurate.")
+    drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-steps"]
+    assert atlas_figures.SETTLED in {text.get_text() for text in drawn.figure.legends[0].get_texts()}
 
 
 def test_adaptive_methods_are_mapped_over_their_tolerance():
@@ -101,7 +174,10 @@ def test_rows_share_phases_and_are_not_commensurate_with_the_nutation():
     assert np.isnan(runs.phases[2]).sum() == 49 - 7
     phases = np.sort(np.mod(runs.phases[0], 1.0))
     assert np.max(np.diff(phases)) < 0.125
-    assert [piece.stop - piece.start for piece in outcome_maps.columns_together(runs, 1)] == [2, 1]
+    assert [piece.stop - piece.start for piece in together_in(runs, 1)] == [1, 1, 1]  # too far apart
+    near = row_plan(integrator("strang"), [0.01, 0.0105, 0.1, 0.105, 0.25, 1.9, 1.91], 12.0)
+    assert [piece.stop - piece.start for piece in together_in(near, 1)] == [2, 1, 2, 2]
+    assert [piece.stop - piece.start for piece in together_in(near, 1, alone={1, 2})] == [2, 1, 1, 1, 1, 1]
 
 
 def test_the_families_are_what_they_say():
@@ -331,7 +407,7 @@ def test_maps_can_be_read_without_colours(size):
     """Every outcome that is not plain has a hatch of its own, and any two colours differ in lightness or have one."""
     hatched = {}
     for index, word in enumerate(VERDICTS):
-        image = atlas_figures.painted(np.full((4, 6), index, dtype=np.uint8), size)
+        image = atlas_figures.painted(np.full((4, 6), index, dtype=np.uint8), np.full((4, 6), True), size)
         hatched[word] = tuple(np.unique(image.reshape(-1, 3), axis=0).shape)
     plain = [word for word, shape in hatched.items() if shape[0] == 1]
     lightness = {word: 0.2126 * r + 0.7152 * g + 0.0722 * b for word in plain
@@ -441,7 +517,8 @@ def test_the_hatch_of_a_map_has_the_slope_of_its_swatch_in_the_legend(word):
         figure = Figure(figsize=(2.0, 1.6), dpi=200, layout="none")
         axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         if draw == "map":
-            one = atlas.OutcomeMap(index, np.geomspace(0.1, 30.0, 40), np.geomspace(0.01, 1.0, 60), "step_size")
+            axes = np.geomspace(0.1, 30.0, 40), np.geomspace(0.01, 1.0, 60)
+            one = atlas.OutcomeMap(index, *axes, "step_size", np.full(index.shape, True))
             atlas_figures.draw_map(axis, one, "small")
         else:
             swatch = atlas_figures._handle(word)
@@ -510,7 +587,7 @@ def test_the_page_of_the_pole_tells_charts_apart_and_names_an_exception():
     rows = {"rk4[axis]": [0, 0, 0], "strang[axis]": [0, 0, 1], "rk4[angles]": [0, 1, 1],
             "stormer-verlet-reversible[angles]": [0, 0, 1]}  # fmt: skip
     axes = np.array([1e-6, 0.3]), np.array([0.001, 0.01, 0.1]), "step_size"
-    shown = {name: atlas.OutcomeMap(np.array([row] * 2), *axes) for name, row in rows.items()}
+    shown = {name: atlas.OutcomeMap(np.array([row] * 2), *axes, np.full((2, 3), True)) for name, row in rows.items()}
     data = xr.Dataset(coords={"integrator": list(rows)})
     assert atlas_words.page_message(data, "grazing", shown) == (
         "Past a pole methods on the axis are accurate in 67% to 100% of their runs, methods in angles in 33%, but for "
