@@ -1,18 +1,20 @@
 """Runs the missing cases of a study in worker processes; a case whose worker dies is retried alone.
 
-The first case of every integrator goes first and the integrator's others follow it, so that its kernels are compiled by
-one worker and found on disk by the rest. A case that another run is computing is left to it, and looked for again at
-the end. If a worker is killed, all cases that were begun are computed again, each by itself, so that a case that kills
-its process can be told from the others.
+Two workers that need the same kernel at the same time both compile it. So the first case of every method goes first,
+neighbours of different families, because methods of a family share kernels; the first cases of its other charts follow
+it, and each of these is followed by its others, which find their kernels on disk (`Queue`). A case that another run is
+computing is left to it, and looked for again at the end. If a worker is killed, all cases that were begun are computed
+again, each by itself, so that a case that kills its process can be told from the others.
 """
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from pathlib import Path
 
 from symtop.base import locks
 from symtop.base.validate import SymtopError
+from symtop.methods.registry import integrators, split_name
 from symtop.runner import plugins, store, work
 from symtop.runner.pools import CLUSTER, HERE, Workers
 from symtop.runner.study import Study
@@ -104,31 +106,60 @@ def _failed(task: Task, reason: str, trace: str = "") -> Result:
     return Result("failed", message)
 
 
+class Queue:
+    """Tasks that are `ready` to begin, and those that wait for another one to end, whose kernels they need."""
+
+    def __init__(self, tasks: Iterable[Task], *, timed: bool) -> None:
+        rows: dict[str, list[Task]] = {}
+        for task in tasks:  # a timed case compiles before it times
+            rows.setdefault(task.path if timed else task.case.integrator, []).append(task)
+        charts: dict[str, list[str]] = {}
+        for row in rows:
+            charts.setdefault(row if timed else split_name(row)[0], []).append(row)
+        self._followers = {row: group[1:] for row, group in rows.items()}
+        self._charts = {method: [rows[row][0] for row in several[1:]] for method, several in charts.items()}
+        family = dict.fromkeys(charts, "") if timed else {method: _family(method) for method in charts}
+        seen: Counter[str] = Counter()
+        rank = dict[str, int]()  # the first method of every family, then the second, ...
+        for method in charts:
+            rank[method] = seen[family[method]]
+            seen[family[method]] += 1
+        self.ready = deque(rows[charts[method][0]][0] for method in sorted(charts, key=rank.__getitem__))
+
+    def ended(self, task: Task) -> None:
+        """What waited for the task may begin."""
+        row = task.case.integrator
+        self.ready.extend(self._followers.pop(row, ()))
+        self.ready.extend(self._charts.pop(split_name(row)[0], ()))
+
+
+def _family(method: str) -> str:
+    """The family of a method; a name that none has, such as that of a case of several, is one by itself."""
+    known = integrators().get(method)
+    return method if known is None else known.family
+
+
 def _drain(study: Study, tasks: list[Task], workers: Workers, size: int, settle: OnResult, *, timed: bool) -> None:
-    """Hand over all tasks, the first of each integrator before its others."""
+    """Hand over all tasks in the order of a `Queue`."""
     pool, width = workers.pool(size), workers.width(size)
     if timed:
         company = workers.side_by_side(size, len(tasks))
         tasks, width = [task._replace(company=company) for task in tasks], company.at_once
     given = study if size == HERE else None  # other processes load it by name
-    followers: dict[str, list[Task]] = {}
-    for task in tasks:
-        kernels = task.path if timed else task.case.integrator  # a timed case compiles before it times
-        followers.setdefault(kernels, []).append(task)
-    ready = deque(group.pop(0) for group in followers.values())
+    queue = Queue(tasks, timed=timed)
     futures: dict[Future[Result], Task] = {}
     elsewhere: list[Task] = []
     patient = False
-    while ready or futures or elsewhere:
-        if not ready and not futures:
-            ready, elsewhere, patient = deque(elsewhere), [], True
-        while ready and len(futures) < width:
-            task = ready.popleft()
+    while queue.ready or futures or elsewhere:
+        if not queue.ready and not futures:
+            queue.ready, elsewhere, patient = deque(elsewhere), [], True
+        while queue.ready and len(futures) < width:
+            task = queue.ready.popleft()
             futures[pool.submit(work.compute, task, given, wait=patient)] = task
         for future in wait(futures, return_when=FIRST_COMPLETED).done:
             task = futures.pop(future)
             result = _result(future, task, workers)
-            ready.extend(followers.pop(task.case.integrator, ()))
+            queue.ended(task)
             if result.state == "busy":
                 elsewhere.append(task)
             else:

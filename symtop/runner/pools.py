@@ -12,6 +12,7 @@ from typing import Any
 
 from symtop.base import cluster, processes
 from symtop.base.threads import cores
+from symtop.model import closed_form
 from symtop.runner import trial, work
 from symtop.runner.sideline import Beside, Sideline
 from symtop.runner.work import ALONE, Company
@@ -70,8 +71,11 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
         return self._sideline.promise(function, *args)
 
     def open_beside(self) -> None:
-        """Start the process of `beside`, which takes two seconds."""
-        self._sideline.open()
+        """Start the process of `beside`, which compiles the closed form: every worker would, in 12 s, and interpret it.
+
+        Whoever needs it meanwhile interprets it, and loads it as soon as it is on disk (`symtop.base.lazy`).
+        """
+        self._sideline.open(closed_form.compile_now)
 
     def fill(self) -> None:
         """Let promised calls begin, one after another: cases are computed that are not timed."""

@@ -70,10 +70,10 @@ class Sideline:
             self._promised = [*(other for other in self._promised if not other.done()), one]
         return one
 
-    def open(self) -> None:
-        """Start the process, which takes two seconds, before there is a call to make."""
+    def open(self, first: Callable[[], Any]) -> None:
+        """Start the process, which takes two seconds, with a call that nobody waits for."""
         if self._own is None:
-            self.promise(int).start()
+            self.promise(first).start()
 
     def go_on(self) -> None:
         """Let promised calls begin, one after another."""
