@@ -30,7 +30,7 @@ NOT_QUICK = {"left to the ordinary grid": ("goldstein",)}
 STEPS_A_NUTATION = 118.02  # not commensurate with the nutation
 TOLERANCE = 1e-8  # of every adaptive method without a default of its own
 SHORTENED = {  # share of the horizon: over all of it they take between 15 s (lsoda) and 8 minutes (radau) on each scene
-    "rk45": 0.1, "dop853": 0.1, "lsoda": 0.1, "radau": 0.01, "taylor-quad": 0.005,
+    "rk45": 0.05, "dop853": 0.05, "lsoda": 0.05, "radau": 0.005, "taylor-quad": 0.005,
 }  # fmt: skip
 MEASURES = {HISTORIES: run_history, WINDOWS: windows, ROUNDINGS: rounding, HORIZONS: phase_loss}
 

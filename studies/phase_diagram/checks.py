@@ -22,8 +22,8 @@ COUNT = 10
 
 
 def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
-    """Settings of the checks: quantity, target, horizon, and of two rows the two settings."""
-    eligible: dict[str, list[tuple[float, dict[str, Any]]]] = {}
+    """Settings of the checks: quantity, target, horizon, and of two rows the two settings; the dearest first."""
+    eligible: dict[str, list[tuple[float, float, dict[str, Any]]]] = {}
     for quantity in QUANTITIES:
         panel = tables.diagram(data, tables.SCENE, quantity)
         eligible[quantity] = []
@@ -34,25 +34,26 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
             pair = [int(panel.winner[at]), int(panel.second[at])]
             parts = [rows[place].settings(at) for place in pair]
             horizon = float(panel.horizons[at[1]])
-            if max(work for _, work, _ in parts) * horizon > limit:
+            dearest = max(work for _, work, _ in parts) * horizon
+            if dearest > limit:
                 continue
             names = [panel.names[place] for place in pair]
             settings = {"integrators": names, "quantity": quantity, "target": tables.TARGETS[at[0]], "horizon": horizon,
                         "settings": [values for values, _, _ in parts]}  # fmt: skip
-            eligible[quantity].append((horizon / parts[0][2], settings))
+            eligible[quantity].append((horizon / parts[0][2], dearest, settings))
     queues = [sorted(each, key=lambda one: -one[0]) for each in eligible.values()]
-    taken: list[dict[str, Any]] = []
+    taken: list[tuple[float, dict[str, Any]]] = []
     runs: list[Any] = []
     while any(queues) and len(taken) < COUNT:
         for queue in queues:
             while queue and len(taken) < COUNT:
-                one = queue.pop(0)[1]
+                _, dearest, one = queue.pop(0)
                 decided_by = one["integrators"], one["settings"]
                 if decided_by not in runs:
                     runs.append(decided_by)
-                    taken.append(one)
+                    taken.append((dearest, one))
                     break
-    return taken
+    return [one for _, one in sorted(taken, key=lambda each: -each[0])]  # the last to begin are short
 
 
 class _Row(NamedTuple):

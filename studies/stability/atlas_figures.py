@@ -32,7 +32,7 @@ HATCHES = {  # of the legend, and in the map: which pixels, by row, counted upwa
     "step_too_small": ("....", lambda row, column: (row % 5 == 0) & (column % 5 == 0)),
     "out_of_budget": ("||||", lambda row, column: (column % 6 == 0) & (row >= 0)),
 }
-SETTLED = "accurate above, not run"  # of tops that were accurate at all settings of a stretch above (`outcome_maps`)
+SETTLED = {"step_size": "accurate at longer steps, not run", "tolerance": "accurate at looser tolerances, not run"}
 PALE_GREEN = "#9FDAC8"
 SEEN = 0.004  # of a small map: an outcome with less cannot be seen in it and has no entry in the key
 LINES = {  # over the maps: label and dashes
@@ -198,7 +198,7 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
         one = shown[name]
         parts = zip(VERDICTS, one.shares, strict=False)
         drawn |= dict.fromkeys(word for word, share in parts if share >= SEEN)
-        drawn |= {} if one.made.all() else {SETTLED: None}
+        drawn |= {} if one.made.all() else {SETTLED[one.control]: None}
         draw_map(axis, one, "small", None if one.control == "none" else (*across, *upwards))
         if one.control != "none":
             axis.set_xticks(*_ticks(inner, 3))
@@ -257,7 +257,7 @@ def enlarged(data: xr.Dataset, family: str, name: str, message: str) -> Any:
         one = shown[name]
         drawn |= dict.fromkeys(VERDICTS[index] for index in np.unique(sampled(one.outcome, *RASTER["enlarged"])))
         draw_map(axis, one)
-        drawn |= {} if one.made.all() else {SETTLED: None}
+        drawn |= {} if one.made.all() else {SETTLED[one.control]: None}
         drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, integrator=name), one, over))
         axis.set(xlabel=CONTROLS[one.control], ylabel=AXES[over])
         axis.set_title(f"scene {scene}, {'its spin changed' if over == 'spin' else 'a fall past a pole'}")
@@ -267,8 +267,9 @@ def enlarged(data: xr.Dataset, family: str, name: str, message: str) -> Any:
 
 
 def _key(figure: Any, drawn: Mapping[str, None]) -> None:
-    shown = [name for name in (VERDICTS[0], SETTLED, *VERDICTS[1:], *LINES) if name in drawn]
-    columns = (4 if set(drawn).isdisjoint(("limit", "third")) else 3) if figure.get_figwidth() > 5.0 else 2
+    shown = [name for name in (VERDICTS[0], *SETTLED.values(), *VERDICTS[1:], *LINES) if name in drawn]
+    narrow = set(drawn).isdisjoint(("limit", "third", *SETTLED.values()))
+    columns = (4 if narrow else 3) if figure.get_figwidth() > 5.0 else 2
     figure.legend(handles=list(map(_handle, shown)), loc="outside lower center", ncols=columns, frameon=False)
 
 
@@ -279,7 +280,7 @@ def _handle(name: str) -> Any:
 
     if name in LINES:
         return Line2D([], [], color="black", lw=1.1, ls=LINES[name][1], label=LINES[name][0])
-    if name == SETTLED:
-        return Patch(facecolor=PALE_GREEN, label=SETTLED, edgecolor=GREY, lw=0.4)
+    if name in SETTLED.values():
+        return Patch(facecolor=PALE_GREEN, label=name, edgecolor=GREY, lw=0.4)
     hatch = HATCHES[name][0] if name in HATCHES else None
     return Patch(facecolor=OUTCOME_COLORS[name], label=said(name), hatch=hatch, edgecolor=GREY, lw=0.4)

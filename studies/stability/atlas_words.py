@@ -122,7 +122,7 @@ def page_message(data: xr.Dataset, scene: str, shown: Mapping[str, OutcomeMap]) 
     place = "past a pole" if scene == "grazing" else f"on tops like {scene}"
     apart = closed and len(closed) < len(shown)
     after = f" after {' and '.join(closed)}, exact at any step," if apart else ""
-    return f"At equal {control} {place} the most runs{after} are accurate with {best}, the fewest with {worst}"
+    return f"At equal {control} {place} most of the map{after} is accurate with {best}, least with {worst}"
 
 
 def _charts_message(compared: Mapping[str, OutcomeMap]) -> str:
@@ -138,7 +138,7 @@ def _charts_message(compared: Mapping[str, OutcomeMap]) -> str:
     on = "on the axis" if charts == {"axis"} else "in other charts"
     apart = ", ".join(f"{split_name(name)[0]} ({share:.0%})" for name, share in beside.items())
     return (
-        f"Past a pole methods {on} are accurate in {_span(others.values())} of their runs, methods in angles in "
+        f"Past a pole methods {on} are accurate in {_span(others.values())} of their maps, methods in angles in "
         f"{_span(behind)}{f', but for {apart}' if apart else ''}"
     )
 
@@ -300,7 +300,7 @@ def atlas_tables(data: xr.Dataset, family: str) -> list[Table]:
         shares = ("" if math.isnan(share) else f"{share:.0%}" for share in (one.shares[0], one.early, one.silent))
         lines.append([line.integrator, line.use, line.fails, *shares, _limit(data, family, name)])
     title = f"The atlas in words: {family} with its spin changed, {PERIODS:g} nutations"
-    header = ["row", "use it", "it fails", "accurate runs", "runs that end early", "inaccurate runs without an error",
+    header = ["row", "use it", "it fails", "accurate", "ended early", "inaccurate runs without an error",
               f"small nutations first grow at a step of (nutation periods, {CURVE_STEPS} tried)"]  # fmt: skip
     made = [Table(title, header, lines)]
     if several := _charts(by_name):

@@ -37,7 +37,7 @@ def _pages(data: xr.Dataset, scene: str, over: str, name: str) -> Iterator[Pictu
         figure = small_maps(data, scene, names, over)
         headline(figure, page_message(data, scene, shown))
         count = counted(len(names), "small map")
-        alt = f"{count} of outcomes, from {names[0]} with the most accurate runs to {names[-1]}."
+        alt = f"{count} of outcomes, from {names[0]}, accurate in the largest part of its map, to {names[-1]}."
         yield Picture(f"{name}-{title}", figure, caption(data, scene, names), alt)
 
 
@@ -46,7 +46,7 @@ def _enlarged(data: xr.Dataset, family: str) -> Picture:
     name = FAMILIAR if FAMILIAR in shown else by_area(shown)[0]
     right, past = shown[name].shares[0], maps(data, "grazing").get(name)
     beside = "" if past is None else f" with its spin changed and in {past.shares[0]:.0%} past a pole"
-    message = f"{name} is accurate in {right:.0%} of the runs of {family}{beside}"
+    message = f"{name} is accurate in {right:.0%} of the map of {family}{beside}"
     figure = enlarged(data, family, name, message)
     what = "" if past is None else ", and right a fall of the scene grazing past a pole"
     text = (

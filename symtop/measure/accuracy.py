@@ -72,11 +72,17 @@ def error_row(
     observe: str | None = None,
     *,
     phases: bool = False,
+    budget: float | None = None,
 ) -> dict[str, float | str]:
-    """One run's entries in an error table; with `phases` also its frequencies, shape error and lags (see `phase`)."""
+    """One run's entries in an error table; with `phases` also its frequencies, shape error and lags (see `phase`).
+
+    `budget` is that of `simulate`.
+    """
     control = method.setting(setting).kwargs()
     samples = enough_samples(scene, horizon)
-    run = simulate(scene, method, **control, horizon=horizon, samples=samples, observe=observe, guard=False)
+    run = simulate(
+        scene, method, **control, horizon=horizon, samples=samples, observe=observe, guard=False, budget=budget
+    )
     truth = reference(scene, run["time"].values, precision="closed-form")
     shown = errors_against(scene, run, truth)
     row: dict[str, float | str] = {name: run.attrs[name] for name in _COUNTS}

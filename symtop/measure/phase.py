@@ -81,12 +81,13 @@ def _curve(scene: Scene, times: Array) -> tuple[Array, Array, Array, Array, Arra
 
 @functools.lru_cache(maxsize=64)
 def _table(top: SymmetricTop, start: Angles) -> tuple[Array, Array, Array]:
-    """Times of one nutation and the true curve there."""
+    """Times of one nutation, the true curve there, (2, TABLE), and half the squares of its points' lengths."""
     scene = Scene("table", top, start, 1.0)
     period = scene.nutation_period
     times = period * np.arange(TABLE) / TABLE
     u, du, *_ = _curve(scene, times)
-    return times, u, du * period / (2.0 * math.pi)
+    points = np.stack([u, du * period / (2.0 * math.pi)])
+    return times, points, 0.5 * np.sum(points * points, axis=0)
 
 
 def nutates(scene: Scene) -> bool:
@@ -120,9 +121,9 @@ def _split(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Split:
     if not nutates(scene):
         u_true, du_true, _, phi_true, _ = _curve(scene, t)
         return Split(np.hypot(u - u_true, (du - du_true) / omega), np.full(t.size, math.nan), phi - phi_true)
-    times, u_table, w_table = _table(scene.top, scene.start)
+    times, points, halves = _table(scene.top, scene.start)
     w = du / omega
-    nearest = np.argmin((u[:, None] - u_table) ** 2 + (w[:, None] - w_table) ** 2, axis=1)
+    nearest = np.argmin(halves - np.stack([u, w], axis=1) @ points, axis=1)  # |p - q|^2/2 without |q|^2/2
     early = times[nearest] - t
     early -= period * np.rint(early / period)
     tau, rest = t + early, np.zeros(t.size)

@@ -35,6 +35,9 @@ AIM = 0.85
 REFINEMENTS = 2
 NEARBY = 1.2  # a setting less coarser than that is not worth a run
 MOST = 24  # runs of one walk
+ABOVE = (
+    2.0  # times the budget, after which a run ends that was foreseen to cost less: rk45 at 1e-2 may shrink its steps
+)
 FLAT = 1.5  # two steps in a row that gain less than this, below `ROUNDED`, have met rounding
 STOPS = ("all targets met", "rounding", "budget", "least tolerance", "nothing to set", "too many runs")
 TOO_WIDE = "wider than the nutation"  # of a target
@@ -69,7 +72,8 @@ class Walk:
     def run(self, setting: float) -> Row:
         """Measure a setting, once."""
         if setting not in self.rows:
-            row = error_row(self.scene, self.method, setting, self.horizon, "axis", phases=True)
+            most = ABOVE * self.budget if self.method.adaptive else None
+            row = error_row(self.scene, self.method, setting, self.horizon, "axis", phases=True, budget=most)
             self.rows[setting] = row | {"setting_value": setting}
         return self.rows[setting]
 

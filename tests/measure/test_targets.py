@@ -101,6 +101,17 @@ def test_a_walk_ends_at_its_budget_and_says_so():
     assert set(nothing["outcome"].values[1]) == {"not_run"}
 
 
+def test_a_run_that_costs_far_more_than_was_foreseen_ends():
+    """At 1e-2 rk45 loses the motion, and its steps shrink: 850,000 evaluations over 1000 nutations for 20,000."""
+    scene = symtop.scene("goldstein")
+    table = work_table(scene, symtop.integrator("rk45[axis]"), spans(scene, [10.0, 1000.0]), 2.5e4)
+    assert table["outcome"].values[1, 0] == "out_of_budget"
+    assert 5e4 <= np.nanmax(table["force_evaluations"].values) <= 5.1e4
+    assert list(table["stopped"].values) == ["budget", "budget"]
+    assert list(table["reached"].values[1]) == ["out of budget"] * 4
+    assert (table["outcome"].values[0] == "ok").all()
+
+
 def test_a_coarse_setting_that_is_good_enough_is_made_coarser():
     scene, method = symtop.scene("fast"), symtop.integrator("strang[axis]")
     walk = Walk(scene, method, 10.0 * scene.nutation_period, 1e4)

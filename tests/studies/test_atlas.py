@@ -156,7 +156,7 @@ def test_cells_that_were_not_run_are_pale_and_counted():
     assert said.startswith(f"Of the 240 cells of these maps {left / 240:.0%} were not run")
     assert said.endswith(f"Of {int(data[Column.CHECKS].sum())} runs that check this none is inaccurate.")
     drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-steps"]
-    assert atlas_figures.SETTLED in {text.get_text() for text in drawn.figure.legends[0].get_texts()}
+    assert atlas_figures.SETTLED["step_size"] in {text.get_text() for text in drawn.figure.legends[0].get_texts()}
 
 
 def test_adaptive_methods_are_mapped_over_their_tolerance():
@@ -441,7 +441,7 @@ def test_a_page_of_small_maps_shows_every_row_once_in_the_order_of_its_accurate_
 def test_the_enlarged_map_is_that_of_a_familiar_row_and_names_its_regions():
     data = two_maps()
     figure = next(figures.pictures(data)).figure
-    assert figure.get_suptitle() == "rk4[axis] is accurate in 67% of the runs of cusp"
+    assert figure.get_suptitle() == "rk4[axis] is accurate in 67% of the map of cusp"
     assert {text.get_text() for text in figure.axes[0].texts} == {"accurate", "bounded but wrong"}
     renamed = data.assign_coords(integrator=["rk4[axis]", figures.FAMILIAR, "rk45[axis]"])
     assert next(figures.pictures(renamed)).figure.get_suptitle().startswith(figures.FAMILIAR)
@@ -590,7 +590,7 @@ def test_the_page_of_the_pole_tells_charts_apart_and_names_an_exception():
     shown = {name: atlas.OutcomeMap(np.array([row] * 2), *axes, np.full((2, 3), True)) for name, row in rows.items()}
     data = xr.Dataset(coords={"integrator": list(rows)})
     assert atlas_words.page_message(data, "grazing", shown) == (
-        "Past a pole methods on the axis are accurate in 67% to 100% of their runs, methods in angles in 33%, but for "
+        "Past a pole methods on the axis are accurate in 67% to 100% of their maps, methods in angles in 33%, but for "
         "stormer-verlet-reversible (67%)"
     )
 
