@@ -275,3 +275,12 @@ def test_a_study_that_says_nothing_is_told_when_it_is_asked(script, tmp_path):
         answer = runner.begin(runner.load(script("silent")), tmp_path / "r", workers, quiet=True, beside=True)
         with pytest.raises(SymtopError, match="study silent has nothing to say"):
             answer()
+
+
+def test_the_process_beside_compiles_the_closed_form_for_all():
+    compiled = "__import__('symtop.model.closed_form', fromlist=['_'])._build.compiled is not None"
+    with Workers(2) as workers:
+        assert not workers.beside(eval, compiled).result()
+    with Workers(2) as workers:
+        workers.open_beside()
+        assert workers.beside(eval, compiled).result()
