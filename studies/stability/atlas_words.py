@@ -169,9 +169,10 @@ def caption(data: xr.Dataset, scene: str, names: Sequence[str]) -> str:
         f"sleeps: it spins upright and stays so), to the right the {control}"
     )
     together = ", one map for all without a wrong run" if accurate_everywhere(compared) else ""
+    pale = "" if all(one.made.all() for one in shown.values()) else "; pale: not run, counted as accurate"
     return (
         f"Outcome of every run of {counted(len(names))}, a map each, named by method and chart, with the share that is "
-        f"accurate{together}. {what}. All else is held fixed, and an equal {control} is not an equal cost. "
+        f"accurate{together}{pale}. {what}. All else is held fixed, and an equal {control} is not an equal cost. "
         f"{_counted(shown, compared)}Accurate in the largest part of its map: {best}; in the smallest: {worst}. {early}"
         f"{_without_limit(data, scene, shown) if scene != 'grazing' else ''}"
     )
@@ -244,7 +245,7 @@ def _settled(part: xr.Dataset, by_name: Mapping[str, OutcomeMap]) -> str:
     checks, refuted = (int(part[name].sum()) for name in (Column.CHECKS, Column.REFUTED))
     ended = "none is inaccurate" if not refuted else f"{counted(refuted, 'top')} failed it and ran at every setting"
     return (
-        f"Of the {cells} cells of these maps {left / cells:.0%} were not run: their tops had been accurate at every "
+        f"Of the {cells:,} cells of these maps {left / cells:.0%} were not run: their tops had been accurate at every "
         f"step over a factor of {SETTLED_STEPS:g} above, or at every tolerance over a factor of "
         f"{SETTLED_TOLERANCES:g}. Of {checks} runs that check this {ended}."
     )

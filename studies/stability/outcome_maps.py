@@ -16,8 +16,9 @@ taken at the same fractions of a nutation for every spin, and these are not comm
 Half of the steps of a map stand in its shortest octave, where most methods have long been accurate. So a map is run
 from long steps to short ones, and a scene that was accurate at every step over a factor of 2 (at every tolerance over a
 factor of 10, at four settings at least) has *settled*: it is not run at shorter ones, but at five settings, evenly over
-the map, that check it. If one of them is not accurate, the scene is run at every setting. In maps of 63 rows that were
-run as a whole, all 4.3 million cells that this would have left out were accurate; after a factor of 1.5, 4 were not.
+the map, that check it. If it is not accurate at one of them, it is run at every setting. All 134 maps of the study were
+once run as a whole: the 5.2 million cells that are left out were accurate, every one. After a factor of 1.5, 4 of 4.8
+million were not.
 """
 
 import functools
@@ -181,10 +182,7 @@ class _Descent:
         self.followed = np.zeros(m, dtype=bool)
         self.followed[slice(None) if followed is None else list(followed)] = True
         checks = np.linspace(0, m - 1, CHECKED).round().astype(int)
-        self.of_all = {
-            *np.flatnonzero(self.followed).tolist(),
-            *checks.tolist(),
-        }  # settings at which all scenes are run
+        self.of_all = frozenset(np.union1d(np.flatnonzero(self.followed), checks).tolist())  # where all scenes are run
         self.judged, self.made = Judged.begun(n, m), np.zeros((n, m), dtype=bool)
         self.factor = SETTLED_STEPS if method.fixed_step else SETTLED_TOLERANCES
         self.since, self.accurate = np.full(n, math.nan), np.zeros(n, dtype=np.int64)  # how long a scene has been so
