@@ -35,9 +35,7 @@ AIM = 0.85
 REFINEMENTS = 2
 NEARBY = 1.2  # a setting less coarser than that is not worth a run
 MOST = 24  # runs of one walk
-ABOVE = (
-    2.0  # times the budget, after which a run ends that was foreseen to cost less: rk45 at 1e-2 may shrink its steps
-)
+ABOVE = 2.0  # times the budget: a run that costs more ends, whatever was foreseen (rk45 at 1e-2 may shrink its steps)
 FLAT = 1.5  # two steps in a row that gain less than this, below `ROUNDED`, have met rounding
 STOPS = ("all targets met", "rounding", "budget", "least tolerance", "nothing to set", "too many runs")
 TOO_WIDE = "wider than the nutation"  # of a target
