@@ -31,7 +31,7 @@ GOALS = (
     (1000.0, 1e-6, (COMPILED,), (KERNEL,)),  # long enough that a call's own time does not count
 )
 ROUNDS = 2  # of all cells
-FURTHER = (6, 3)  # times as many rounds for short calls, in full and quick
+FURTHER = (4, 3)  # times as many rounds for short calls, in full and quick
 BATCH = (0.0015, 0.001)  # seconds, in full and quick
 
 

@@ -36,7 +36,7 @@ PERIODS = ([10.0, 1000.0], [10.0, 100.0])  # in full, and quick
 BUDGET = {"compiled": 1e6, "python": 2.5e4}  # force evaluations of one run
 SOFTWARE = 4e4  # the same for arithmetic in software: quadruple precision costs 2 us an evaluation
 EFFORT = (  # rounds and seconds of a batch, of all timed runs and of the contenders; in full, and quick
-    {"first": (3, 0.0025), "further": (8, 0.005)},
+    {"first": (3, 0.0025), "further": (6, 0.005)},
     {"first": (3, 0.001), "further": (5, 0.002)},
 )
 

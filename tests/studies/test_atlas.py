@@ -154,7 +154,9 @@ def test_cells_that_were_not_run_are_pale_and_counted():
     said = atlas_words.summary(data, "cusp")[-1]
     left = sum((~each.made).sum() for each in atlas.maps(data, "cusp").values())
     assert said.startswith(f"Of the 240 cells of these maps {left / 240:.0%} were not run")
-    assert said.endswith(f"Of {int(data[Column.CHECKS].sum())} runs that check this none is inaccurate.")
+    assert said.endswith(f"{int(data[Column.CHECKS].sum())} runs of such tops check this, and none is inaccurate.")
+    data[Column.REFUTED] += 1.0  # of each of the two rows
+    assert atlas_words.summary(data, "cusp")[-1].endswith("check this; 2 tops failed and ran at every setting.")
     drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-steps"]
     assert atlas_figures.SETTLED["step_size"] in {text.get_text() for text in drawn.figure.legends[0].get_texts()}
 
