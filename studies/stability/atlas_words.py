@@ -243,13 +243,12 @@ def _settled(part: xr.Dataset, by_name: Mapping[str, OutcomeMap]) -> str:
     if not left:
         return ""
     checks, refuted = (int(part[name].sum()) for name in (Column.CHECKS, Column.REFUTED))
-    ended = (
-        ", and none is inaccurate" if not refuted else f"; {counted(refuted, 'top')} failed and ran at every setting"
-    )
+    none = ", and none is inaccurate"
+    failed = f"; {counted(refuted, 'top')} failed and ran at every setting"
     return (
         f"Of the {cells:,} cells of these maps {left / cells:.0%} were not run, because their tops were accurate at "
         f"every longer step over a factor of {SETTLED_STEPS:g}, or at every looser tolerance over a factor of "
-        f"{SETTLED_TOLERANCES:g}. {checks:,} runs of such tops check this{failed if refuted else ', and none is inaccurate'}."
+        f"{SETTLED_TOLERANCES:g}. {checks:,} runs of such tops check this{failed if refuted else none}."
     )
 
 
