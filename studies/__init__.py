@@ -3,5 +3,5 @@
 # of the report; others follow
 ORDER = (
     "population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "claims", "reduction",
-    "phase_diagram", "oscillators",
+    "phase_diagram", "oscillators", "notebook",
 )  # fmt: skip

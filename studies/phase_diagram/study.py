@@ -37,7 +37,7 @@ def candidates() -> list[str]:
 def grid(quick: bool) -> list[Case]:
     """Every candidate on the population and on the scene, and the prices."""
     names = candidates()
-    timing = {"integrators": names, "rounds": 3 if quick else 9, "batch": 0.001 if quick else 0.002}
+    timing = {"integrators": names, "rounds": 3 if quick else 6, "batch": 0.001 if quick else 0.002}
     asked = {POPULATION: QUICK if quick else FULL, SCENE: QUICK | {"members": 1} if quick else FULL_SCENE}
     return [
         *(Case(tops, name, {**settings, "seed": SEED}, group=LADDERS)

@@ -53,7 +53,7 @@ def grid(*, quick: bool = False, full: bool = False) -> list[Case]:
         ]
     drawn = {"members": members["short"], "seed": SEED, "nutations": horizons["short"]}
     cases.append(Case("population", "exact", drawn, group=TOPS))
-    timing = {"integrators": names, "rounds": 3 if quick else 6, "batch": 0.001 if quick else 0.002}
+    timing = {"integrators": names, "rounds": 3 if quick else 4, "batch": 0.001 if quick else 0.002}
     return [*cases, *(Case(process, "together", timing, timed=True, group=PRICES) for process in PROCESSES)]
 
 
