@@ -17,13 +17,13 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.families import REGIMES, tops
-from symtop.base.multiprecision import context
-from symtop.base.numbers import EPSILON
-from symtop.model import closed_form, motion_constants, motion_layout as at
+from symtop.core.multiprecision import context
+from symtop.core.numbers import EPSILON
 from symtop.model.charts import Array
-from symtop.model.closed_form import ClosedForm
-from symtop.model.precise_constants import precise_constants
-from symtop.model.precise_form import PreciseForm
+from symtop.model.exact import closed_form, motion_constants, motion_layout as at
+from symtop.model.exact.closed_form import ClosedForm
+from symtop.model.exact.precise_constants import precise_constants
+from symtop.model.exact.precise_form import PreciseForm
 from symtop.model.top import Angles, SymmetricTop, flat
 
 DIGITS, SEED, EACH = 50, 25, 385

@@ -19,12 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import symtop
-from symtop.base.threads import cores
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.many import members_of
-from symtop.run import members as reading
-from symtop.run.pieces import Job
-from symtop.run.schedule import nutation_periods, schedule
+from symtop.core.parallel import cores
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.many import members_of
+from symtop.run.ensemble import inputs as reading
+from symtop.run.ensemble.chunks import Job
+from symtop.run.sampling import nutation_periods, schedule
 
 METHOD, CHART, PER_NUTATION, NUTATIONS, SAMPLES = "strang", "axis", 100, 10, 11
 MEMBERS, ALONE, ROUNDS = 10_000, 300, 9

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 
 import symtop
-from symtop.methods import exact_discrete
-from symtop.methods.exact_map import exact_map
-from symtop.methods.fixed_step import FixedStep, inside
-from symtop.methods.loop import Loop, accumulate_plainly, driver
-from symtop.methods.plan import Plan
+from symtop.methods.framework.fixed_step import FixedStep, inside
+from symtop.methods.framework.loop import Loop, accumulate_plainly, driver
+from symtop.methods.framework.plan import Plan
+from symtop.methods.lagrangian import exact_discrete
+from symtop.methods.lagrangian.exact_map import exact_map
 from symtop.model import charts
-from symtop.model.precise_form import PreciseForm
+from symtop.model.exact.precise_form import PreciseForm
 from symtop.model.top import Angles, SymmetricTop
 
 METHOD = "exact-discrete"
@@ -78,7 +78,7 @@ def of_random_tops(count: int = TOPS) -> np.ndarray:
     """Errors after two nutations, shape (tops, steps), over the radians that phi and psi have turned."""
     method, found = symtop.integrator(METHOD), []
     for top, start in random_tops(count):
-        form = symtop.model.closed_form.ClosedForm(top, start)
+        form = symtop.model.exact.closed_form.ClosedForm(top, start)
         turned = 1.0 + 2.0 * (abs(form.phi_per_period) + abs(form.psi_per_period))
         row = []
         for steps in STEPS[:4]:

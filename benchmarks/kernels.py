@@ -11,8 +11,8 @@ from typing import NamedTuple
 import symtop
 from benchmarks import twin
 from symtop.measure.timing import Timing, timings
-from symtop.methods.fixed_step import inside
-from symtop.methods.registry import methods
+from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.registry import methods
 
 SCENE = "spheroid"
 PER_NUTATION = 400.37

@@ -23,14 +23,14 @@ import numpy as np
 
 import symtop
 from benchmarks import kernels, twin
-from symtop.base.threads import in_threads
+from symtop.core.parallel import in_threads
 from symtop.measure.timing import timings
-from symtop.methods import taylor
-from symtop.methods.fixed_step import FixedStep, inside
-from symtop.methods.lanes import W
-from symtop.methods.many import members_of
+from symtop.methods.framework.fixed_step import FixedStep, inside
+from symtop.methods.framework.lanes import W
+from symtop.methods.framework.many import members_of
+from symtop.methods.taylor import taylor
 from symtop.model import charts
-from symtop.model.closed_forms import ClosedForms
+from symtop.model.exact.closed_forms import ClosedForms
 from symtop.model.top import flat
 from symtop.runner.study import Table
 

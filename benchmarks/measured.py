@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from symtop.base import datasets
+from symtop.core import netcdf
 
 
 def circumstances() -> dict[str, Any]:
@@ -15,7 +15,7 @@ def circumstances() -> dict[str, Any]:
         "measured": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
         "cores": os.cpu_count() or 0,
         "load_before": os.getloadavg()[0],
-        **datasets.provenance(),
+        **netcdf.provenance(),
     }
 
 

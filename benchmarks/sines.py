@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit
 
 import symtop
-from symtop.base.compiled import OPTIONS, register_jitable
-from symtop.base.sines import sincos
+from symtop.core.jit import OPTIONS, register_jitable
+from symtop.core.sines import sincos
 from symtop.measure.timing import Timing, timings
 from symtop.model.effective import half_angle_force
 

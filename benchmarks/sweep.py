@@ -3,8 +3,9 @@
     python -m benchmarks.sweep [STARTS] [CERTIFIED]
 
 The starts are a grid of inclinations and spins of one top, run with one method for a few nutations, all in one process.
-A certificate compares the closed form of one start with 40 digits and an integration (`symtop.run.certificate`), as
-every reference once did; some of the starts are certified, and their time is what all would take.
+A certificate compares the closed form of one start with 40 digits and an integration
+(`symtop.run.reference.certificate`), as every reference once did; some of the starts are certified, and their time is
+what all would take.
 """
 
 import os
@@ -16,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 import symtop
-from symtop.model import closed_form
+from symtop.model.exact import closed_form
 
 METHOD, STEP, HORIZON = "strang[axis]", 0.02, 8.0
 STARTS, CERTIFIED = 1000, 20

@@ -11,8 +11,8 @@ import numpy as np
 
 import symtop
 from symtop.measure.timing import timings
-from symtop.methods.plan import Plan
-from symtop.methods.registry import methods
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import methods
 from symtop.model import charts
 
 HORIZON = 8.0

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.measure.timing import timings
-from symtop.model import closed_form
-from symtop.model.closed_form import ClosedForm
-from symtop.model.closed_forms import ClosedForms
-from symtop.model.precise_form import PreciseForm
+from symtop.model.exact import closed_form
+from symtop.model.exact.closed_form import ClosedForm
+from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.exact.precise_form import PreciseForm
 from symtop.model.scenes import sleeping, spinning, steady
 from symtop.model.top import Angles, SymmetricTop, flat
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 
 COUNT, MANY, BATCHES = 2000, 10_000, 15
 FAR = np.linspace(0.0, 1e5, 1001)  # times of the long reference

@@ -18,27 +18,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.methods import (
-    attitude_series,
-    axis_series,
-    collective_gauss,
-    discrete_lagrangian,
-    energy_momentum,
-    exact_discrete,
-    galerkin,
-    gauss,
-    generalised_alpha,
-    kahan,
-    lie_runge_kutta,
-    lie_variational,
-    runge_kutta,
-    splitting_angles,
-    splitting_space,
-    unreduced,
-)
-from symtop.methods.fixed_step import inside
-from symtop.methods.registry import Integrator
-from symtop.methods.series import DEFAULT_ORDER
+from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.lagrangian import discrete_lagrangian, exact_discrete, galerkin, unreduced
+from symtop.methods.lie_group import energy_momentum, generalised_alpha, lie_runge_kutta, lie_variational
+from symtop.methods.runge_kutta import collective_gauss, gauss, kahan, runge_kutta
+from symtop.methods.splitting import splitting_angles, splitting_space
+from symtop.methods.taylor import attitude_series, axis_series
+from symtop.methods.taylor.series import DEFAULT_ORDER
 from symtop.model.scenes import Scene
 
 SOURCES = Path(__file__).resolve().parent / "twins"

@@ -10,15 +10,15 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import symtop
-from symtop.base import datasets
-from symtop.base.lazy import LAZY
-from symtop.base.over_time import over_time
+from symtop.core import netcdf
+from symtop.core.lazy_kernel import LAZY
+from symtop.core.over_time import over_time
 from symtop.measure.timing import bare_run, timings
-from symtop.methods.calling import solve
-from symtop.methods.fixed_step import inside
-from symtop.methods.registry import methods
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.registry import methods
 from symtop.model.scenes import closed_form
-from symtop.run.guard import warning
+from symtop.run.guard.guard import warning
 from symtop.run.simulation import as_dataset, make_plan
 
 SCENE, METHOD, CHART, STEPS = "spheroid", "strang", "axis", 400
@@ -55,7 +55,7 @@ def measure() -> list[Item]:
         "columns and dataset": lambda: as_dataset(scene, CHART, plan, run),
         "closed form at the samples": lambda: form.turns(plan.times),
         "dataset of columns": lambda: over_time(plan.times, columns),
-        "attributes": lambda: datasets.describe(data, "bench", **attributes),
+        "attributes": lambda: netcdf.describe(data, "bench", **attributes),
         "simulate without the guard": lambda: symtop.simulate(scene, method, step_size=h, guard=False),
         "simulate": lambda: symtop.simulate(scene, method, step_size=h),
     }

@@ -11,31 +11,31 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from symtop.advise import Advice as Advice, recommend as recommend
-    from symtop.base.validate import SymtopError as SymtopError, SymtopWarning as SymtopWarning
+    from symtop.core.errors import SymtopError as SymtopError, SymtopWarning as SymtopWarning
     from symtop.judging.judge_step import judge as judge
     from symtop.measure.errors import errors as errors
-    from symtop.methods.citations import citation as citation
-    from symtop.methods.discrete_lagrangian import discrete_lagrangian as discrete_lagrangian
-    from symtop.methods.field import field as field
-    from symtop.methods.plan import Plan as Plan, Run as Run
-    from symtop.methods.registry import (
+    from symtop.methods.framework.citations import citation as citation
+    from symtop.methods.framework.field import field as field
+    from symtop.methods.framework.plan import Plan as Plan, Run as Run
+    from symtop.methods.framework.registry import (
         Integrator as Integrator,
         integrator as integrator,
         integrators as integrators,
         register as register,
     )
-    from symtop.methods.runge_kutta import runge_kutta as runge_kutta
-    from symtop.methods.series import series as series
-    from symtop.methods.splitting import composition as composition
-    from symtop.model.closed_form import ClosedForm as ClosedForm
+    from symtop.methods.lagrangian.discrete_lagrangian import discrete_lagrangian as discrete_lagrangian
+    from symtop.methods.runge_kutta.runge_kutta import runge_kutta as runge_kutta
+    from symtop.methods.splitting.splitting import composition as composition
+    from symtop.methods.taylor.series import series as series
+    from symtop.model.exact.closed_form import ClosedForm as ClosedForm
     from symtop.model.scenes import Scene as Scene, register_scene as register_scene, scene as scene, scenes as scenes
     from symtop.model.top import Angles as Angles, Momenta as Momenta, SymmetricTop as SymmetricTop
     from symtop.report.card import card as card
     from symtop.report.plot import plot as plot
-    from symtop.run.ensemble import ensemble as ensemble
+    from symtop.run.ensemble.ensemble import ensemble as ensemble
+    from symtop.run.ensemble.population import population as population
     from symtop.run.long_run import long_run as long_run
-    from symtop.run.population import population as population
-    from symtop.run.reference import reference as reference
+    from symtop.run.reference.truth import reference as reference
     from symtop.run.simulation import simulate as simulate
     from symtop.runner.study import Case as Case, Picture as Picture, Study as Study, Table as Table
     from symtop.runner.sweep import sweep as sweep
@@ -44,24 +44,24 @@ __version__ = "0.2.0"
 
 _NAMES = {  # by the module that holds them
     "advise": "Advice recommend",
-    "base.validate": "SymtopError SymtopWarning",
+    "core.errors": "SymtopError SymtopWarning",
     "judging.judge_step": "judge",
     "measure.errors": "errors",
-    "methods.citations": "citation",
-    "methods.discrete_lagrangian": "discrete_lagrangian",
-    "methods.field": "field",
-    "methods.plan": "Plan Run",
-    "methods.registry": "Integrator integrator integrators register",
-    "methods.runge_kutta": "runge_kutta",
-    "methods.series": "series",
-    "methods.splitting": "composition",
-    "model.closed_form": "ClosedForm",
+    "methods.framework.citations": "citation",
+    "methods.lagrangian.discrete_lagrangian": "discrete_lagrangian",
+    "methods.framework.field": "field",
+    "methods.framework.plan": "Plan Run",
+    "methods.framework.registry": "Integrator integrator integrators register",
+    "methods.runge_kutta.runge_kutta": "runge_kutta",
+    "methods.taylor.series": "series",
+    "methods.splitting.splitting": "composition",
+    "model.exact.closed_form": "ClosedForm",
     "model.scenes": "Scene register_scene scene scenes",
     "model.top": "Angles Momenta SymmetricTop",
-    "run.ensemble": "ensemble",
+    "run.ensemble.ensemble": "ensemble",
     "run.long_run": "long_run",
-    "run.population": "population",
-    "run.reference": "reference",
+    "run.ensemble.population": "population",
+    "run.reference.truth": "reference",
     "run.simulation": "simulate",
     "report.card": "card",
     "report.plot": "plot",

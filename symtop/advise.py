@@ -32,17 +32,17 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.base import datasets
-from symtop.base.validate import SymtopError, one_of, positive
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError, one_of, positive
 from symtop.measure import ranking, settings
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.nearest import STORED, Near, distances, nearest, regime
 from symtop.measure.phase import FREQUENCIES
 from symtop.measure.timing import bare_run, timings
-from symtop.methods.registry import Integrator, integrator, integrators, is_built_in, split_name
+from symtop.methods.framework.registry import Integrator, integrator, integrators, is_built_in, split_name
 from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
-from symtop.run.guard import MOST_STEPS
+from symtop.run.guard.guard import MOST_STEPS
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
 STORED_STUDY = "work_precision.nc"
@@ -175,7 +175,7 @@ def _stored(file: Path) -> xr.Dataset:
         raise SymtopError(f"results holds no {file.name}: {str(file.parent)!r}; run symtop study work_precision first")
     remedy = "run symtop study work_precision --fresh"
     try:
-        data = datasets.read(file)
+        data = netcdf.read(file)
     except SymtopError as error:
         raise SymtopError(f"{file} cannot be read ({error.__cause__}); {remedy}") from error
     if missing := [name for name in ranking.NEEDS if name not in data]:

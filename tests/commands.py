@@ -9,7 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from symtop.base import datasets
+from symtop.core import netcdf
 
 PROBE = Path(__file__).parent / "probe.py"
 
@@ -51,9 +51,9 @@ def contents(results: Path) -> dict[str, xr.Dataset]:
     """Every dataset of a results folder by its place in it, without its attributes of provenance."""
     found = {}
     for path in sorted(results.rglob("*.nc")):
-        data = datasets.read(path)
+        data = netcdf.read(path)
         found[str(path.relative_to(results))] = data.drop_attrs().assign_attrs(
-            {key: value for key, value in data.attrs.items() if key not in datasets.provenance()}
+            {key: value for key, value in data.attrs.items() if key not in netcdf.provenance()}
         )
     return found
 

@@ -26,9 +26,9 @@ if sys.modules.get("dask", sys) is None:  # the processes that share the tests o
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what runs in its background like that
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-from symtop.base import locks
 from symtop.cli.main import main
-from symtop.methods import registry
+from symtop.core import files
+from symtop.methods.framework import registry
 from symtop.model import scenes
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
@@ -95,7 +95,7 @@ def quick_results(tmp_path_factory) -> Path:
     base = tmp_path_factory.getbasetemp()
     folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "results-of-all"
     done = folder / "done"
-    with locks.locked(folder / "making", wait=True):
+    with files.locked(folder / "making", wait=True):
         if not done.is_file():
             if STORED.is_dir():  # after `make quick`: what is up to date need not be computed twice
                 shutil.copytree(STORED, folder / "quick", dirs_exist_ok=True)

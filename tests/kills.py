@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import xarray as xr
 
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.runner.check import differences
 from tests.commands import ended, leftovers, symtop
 
@@ -93,7 +93,7 @@ def assert_same(results: Path, calm: Path) -> None:
 
 
 def _read(path: Path) -> xr.Dataset | xr.DataTree:
-    data = datasets.read_any(path)
+    data = netcdf.read_any(path)
     return data.drop_nodes("checks") if isinstance(data, xr.DataTree) and "checks" in data.children else data
 
 

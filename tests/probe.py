@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import xarray as xr
 from tqdm import tqdm
 
-from symtop.methods.registry import integrator, integrators
+from symtop.methods.framework.registry import integrator, integrators
 from symtop.model.scenes import scene
 from symtop.run.simulation import simulate
 from symtop.runner.study import Case, Picture, Study

@@ -5,7 +5,7 @@ import numpy as np
 import symtop
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import LEAST, Fit, power_law
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 
 
 def measured_order(

@@ -15,7 +15,7 @@ from symtop.cli.main import main
 from symtop.measure import settings
 from symtop.measure.errors import errors_against
 from symtop.measure.nearest import Near
-from symtop.methods.registry import methods
+from symtop.methods.framework.registry import methods
 
 
 def measured(scene, advice, quantity="axis"):

@@ -13,9 +13,9 @@ import numpy as np
 import symtop
 from benchmarks.engines import Setting
 from benchmarks.engines.common import Path, body_of, velocities
-from symtop.methods.calling import solve
-from symtop.methods.engines import SINGLE
-from symtop.methods.plan import Plan
+from symtop.methods.engines.engines import SINGLE
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan
 from symtop.model import charts
 from symtop.model.scenes import Scene
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from benchmarks.engines.measure import COMPARED, COUNT, LEVEL, STEPS, agrees
-from symtop.base import datasets
-from symtop.methods.engines import SINGLE
+from symtop.core import netcdf
+from symtop.methods.engines.engines import SINGLE
 from symtop.report.sentences import counted, few
 
 NAME = "live-engines"  # of the findings; `engines` is the study of the maps
@@ -76,6 +76,6 @@ def findings(rows: Sequence[dict[str, Any]], missing: Sequence[str], measured: s
         "question": "Are the maps of the catalogue those that the engines take?",
         "how_to_read": HOW_TO_READ, "verdict": verdict(rows), "tables": [table], "charts": [], "opening": None,
         "pictures": [], "failures": [*missing, *failed], "cases": len(rows), "quick": False,
-        "provenance": datasets.provenance(), "measured": measured, "rows": list(rows),
+        "provenance": netcdf.provenance(), "measured": measured, "rows": list(rows),
         "missing": list(missing),
     }  # fmt: skip

@@ -3,7 +3,7 @@
 import importlib
 from typing import NamedTuple
 
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 
 ADAPTERS = ("scipy", "odeint", "diffrax", "sundae", "cvode", "arkode", "mujoco", "rebound", "drake")
 

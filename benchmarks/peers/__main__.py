@@ -11,7 +11,7 @@ from benchmarks.peers.adapters.diffrax import PACKAGE as DIFFRAX, SOLVERS
 from benchmarks.peers.measure import SCENES, measure
 from benchmarks.peers.study import STUDY, measured
 from benchmarks.peers.summary import lines
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.report import style
 from symtop.runner import conclude, store
 
@@ -26,15 +26,15 @@ def main() -> None:
     options = parser.parse_args()
     file, told = options.results / "peers.nc", options.results / "peers.json"
     if options.redraw:
-        data, stored = datasets.read(file), store.read_json(told) or {}
+        data, stored = netcdf.read(file), store.read_json(told) or {}
         many = [together.Row(**row) for row in stored.get("together", [])]
         missing = stored.get("failures", [])
     else:
         peers, missing = load(tuple(options.only))
         for sentence in missing:
             print(sentence)
-        data = datasets.describe(measure(peers, options.scenes), STUDY.title, question=STUDY.question)
-        datasets.write(data, file)
+        data = netcdf.describe(measure(peers, options.scenes), STUDY.title, question=STUDY.question)
+        netcdf.write(data, file)
         many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())
     findings = conclude.findings_of(
         STUDY, data, options.results, style.publish, failures=missing, cases=data["seconds"].count().item()

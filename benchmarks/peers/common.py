@@ -19,10 +19,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from symtop.methods.euler_lagrange import accelerations, with_rates
-from symtop.methods.plan import Array, Plan, Run
-from symtop.methods.registry import Integrator
-from symtop.methods.space import on_axis
+from symtop.methods.framework.euler_lagrange import accelerations, with_rates
+from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.framework.space import on_axis
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop
 

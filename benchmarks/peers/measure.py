@@ -28,10 +28,10 @@ from benchmarks.peers.common import Inner, Library, axes_of
 from symtop.measure.accuracy import SAMPLES, judge_limit
 from symtop.measure.settings import seek, step_ladder
 from symtop.measure.timing import timings
-from symtop.methods.registry import Integrator, methods
+from symtop.methods.framework.registry import Integrator, methods
 from symtop.model import charts
 from symtop.model.scenes import Scene
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 from symtop.run.simulation import as_dataset, make_plan
 
 SCENES = ("spheroid", "goldstein")

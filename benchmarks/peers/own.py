@@ -11,11 +11,11 @@ import numpy as np
 
 import symtop
 from benchmarks.peers.common import Inner
-from symtop.methods import taylor
-from symtop.methods.calling import solve
-from symtop.methods.fixed_step import inside
-from symtop.methods.plan import Plan
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.taylor import taylor
 from symtop.model.scenes import Scene
 
 LANGUAGE = "numba, inside the kernel"

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from symtop.methods.plan import Array
+from symtop.methods.framework.plan import Array
 
 NORMAL, NO_COMMUNICATOR = 1, 0
 

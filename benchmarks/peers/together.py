@@ -18,11 +18,11 @@ import numpy as np
 import symtop
 from benchmarks import lanes
 from benchmarks.peers.adapters import diffrax as adapter
-from symtop.methods.many import members_of
-from symtop.methods.plan import Array
-from symtop.methods.space import on_axis
+from symtop.methods.framework.many import members_of
+from symtop.methods.framework.plan import Array
+from symtop.methods.framework.space import on_axis
 from symtop.model import charts
-from symtop.model.closed_forms import ClosedForms
+from symtop.model.exact.closed_forms import ClosedForms
 from symtop.model.top import flat
 from symtop.runner.study import Table
 

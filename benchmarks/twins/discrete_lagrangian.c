@@ -1,4 +1,4 @@
-/* Twin of symtop/methods/discrete_lagrangian.py; NODES is the number of nodes of the rule. */
+/* Twin of symtop/methods/lagrangian/discrete_lagrangian.py; NODES is the number of nodes of the rule. */
 
 #include "march.h"
 #include "sines.h"

@@ -1,4 +1,4 @@
-/* Twin of symtop/methods/exact_discrete.py. The maps between chi and Z, and the phases, are no part of a step; the
+/* Twin of symtop/methods/lagrangian/exact_discrete.py. The maps between chi and Z, and the phases, are no part of a step; the
    caller does them. */
 
 #include "march.h"

@@ -1,4 +1,4 @@
-/* Twin of symtop/methods/galerkin.py. */
+/* Twin of symtop/methods/lagrangian/galerkin.py. */
 
 #include "march.h"
 #include "sines.h"

@@ -1,4 +1,4 @@
-/* Twin of symtop/methods/gauss.py on (e, L), with -DAXIS, or on (e, L, a), with -DFRAME.
+/* Twin of symtop/methods/runge_kutta/gauss.py on (e, L), with -DAXIS, or on (e, L, a), with -DFRAME.
 
    The Python kernel is compiled once for all numbers of stages, and so is this: the number is read from the table.
    It is the twin of the sweep: where sweeps do not converge and Python goes on with Newton, this ends. */

@@ -1,4 +1,4 @@
-/* Twin of symtop/methods/kahan.py: on (e, L), or with -DFRAME on (e, L, a). */
+/* Twin of symtop/methods/runge_kutta/kahan.py: on (e, L), or with -DFRAME on (e, L, a). */
 
 #include "march.h"
 

@@ -1,4 +1,4 @@
-/* The stepping loop of the C twins: what symtop/methods/loop.py compiles around every kernel family.
+/* The stepping loop of the C twins: what symtop/methods/framework/loop.py compiles around every kernel family.
 
    A family's file defines DIM, the structs Par, Rule and Carry, and
 

@@ -1,4 +1,4 @@
-/* Twin of symtop/base/sines.py: sine and cosine by polynomials, without a call and without a branch. */
+/* Twin of symtop/core/sines.py: sine and cosine by polynomials, without a call and without a branch. */
 
 #include <math.h>
 

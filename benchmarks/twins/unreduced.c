@@ -1,4 +1,4 @@
-/* Twin of symtop/methods/unreduced.py; NODES is the number of nodes of the rule. */
+/* Twin of symtop/methods/lagrangian/unreduced.py; NODES is the number of nodes of the rule. */
 
 #include "march.h"
 

@@ -7,8 +7,8 @@ import xarray as xr
 from matplotlib.ticker import NullLocator
 
 from symtop.judging.claims import SCENE
-from symtop.judging.ledger import CLAIMS, Finding, spoken
-from symtop.methods.registry import FAMILIES, integrators
+from symtop.judging.findings import CLAIMS, Finding, spoken
+from symtop.methods.framework.registry import FAMILIES, integrators
 from symtop.report import style
 from symtop.report.figures import name_ends
 from symtop.report.sentences import joined

@@ -3,7 +3,7 @@
 import xarray as xr
 
 from symtop.judging.claims import judge
-from symtop.methods.registry import integrator, integrators
+from symtop.methods.framework.registry import integrator, integrators
 from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study

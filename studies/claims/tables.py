@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.judging.claims import SCENE
-from symtop.judging.ledger import Finding, read
+from symtop.judging.findings import Finding, read
 
 
 def findings(data: xr.Dataset) -> dict[str, list[Finding]]:

@@ -5,7 +5,7 @@ from collections import Counter
 import xarray as xr
 
 from symtop.judging.claims import SCENE
-from symtop.judging.ledger import CLAIMS, VERDICTS, Finding, spoken
+from symtop.judging.findings import CLAIMS, VERDICTS, Finding, spoken
 from symtop.report.sentences import FEW, joined
 from symtop.runner.study import Table
 

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.growth import tops
-from symtop.methods.registry import split_name
+from symtop.methods.framework.registry import split_name
 from symtop.model.charts import Array
 from symtop.report.figures import SMALLEST, error_band
 from symtop.report.style import FIRM, LEAST_TEXT, few_ticks, headline, legend_below, line, look, number, panels

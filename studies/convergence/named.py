@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from symtop.methods.registry import split_name
+from symtop.methods.framework.registry import split_name
 
 from .tables import MAIN, NAMED, evaluations_a_nutation, merged
 

@@ -6,7 +6,7 @@ import xarray as xr
 
 from symtop.measure.order_table import observable, order_table
 from symtop.measure.settings import step_ladder, tolerance_ladder
-from symtop.methods.registry import integrator, rows
+from symtop.methods.framework.registry import integrator, rows
 from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study

@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.base.numbers import EPSILON
-from symtop.base.remembered import of_one_dataset
+from symtop.core.memoize import of_one_dataset
+from symtop.core.numbers import EPSILON
 from symtop.measure.conservation import residuals
 from symtop.measure.order import LARGEST_ERROR, Fit, order_verdict, power_law
 from symtop.measure.order_table import observable, order_fit
-from symtop.methods.registry import Integrator, integrator, integrators, split_name
+from symtop.methods.framework.registry import Integrator, integrator, integrators, split_name
 from symtop.model.scenes import Scene, scene
 from symtop.run.simulation import simulate
 

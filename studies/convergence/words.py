@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.order import BESIDE
-from symtop.methods.registry import split_name
+from symtop.methods.framework.registry import split_name
 from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 

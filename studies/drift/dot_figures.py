@@ -8,7 +8,7 @@ from matplotlib.ticker import FixedLocator, NullLocator
 
 from symtop.measure.conservation import CONSTANTS
 from symtop.measure.growth import ROUNDED
-from symtop.methods.registry import integrators, split_name
+from symtop.methods.framework.registry import integrators, split_name
 from symtop.report import style
 from symtop.runner.study import Picture
 

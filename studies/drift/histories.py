@@ -10,7 +10,7 @@ from typing import Any
 import xarray as xr
 
 from symtop.measure.conservation import history
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 
 

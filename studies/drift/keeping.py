@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.methods.registry import integrator, integrators, split_name
+from symtop.methods.framework.registry import integrator, integrators, split_name
 
 LENGTHS = np.geomspace(10.0, 1e6, 41)  # nutations
 FAMILIAR = ("midpoint[angles]", "stormer-verlet[angles]", "rk4[axis]")

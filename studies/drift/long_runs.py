@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.base.validate import whole
+from symtop.core.errors import whole
 from symtop.measure.growth import ensemble_growth
-from symtop.methods.loop import Loop
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.loop import Loop
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import flat
 from symtop.run.long_run import (

@@ -13,7 +13,7 @@ import xarray as xr
 from symtop.measure.growth import growth, horizon, lost_at
 from symtop.measure.phase import nutation_phase
 from symtop.measure.settings import seek
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate
 

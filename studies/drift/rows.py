@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS
-from symtop.methods.registry import split_name
+from symtop.methods.framework.registry import split_name
 from symtop.model.charts import CHARTS
 from symtop.report.sentences import counted, few
 from symtop.runner.study import Table

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 
 import xarray as xr
 
-from symtop.methods.registry import Integrator, integrator
+from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import Scene, scene
 from symtop.run.long_run import PER_NUTATION
 from symtop.runner.grid import grid_rows, grid_scenes

@@ -5,7 +5,7 @@ from typing import Any
 
 import xarray as xr
 
-from symtop.methods.registry import integrator
+from symtop.methods.framework.registry import integrator
 from symtop.runner.study import Table
 
 from . import words

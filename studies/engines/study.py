@@ -9,11 +9,11 @@ import functools
 import numpy as np
 import xarray as xr
 
-from symtop.methods.registry import engines, integrator
-from symtop.model.closed_forms import ClosedForms
+from symtop.methods.framework.registry import engines, integrator
+from symtop.model.exact.closed_forms import ClosedForms
 from symtop.model.scenes import scene
-from symtop.run.ensemble import ensemble
-from symtop.run.population import NUMBERS, population
+from symtop.run.ensemble.ensemble import ensemble
+from symtop.run.ensemble.population import NUMBERS, population
 from symtop.runner.study import Case, Study
 
 from . import figures, listed, words

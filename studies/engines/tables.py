@@ -14,10 +14,10 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from symtop.methods.calling import solve
-from symtop.methods.plan import Plan
-from symtop.methods.registry import Integrator
-from symtop.model.closed_forms import ClosedForms
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator
+from symtop.model.exact.closed_forms import ClosedForms
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop, flat
 from symtop.model.view import axis_of, space_energy, space_momenta

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.methods.engines import SINGLE
-from symtop.methods.registry import integrator, split_name
+from symtop.methods.engines.engines import SINGLE
+from symtop.methods.framework.registry import integrator, split_name
 from symtop.report.sentences import counted, few
 
 from .tables import FREQUENCIES, HORIZON, SCENES

@@ -9,10 +9,10 @@ one is a kernel of its own: symplectic Euler on the reduced top, order 1.
 import numpy as np
 
 import symtop
-from symtop.methods.angles import chart_outcome, reduced
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.loop import driver
-from symtop.methods.splitting_angles import force_angles
+from symtop.methods.framework.angles import chart_outcome, reduced
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import driver
+from symtop.methods.splitting.splitting_angles import force_angles
 
 # A discrete Lagrangian is a quadrature rule: nodes and weights. Two Gauss points:
 left, right = 0.5 - 3**0.5 / 6, 0.5 + 3**0.5 / 6

@@ -1,8 +1,8 @@
 """The cells of the factorial: a method, the chart of its equations, the language that runs it, the call around it.
 
     method        a scheme: the same coefficients in every chart and language
-    chart         angles, axis, attitude                                        see `symtop.methods.formulations`
-    language      compiled        the whole loop, by numba or heyoka
+    chart         angles, axis, attitude                                        see
+    `symtop.methods.framework.formulations` language      compiled        the whole loop, by numba or heyoka
                   scipy-numba     SciPy's loop in Python, the right-hand side compiled
                   scipy-python    SciPy's loop, the right-hand side in Python on floats
                   numpy           a loop in Python over NumPy arrays            see `plain_numpy`
@@ -18,13 +18,13 @@ top and gravity), with the same coefficients. The implicit midpoint rule is `mid
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from symtop.methods import taylor
-from symtop.methods.angles import BareTop
-from symtop.methods.euler_lagrange import sampled_momenta, to_angles
-from symtop.methods.formulations import FORMULATIONS
-from symtop.methods.plan import Array
-from symtop.methods.registry import Integrator, integrators
-from symtop.methods.scipy_ivp import RightHandSide, scipy_method
+from symtop.methods.framework.angles import BareTop
+from symtop.methods.framework.euler_lagrange import sampled_momenta, to_angles
+from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.plan import Array
+from symtop.methods.framework.registry import Integrator, integrators
+from symtop.methods.library.scipy_ivp import RightHandSide, scipy_method
+from symtop.methods.taylor import taylor
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
 from symtop.run.simulation import make_plan, simulate

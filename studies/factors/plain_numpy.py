@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from symtop.methods.formulations import FORMULATIONS, as_run
-from symtop.methods.outcomes import NOT_FINITE, OK
-from symtop.methods.plan import Array, Plan, Run
-from symtop.methods.registry import Integrator, Solver
+from symtop.methods.framework.formulations import FORMULATIONS, as_run
+from symtop.methods.framework.outcomes import NOT_FINITE, OK
+from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.registry import Integrator, Solver
 from symtop.model.top import Angles, SymmetricTop
 
 Step = Callable[[Callable[[Array], Array], Any, Array, float], Array]

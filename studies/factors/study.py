@@ -8,7 +8,7 @@ import math
 
 import xarray as xr
 
-from symtop.methods.registry import integrators
+from symtop.methods.framework.registry import integrators
 from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study

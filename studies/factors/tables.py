@@ -14,7 +14,7 @@ import xarray as xr
 
 from symtop.measure import settings
 from symtop.measure.timing import NOISY, Timing, first_call, timings
-from symtop.methods.registry import SMALLEST_FIRST
+from symtop.methods.framework.registry import SMALLEST_FIRST
 from symtop.model.scenes import Scene
 
 from .cells import (

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import residuals
-from symtop.methods.registry import integrator
+from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate
 

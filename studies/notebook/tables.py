@@ -13,8 +13,8 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import residuals
-from symtop.methods.registry import integrator
-from symtop.methods.scipy_ivp import integrated
+from symtop.methods.framework.registry import integrator
+from symtop.methods.library.scipy_ivp import integrated
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.run.modified_energy import modified_energy

@@ -22,12 +22,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.base.compiled import register_jitable
-from symtop.methods.euler_lagrange import accelerations, with_rates
-from symtop.methods.loop import March, Marks, driver
-from symtop.methods.quadrature import RULES, quadrature
-from symtop.methods.scipy_ivp import integrated
-from symtop.methods.unreduced import begin, observe, unreduced_step, with_momenta
+from symtop.core.jit import register_jitable
+from symtop.methods.framework.euler_lagrange import accelerations, with_rates
+from symtop.methods.framework.loop import March, Marks, driver
+from symtop.methods.lagrangian.quadrature import RULES, quadrature
+from symtop.methods.lagrangian.unreduced import begin, observe, unreduced_step, with_momenta
+from symtop.methods.library.scipy_ivp import integrated
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 

@@ -26,9 +26,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symtop.base.compiled import register_jitable
-from symtop.methods.loop import driver
-from symtop.methods.quadrature import RULES, quadrature
+from symtop.core.jit import register_jitable
+from symtop.methods.framework.loop import driver
+from symtop.methods.lagrangian.quadrature import RULES, quadrature
 from symtop.model.charts import Array
 
 ONE_SIDED = "force-at-one-end"  # the midpoint rule with the whole force in F_d^-, a negative control of order 1

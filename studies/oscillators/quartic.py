@@ -2,13 +2,14 @@
 
     x'' = (2 sigma |x|^2 + 3 b) x,      E = |x'|^2/2 - 3 b |x|^2/2 - sigma |x|^4/2,      J = Im(conj(x) x'),   x complex
 
-sigma = 0 is the harmonic oscillator in a plane. sigma = kappa and -kappa, with the b of `symtop.methods.oscillators`,
-are the two half-angle functions of a top. Four maps, three of them of one form, Z_{n+1} + Z_{n-1} = 2 f(|Z_n|^2) Z_n:
+sigma = 0 is the harmonic oscillator in a plane. sigma = kappa and -kappa, with the b of
+`symtop.methods.lagrangian.oscillators`, are the two half-angle functions of a top. Four maps, three of them of one
+form, Z_{n+1} + Z_{n-1} = 2 f(|Z_n|^2) Z_n:
 
     stormer-verlet    f = 1 + h^2 (3 b/2 + sigma s)                                          x_n = Z_n
     mcmillan          f = (1 + 3 b h^2/2)/(1 - sigma h^2 s), integrable at any step          x_n = Z_n
-    exact-discrete    f = A/(1 + B s) of `symtop.methods.exact_discrete`                     x_n = exp(i n delta) Z_n
-    midpoint          x_{n+1} = x_n + h v,  v = x'_n + h F((x_n + x_{n+1})/2)/2
+    exact-discrete    f = A/(1 + B s) of `symtop.methods.lagrangian.exact_discrete`                     x_n = exp(i n
+    delta) Z_n midpoint          x_{n+1} = x_n + h v,  v = x'_n + h F((x_n + x_{n+1})/2)/2
 
 The discrete Lagrangian of the first three is r (|Z1 - Z0|^2/2 - (V(Z0) + V(Z1))/2) with dV/ds = 1 - f. With sigma = 0
 the exact one has B = delta = 0, A = cos w h and r = w/sin w h, w^2 = -3 b:
@@ -32,11 +33,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.methods.exact_map import one_oscillator
-from symtop.methods.oscillators import on_oscillators
+from symtop.methods.lagrangian.exact_map import one_oscillator
+from symtop.methods.lagrangian.oscillators import on_oscillators
 from symtop.model.charts import Array
+from symtop.model.exact.weierstrass import differences, half_period, roots
 from symtop.model.scenes import Scene
-from symtop.model.weierstrass import differences, half_period, roots
 
 BITS, ORDER, PER_PERIOD = 96, 20, 48  # of the truth: its terms fall by 10 an order, to 1e-20
 REAL = 1e-7  # imaginary part over size of what counts as a real root

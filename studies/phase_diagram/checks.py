@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.methods.registry import integrator
+from symtop.methods.framework.registry import integrator
 from symtop.model.charts import Array
 
 from ..population.costs import cost_to_reach

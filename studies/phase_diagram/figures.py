@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
-from symtop.methods.registry import integrator, split_name
+from symtop.methods.framework.registry import integrator, split_name
 from symtop.report.style import LEAST_TEXT, headline, look, panels
 from symtop.runner.study import Picture
 

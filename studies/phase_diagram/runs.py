@@ -20,9 +20,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.base.numbers import EPSILON, GOLDEN
-from symtop.methods.plan import Plan
-from symtop.methods.registry import Integrator
+from symtop.core.numbers import EPSILON, GOLDEN
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
 from symtop.model.charts import Array
 from symtop.model.effective import effective_potential

@@ -6,7 +6,7 @@ times a force evaluation of each row. A second round runs ten cells that were fo
 
 import xarray as xr
 
-from symtop.methods.registry import integrator, rows
+from symtop.methods.framework.registry import integrator, rows
 from symtop.runner.study import Case, Study
 
 from ..population.prices import PROCESSES, prices

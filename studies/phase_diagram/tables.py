@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.base.remembered import of_one_dataset
-from symtop.methods.registry import integrator
+from symtop.core.memoize import of_one_dataset
+from symtop.methods.framework.registry import integrator
 from symtop.model.charts import Array
 
 from ..population import verdicts

@@ -34,17 +34,17 @@ from numpy.typing import NDArray
 
 from symtop.measure.settings import FLAT, LEAST_STEPS, ROUNDED
 from symtop.measure.work import TARGETS
-from symtop.methods.adaptive import Adaptive
-from symtop.methods.calling import solve
-from symtop.methods.fixed_step import inside
-from symtop.methods.many import members_of
-from symtop.methods.outcomes import OUTCOMES
-from symtop.methods.plan import Plan
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.adaptive import Adaptive
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.many import members_of
+from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import DIMENSIONS, Array
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.forecast import forecast
+from symtop.run.guard.forecast import forecast
 
 from .costs import cost_to_reach
 from .tops import ASKED, FIRST, MOMENTA, Tops

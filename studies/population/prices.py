@@ -25,14 +25,14 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.timing import Timing, timings
-from symtop.methods.adaptive import Adaptive
-from symtop.methods.fixed_step import inside
-from symtop.methods.plan import Plan
-from symtop.methods.registry import Integrator, integrator
+from symtop.methods.framework.adaptive import Adaptive
+from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.charts import Array
-from symtop.model.closed_forms import ClosedForms
+from symtop.model.exact.closed_forms import ClosedForms
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.population import NUMBERS, population
+from symtop.run.ensemble.population import NUMBERS, population
 
 from .tops import FIRST
 

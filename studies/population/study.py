@@ -7,8 +7,8 @@ for each target. A case is a row and a horizon; a last one, alone on the machine
 import numpy as np
 import xarray as xr
 
-from symtop.methods.registry import Integrator, integrator, rows
-from symtop.run.population import STRATA
+from symtop.methods.framework.registry import Integrator, integrator, rows
+from symtop.run.ensemble.population import STRATA
 from symtop.runner.study import Case, Study
 
 from . import figures, listed, words

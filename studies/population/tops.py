@@ -21,16 +21,16 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.base.numbers import EPSILON, GOLDEN, TINY
-from symtop.methods.many import members_of
+from symtop.core.numbers import EPSILON, GOLDEN, TINY
+from symtop.methods.framework.many import members_of
 from symtop.model import charts, scales
 from symtop.model.charts import Array
-from symtop.model.closed_forms import ClosedForms
 from symtop.model.effective import effective_potential
+from symtop.model.exact.closed_forms import ClosedForms
 from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import axis_of, space_energy
-from symtop.run.bounds import ROUNDING
-from symtop.run.population import NUMBERS, STRATA, population
+from symtop.run.ensemble.population import NUMBERS, STRATA, population
+from symtop.run.reference.bounds import ROUNDING
 
 FIRST = 1.0925  # steps a nutation of the coarsest run
 SAMPLES = 12
@@ -49,7 +49,7 @@ class Body(NamedTuple):
 
 
 class Shown(Protocol):
-    """What n runs have shown, such as `symtop.methods.many.Many`."""
+    """What n runs have shown, such as `symtop.methods.framework.many.Many`."""
 
     @property
     def states(self) -> Array:
@@ -128,8 +128,9 @@ class Tops:
     def bounds(self) -> dict[str, Array]:
         """The least error of each quantity that the truth can judge over the horizon, (n,).
 
-        That of the axis and the attitude is the rounding of the closed form, which `symtop.run.bounds` states. Rows of
-        the angles chart show phi and psi as doubles, whose rounding is an angle; it counts for all rows.
+        That of the axis and the attitude is the rounding of the closed form, which `symtop.run.reference.bounds`
+        states. Rows of the angles chart show phi and psi as doubles, whose rounding is an angle; it counts for all
+        rows.
         """
         turns = (np.abs(self.forms.phi_per_period) + np.abs(self.forms.psi_per_period)) * self.nutations
         grain = (np.abs(self.energy) + np.abs(self.numbers[:, 2])) / self.energy_scale

@@ -22,11 +22,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from symtop.methods.discrete_lagrangian import rule_of
-from symtop.methods.galerkin import is_galerkin
-from symtop.methods.plan import Plan
-from symtop.methods.quadrature import Quadrature
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.lagrangian.discrete_lagrangian import rule_of
+from symtop.methods.lagrangian.galerkin import is_galerkin
+from symtop.methods.lagrangian.quadrature import Quadrature
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 

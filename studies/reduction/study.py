@@ -11,7 +11,7 @@ import math
 import xarray as xr
 
 from symtop.measure.settings import ladder
-from symtop.methods.registry import integrator, methods
+from symtop.methods.framework.registry import integrator, methods
 from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study

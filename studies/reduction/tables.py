@@ -11,14 +11,14 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.measure.accuracy import as_table, error_table
 from symtop.measure.order import LARGEST_ERROR, power_law
 from symtop.measure.timing import bare_run, timings
-from symtop.methods import unreduced
-from symtop.methods.discrete_lagrangian import rule_of
-from symtop.methods.fixed_step import inside
-from symtop.methods.registry import SMALLEST_FIRST, Integrator, integrator, integrators
+from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.registry import SMALLEST_FIRST, Integrator, integrator, integrators
+from symtop.methods.lagrangian import unreduced
+from symtop.methods.lagrangian.discrete_lagrangian import rule_of
 from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.methods.registry import integrator
+from symtop.methods.framework.registry import integrator
 from symtop.report.sentences import few, joined
 from symtop.report.style import number
 from symtop.runner.study import Table

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, JUDGED, VERDICTS
-from symtop.methods.registry import Integrator, integrator, integrators, split_name
+from symtop.methods.framework.registry import Integrator, integrator, integrators, split_name
 
 from .outcome_maps import NOT_RUN, SETTLED
 from .tables import MECHANISMS, Column

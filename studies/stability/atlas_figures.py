@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.measure.verdicts import ACCURATE, OUTSIDE, VERDICTS
-from symtop.methods.registry import split_name
+from symtop.methods.framework.registry import split_name
 from symtop.report.style import GREY, LEAST_TEXT, OUTCOME_COLORS, WIDTH, headline, panels
 
 from .atlas import OutcomeMap, accurate_everywhere, closed_forms, common, maps

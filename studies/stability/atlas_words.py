@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT
-from symtop.methods.registry import split_name
+from symtop.methods.framework.registry import split_name
 from symtop.report.sentences import counted, few
 from symtop.runner.study import Table
 

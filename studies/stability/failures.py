@@ -20,11 +20,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.methods.calling import solve
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.outcomes import OUTCOMES
-from symtop.methods.plan import Array, Plan
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.framework.plan import Array, Plan
+from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, flat

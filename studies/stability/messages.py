@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 
-from symtop.methods.registry import split_name
+from symtop.methods.framework.registry import split_name
 from symtop.model.charts import Array
 from symtop.report.sentences import counted
 from symtop.report.style import number

@@ -30,11 +30,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.measure.many_verdicts import Judged, judge_runs, truths
-from symtop.methods.calling import solve
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.outcomes import OUTCOMES
-from symtop.methods.plan import Plan
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator
 from symtop.model import charts, scenes
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene

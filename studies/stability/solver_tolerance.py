@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.base.compiled import compile_kernel, register_jitable
-from symtop.methods import discrete_lagrangian
-from symtop.methods.angles import reduced
-from symtop.methods.quadrature import Quadrature
+from symtop.core.jit import compile_kernel, register_jitable
+from symtop.methods.framework.angles import reduced
+from symtop.methods.lagrangian import discrete_lagrangian
+from symtop.methods.lagrangian.quadrature import Quadrature
 from symtop.model import top as model
 from symtop.model.scenes import Scene
 

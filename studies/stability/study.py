@@ -5,8 +5,8 @@ import math
 import numpy as np
 import xarray as xr
 
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.registry import Integrator, integrator
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.registry import Integrator, integrator
 from symtop.runner.grid import grid_rows, grid_scenes
 from symtop.runner.study import Case, Study
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.methods.discrete_lagrangian import is_midpoint, rule_of
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.lagrangian.discrete_lagrangian import is_midpoint, rule_of
 from symtop.model import scenes
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import linear_limits, sleeping_threshold, with_momenta

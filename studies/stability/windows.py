@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import NO_TRACE, surpasses, trace
 

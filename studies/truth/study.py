@@ -8,7 +8,7 @@ digits; and values that others have published are computed anew.
 import xarray as xr
 
 from symtop.model.scenes import scene
-from symtop.run.witnesses import have_heyoka
+from symtop.run.reference.independent_checks import have_heyoka
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.base.multiprecision import context
+from symtop.core.multiprecision import context
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
-from symtop.run.reference import PRECISIONS, judged_integration, reference
-from symtop.run.witnesses import flown, integrate, iterated, precise_form
+from symtop.run.reference.independent_checks import flown, integrate, iterated, precise_form
+from symtop.run.reference.truth import PRECISIONS, judged_integration, reference
 
 # name: precision, chart
 SOURCES = {

@@ -13,7 +13,7 @@ import xarray as xr
 
 from symtop.measure import ranking
 from symtop.measure.work import TARGETS
-from symtop.methods.registry import split_name
+from symtop.methods.framework.registry import split_name
 from symtop.report.sentences import joined
 from symtop.runner.study import Table
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.base.remembered import of_one_dataset
+from symtop.core.memoize import of_one_dataset
 from symtop.measure import ranking
-from symtop.methods.registry import integrator, integrators, split_name
+from symtop.methods.framework.registry import integrator, integrators, split_name
 from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 

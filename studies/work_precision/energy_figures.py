@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import PercentFormatter
 
-from symtop.methods.registry import split_name
+from symtop.methods.framework.registry import split_name
 from symtop.report import style
 from symtop.report.figures import BELOW, error_band, name_ends
 from symtop.runner.study import Picture

@@ -10,7 +10,7 @@ import xarray as xr
 
 from symtop.measure import ranking
 from symtop.measure.work import TARGETS
-from symtop.methods.registry import split_name
+from symtop.methods.framework.registry import split_name
 from symtop.report.sentences import joined
 from symtop.report.style import GREY, LEAST_TEXT, headline, look, number, panels
 from symtop.runner.study import Picture

@@ -23,7 +23,7 @@ its own), target (rad), batch.
 import xarray as xr
 
 from symtop.measure.work import spans, work_table
-from symtop.methods.registry import integrator
+from symtop.methods.framework.registry import integrator
 from symtop.model import scenes
 from symtop.runner.study import Case
 

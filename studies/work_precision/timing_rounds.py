@@ -24,7 +24,7 @@ import xarray as xr
 
 from symtop.measure.timing import MISSED, Timing, bare_run, first_call, forecasts, met_again, timings
 from symtop.measure.work import TARGETS, least_work
-from symtop.methods.registry import Integrator, integrator
+from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import Scene
 
 WITHIN = 1.6  # of the fastest

@@ -31,13 +31,13 @@ def cite(files: tuple[Path, ...]) -> None:
     symtop cite
     symtop cite results/work_precision.nc run.nc
     """
-    from symtop.base import datasets
-    from symtop.methods.citations import entries
+    from symtop.core import netcdf
+    from symtop.methods.framework.citations import entries
 
     keys: dict[str, None] = {}
     unknown: dict[str, None] = {}
     for file in files:
-        for name in dict.fromkeys(_integrators(datasets.read_any(file))):
+        for name in dict.fromkeys(_integrators(netcdf.read_any(file))):
             sources = _keys(name)
             keys.update(dict.fromkeys(sources))
             if not sources:
@@ -50,9 +50,9 @@ def cite(files: tuple[Path, ...]) -> None:
 
 def _integrators(data: "xr.Dataset | xr.DataTree") -> Iterator[str]:
     """Names of the integrators of a dataset or tree: a coordinate of every group, and the attribute of a run."""
-    from symtop.base import datasets
+    from symtop.core import netcdf
 
-    for group in datasets.groups(data).values():
+    for group in netcdf.groups(data).values():
         if "integrator" in group.variables:
             yield from (str(name) for name in group["integrator"].values.ravel())
         if "integrator" in group.attrs:
@@ -61,9 +61,9 @@ def _integrators(data: "xr.Dataset | xr.DataTree") -> Iterator[str]:
 
 def _keys(name: str) -> list[str]:
     """The entries of `citations.bib` that a method of the registry names; none for one that is not registered here."""
-    from symtop.base.validate import SymtopError
-    from symtop.methods.citations import keys
-    from symtop.methods.registry import integrator
+    from symtop.core.errors import SymtopError
+    from symtop.methods.framework.citations import keys
+    from symtop.methods.framework.registry import integrator
 
     try:
         return keys(integrator(name))

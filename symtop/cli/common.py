@@ -16,9 +16,9 @@ from typing import Any, TextIO
 
 import click
 
-from symtop.base import cache
-from symtop.base.signals import INTERRUPTED, told_apart
-from symtop.base.validate import SymtopError, SymtopWarning, at_home, place, spare
+from symtop.core import files
+from symtop.core.errors import SymtopError, SymtopWarning, at_home, place, spare
+from symtop.core.signals import INTERRUPTED, told_apart
 
 LONGEST_NAME = 80  # characters of a file that are told
 FIGURES = (".png", ".svg", ".pdf")
@@ -107,7 +107,7 @@ OTHER = {"scene": "an integrator", "integrator": "a scene"}
 
 def _is_of_the_other_kind(kind: str, name: str) -> bool:
     """Has somebody typed an integrator where a scene should stand, or a scene in place of an integrator?"""
-    from symtop.methods.registry import integrators, split_name
+    from symtop.methods.framework.registry import integrators, split_name
     from symtop.model.scenes import scenes
 
     return name in scenes() if kind == "integrator" else split_name(name)[0] in integrators()
@@ -117,15 +117,15 @@ def tell_of_compiling() -> None:
     """Say once, on a terminal and in its width, that kernels are being compiled."""
 
     def tell() -> None:
-        cache.on_cold.clear()
-        warn(cache.COMPILING)
+        files.on_cold.clear()
+        warn(files.COMPILING)
 
-    cache.on_cold[:] = [tell] if cache.is_terminal(sys.stderr) else []
+    files.on_cold[:] = [tell] if files.is_terminal(sys.stderr) else []
 
 
 def warn(sentence: str) -> None:
     """Print a warning to the standard error."""
-    clear = "\r\x1b[K" if cache.is_terminal(sys.stderr) else ""  # of a clock that stands in the line
+    clear = "\r\x1b[K" if files.is_terminal(sys.stderr) else ""  # of a clock that stands in the line
     click.echo(clear + fitted(f"symtop: {sentence}", sys.stderr), err=True)
 
 
@@ -166,7 +166,7 @@ def say(sentence: str) -> None:
 
 def fitted(text: str, stream: TextIO | None) -> str:
     """The text in lines that fit the terminal, if a terminal is what the stream goes to."""
-    if not cache.is_terminal(stream):
+    if not files.is_terminal(stream):
         return text
     width = terminal_width()
     return "\n".join(

@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 from symtop import __version__
-from symtop.base.cache import cache_root
+from symtop.core.files import cache_root
 
 PACKAGE = Path(__file__).resolve().parents[1]
 LISTED = ("methods", "model", "runner")  # folders of the package whose files name something, beside the studies
@@ -32,7 +32,7 @@ def _stamp() -> str:
 
 
 def _listed() -> dict[str, list[str]]:
-    from symtop.methods.registry import integrators, rows
+    from symtop.methods.framework.registry import integrators, rows
     from symtop.model.scenes import scenes
     from symtop.runner import scripts
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from symtop.base.progress import beating
+from symtop.core.progress import beating
 
 LEAST_SPACE = 500_000_000  # free bytes below which a full run of the studies may not fit on the disk
 LARGE_CACHE = 5_000_000_000  # bytes of a cache that the doctor advises to delete
@@ -104,7 +104,7 @@ def _heyoka() -> list[Finding]:
     if importlib.util.find_spec("heyoka") is None:
         advice = "heyoka has wheels for Linux only; elsewhere try conda-forge. The closed form works without it"
         return [Finding("precisions", "no Taylor series: heyoka is absent", False, advice)]
-    from symtop.methods.taylor import arithmetic, stepper
+    from symtop.methods.taylor.taylor import arithmetic, stepper
 
     findings = []
     for precision in ("double", "longdouble", "quad"):
@@ -121,7 +121,7 @@ def _heyoka() -> list[Finding]:
 
 
 def _caches() -> list[Finding]:
-    from symtop.base.cache import DAY, by_last_use, cache_root, size_of
+    from symtop.core.files import DAY, by_last_use, cache_root, size_of
 
     root, yesterday = cache_root(), time.time() - DAY
     findings = [_writable("cache", root, "set SYMTOP_CACHE to a folder that can be written")]

@@ -1,8 +1,8 @@
 """`i_use`: what a physics engine's integrator makes of a scene, its best setting, and what would do as well for less.
 
-An engine is known here by the maps of its settings, `symtop.methods.engines`. Each is run at the step of the user to
-the horizon; errors are the largest angle between the axis and the true one. The gain of another method is counted in
-force evaluations, which neither the machine nor the language of the engine decides.
+An engine is known here by the maps of its settings, `symtop.methods.engines.engines`. Each is run at the step of the
+user to the horizon; errors are the largest angle between the axis and the true one. The gain of another method is
+counted in force evaluations, which neither the machine nor the language of the engine decides.
 """
 
 import math
@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from symtop import advise
-from symtop.base.validate import SymtopError, one_of, positive
+from symtop.core.errors import SymtopError, one_of, positive
 from symtop.measure.errors import errors
-from symtop.methods.registry import integrator
+from symtop.methods.framework.registry import integrator
 from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.simulation import simulate

@@ -6,7 +6,6 @@ from functools import partial
 
 import click
 
-from symtop.base.validate import SymtopError, whole
 from symtop.cli.common import (
     File,
     apart,
@@ -21,6 +20,7 @@ from symtop.cli.common import (
     warn,
 )
 from symtop.cli.completion import completing
+from symtop.core.errors import SymtopError, whole
 
 pairs = partial(zip, strict=True)
 COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
@@ -68,7 +68,7 @@ def ensemble(
     symtop ensemble --members 10000 --seed 1 strang --step-size 0.01 --horizon 20 -o runs.nc
     symtop ensemble --kind grazing "gauss-4[axis]" --per-nutation 50 --nutations 10 --figure spread.png
     """
-    from symtop.base.progress import ticking
+    from symtop.core.progress import ticking
 
     figure_file("--figure", figure)
     standing("--output", output)
@@ -77,8 +77,8 @@ def ensemble(
     names = None if variables is None else [name.strip() for name in variables.split(",")]
     with ticking("drawing tops"):
         from symtop.measure.spread import LEVELS, QUANTITIES, largest, member_errors, spread
-        from symtop.run import ensemble as runs
-        from symtop.run.population import population
+        from symtop.run.ensemble import ensemble as runs
+        from symtop.run.ensemble.population import population
 
         tops = population(count, seed=seed, kind=kind)
     compared = [name for name in QUANTITIES if names is None or name in names]

@@ -54,13 +54,15 @@ def judge(
     symtop judge "./my_engine --top" --form program --quick
     symtop judge run.csv --scene spheroid --conserves p_phi
     """
-    from symtop.judging import screen
+    from symtop.judging import text_report
+    from symtop.judging.findings import Finding
     from symtop.judging.judge_step import judge as judged
-    from symtop.judging.ledger import Finding
-    from symtop.judging.watched import About
+    from symtop.judging.sandbox import About
 
     def tell(event: About | Finding) -> None:
-        shown = screen.heading(event._asdict(), scene) if isinstance(event, About) else screen.line(event, width)
+        shown = (
+            text_report.heading(event._asdict(), scene) if isinstance(event, About) else text_report.line(event, width)
+        )
         if shown:
             click.echo(shown)
 
@@ -78,11 +80,11 @@ def judge(
     if as_json:
         click.echo(as_text([finding.plain() for finding in ledger.findings]))
     else:
-        click.echo(screen.ending(ledger.findings, ledger.implied))
+        click.echo(text_report.ending(ledger.findings, ledger.implied))
     if output is not None:
-        from symtop.base import datasets
+        from symtop.core import netcdf
 
-        datasets.write(ledger.dataset(), output)
+        netcdf.write(ledger.dataset(), output)
         click.echo(f"written to {output}", err=as_json)
     if card is not None or badge is not None:
         from symtop.report import card as cards

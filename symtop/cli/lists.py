@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from symtop.base.validate import SymtopError
 from symtop.cli.common import as_text, facts, json_option, plugin_option, table, terminal_width
 from symtop.cli.completion import completing
+from symtop.core.errors import SymtopError
 from symtop.report import tables
 
 if TYPE_CHECKING:
-    from symtop.methods.registry import Integrator
+    from symtop.methods.framework.registry import Integrator
     from symtop.model.scenes import Scene
 
 wide_option = click.option("--wide", is_flag=True, help="Every column, however wide the table becomes.")
@@ -54,7 +54,7 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
     symtop integrators "rk4[axis]"
     symtop integrators --engines
     """
-    from symtop.methods import registry
+    from symtop.methods.framework import registry
 
     listed = registry.engines() if engines else registry.methods()
     methods = [registry.integrator(name)] if name is not None else list(listed.values())
@@ -89,7 +89,7 @@ def _described(method: "Integrator") -> Record:
 
 
 def _integrator_page(described: Record, width: int) -> str:
-    from symtop.methods.citations import citation
+    from symtop.methods.framework.citations import citation
 
     lines = {key: value for key, value in described.items() if key not in ("name", "summary", "about")}
     paragraphs = [f"{described['name']}: {described['summary']}", *described.get("about", "").split("\n\n")]

@@ -14,10 +14,10 @@ from typing import Any
 import click
 
 from symtop import __version__
-from symtop.base.validate import SymtopError, positive
 from symtop.cli import cite, ensembles, judge, lists, runs, tools
 from symtop.cli.common import PLUGINS, File, Group, json_option, plugin_option, results_option, tell_of_compiling, warn
 from symtop.cli.completion import completing
+from symtop.core.errors import SymtopError, positive
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -100,7 +100,7 @@ def study(
 
 def _nothing_to_do(results: Path, quick: bool, full: bool, as_json: bool) -> bool:
     """Is every study up to date? Then its findings are told."""
-    from symtop.cli import told
+    from symtop.cli import study_messages
     from symtop.runner import settled
 
     began = time.monotonic()
@@ -108,7 +108,9 @@ def _nothing_to_do(results: Path, quick: bool, full: bool, as_json: bool) -> boo
     if known is None:
         return False
     took = {"computed": 0, "seconds": time.monotonic() - began}
-    told.end([told.study(one | took, results, as_json=as_json) for one in known], results, as_json=as_json)
+    study_messages.end(
+        [study_messages.study(one | took, results, as_json=as_json) for one in known], results, as_json=as_json
+    )
     return True
 
 

@@ -5,9 +5,9 @@ import sys
 
 import click
 
-from symtop.base.validate import SymtopError
 from symtop.cli.common import File, apart, as_text, figure_file, json_option, plugin_option, say, standing, table, warn
 from symtop.cli.completion import completing
+from symtop.core.errors import SymtopError
 
 SAME = 0.01  # a step that differs by more from the one asked for is told
 
@@ -40,17 +40,17 @@ def run(
     symtop run spheroid "rk4[axis]" --step-size 0.01
     symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
     """
-    from symtop.base.progress import ticking
+    from symtop.core.progress import ticking
 
     figure_file("--figure", figure)
     standing("--output", output)
     apart(output=output, figure=figure)
     with ticking("running"):  # the packages are loaded under the clock, too
-        from symtop.base import datasets
+        from symtop.core import netcdf
         from symtop.measure.errors import QUANTITIES, errors_against
         from symtop.measure.verdicts import judgement
         from symtop.model import scenes
-        from symtop.run.reference import reference
+        from symtop.run.reference.truth import reference
         from symtop.run.simulation import simulate
 
         data = simulate(
@@ -58,7 +58,7 @@ def run(
             observe=observe, guard=warn if guard else False, budget=budget,
         )  # fmt: skip
         if output is not None:
-            datasets.write(data, output)
+            netcdf.write(data, output)
         chosen = scenes.scene(scene)
         truth = reference(chosen, data["time"].values, precision="closed-form")
         error = errors_against(chosen, data, truth)
@@ -116,13 +116,13 @@ def long(
     \b
     symtop long spheroid stormer-verlet --steps 1e9 --output long.nc
     """
-    from symtop.base.progress import ticking
+    from symtop.core.progress import ticking
 
     apart(output=output, checkpoint=checkpoint)
     standing("--output", output)
     standing("--checkpoint", checkpoint)
     with ticking("loading"):
-        from symtop.base.validate import whole
+        from symtop.core.errors import whole
         from symtop.model import scenes
         from symtop.run.long_run import PER_NUTATION, long_run
 
@@ -169,11 +169,11 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     symtop claims midpoint rk4
     symtop claims --plugin my_methods.py
     """
-    from symtop.base.progress import ticking
+    from symtop.core.progress import ticking
 
     with ticking("loading"):
         from symtop.judging.claims import judge
-        from symtop.methods import registry
+        from symtop.methods.framework import registry
         from symtop.model import scenes
 
         chosen = scenes.scene(scene)

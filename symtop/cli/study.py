@@ -7,11 +7,11 @@ from typing import Any
 
 import click
 
-from symtop.base.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
-from symtop.base.validate import SymtopError
-from symtop.cli import told
+from symtop.cli import study_messages
 from symtop.cli.common import as_text, warn
-from symtop.methods.registry import integrator
+from symtop.core.errors import SymtopError
+from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
+from symtop.methods.framework.registry import integrator
 from symtop.runner import check, run, scripts, settled, status, store
 from symtop.runner.pools import Workers
 from symtop.runner.study import Study, StudyError
@@ -83,11 +83,11 @@ def run_all(
     save = style.sketch if grid.get("quick") else style.publish  # quick figures are to look at, not to print
     options = {"fresh": fresh, "limit": limit, "save": save, "beside": len(studies) > 1, **grid}
     ended = _in_order(workers, studies, results, options)
-    summaries = [told.study(findings, results, as_json=as_json) for findings in ended]
+    summaries = [study_messages.study(findings, results, as_json=as_json) for findings in ended]
     failed = any(summary["failures"] for summary in summaries)
     if whole and not failed:
         settled.note(results.resolve(), [study.name for study in studies], made)
-    told.end(summaries, results, as_json=as_json)
+    study_messages.end(summaries, results, as_json=as_json)
     return 1 if failed else 0
 
 
@@ -144,7 +144,7 @@ def show_status(studies: list[Study], results: Path, why: bool, as_json: bool, *
         click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in status.STATES if counts[state]))
         open_rows = [row for row in rows if row["state"] != status.DONE]
         for line in _grouped(open_rows) if why else _counted(open_rows):
-            click.echo(told.indented(line, "  "))
+            click.echo(study_messages.indented(line, "  "))
     return 1 if any(row["state"] == status.FAILED for rows in states.values() for row in rows) else 0
 
 

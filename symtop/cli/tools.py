@@ -5,9 +5,9 @@ from pathlib import Path
 
 import click
 
-from symtop.base.validate import SymtopError
 from symtop.cli.common import File, as_text, json_option, plugin_option, results_option, say
 from symtop.cli.completion import completing
+from symtop.core.errors import SymtopError
 
 
 @click.command(short_help="Find the cheapest integrator for an accuracy.")
@@ -36,7 +36,7 @@ def recommend(
     """
     import dataclasses
 
-    from symtop.base.progress import ticking
+    from symtop.core.progress import ticking
 
     with ticking("loading"):
         from symtop import advise
@@ -69,7 +69,7 @@ def doctor(results: str, warm: bool, as_json: bool) -> None:
 
     The exit code is 1 if there is a fault. It takes some seconds; with --warm, some minutes the first time.
     """
-    from symtop.base.progress import ticking
+    from symtop.core.progress import ticking
 
     with ticking("loading"):
         from symtop.cli import doctor as checks
@@ -97,7 +97,7 @@ def explore(port: int, no_browser: bool) -> None:
     """Show one run beside the exact motion in a browser, with sliders for the top, the start and the step."""
     import webbrowser
 
-    from symtop.base.signals import TerminatedError, ending_on_sigterm
+    from symtop.core.signals import TerminatedError, ending_on_sigterm
     from symtop.explore.server import address, serve
 
     with ending_on_sigterm(), serve(port) as server:

@@ -11,20 +11,19 @@ from typing import Any
 
 from tqdm import tqdm
 
-from symtop.base.cache import cache_root
-from symtop.base.processes import context
-from symtop.base.progress import beating
-from symtop.base.strangers import words_of
-from symtop.base.threads import cores
+from symtop.core.errors import words_of
+from symtop.core.files import cache_root
+from symtop.core.parallel import context, cores
+from symtop.core.progress import beating
 
 SCENE = "goldstein"
 PERIODS = 0.02  # of a nutation: the length of a run
 
 
 def _truth(_: str) -> None:
-    from symtop.base.lazy import LAZY
+    from symtop.core.lazy_kernel import LAZY
     from symtop.model.scenes import scene
-    from symtop.run.reference import reference
+    from symtop.run.reference.truth import reference
     from symtop.run.simulation import simulate
 
     for kernel in LAZY:
@@ -41,14 +40,14 @@ def _alone(name: str) -> None:
 
 
 def _together(name: str) -> None:
-    from symtop.run.ensemble import ensemble
+    from symtop.run.ensemble.ensemble import ensemble
 
     ensemble([SCENE] * 2, name, **_asked(name), threads=1, quiet=True)
 
 
 def _asked(name: str) -> dict[str, Any]:
     """Two steps of a row, or so, in its chart."""
-    from symtop.methods.registry import integrator
+    from symtop.methods.framework.registry import integrator
     from symtop.model.scenes import scene
 
     row, span = integrator(name), PERIODS * scene(SCENE).nutation_period
@@ -73,7 +72,7 @@ def _run(task: tuple[str, str]) -> str:
 
 def tasks() -> list[tuple[str, str]]:
     """Every run that compiles something: what it is, and the row ``method[chart]``."""
-    from symtop.methods.registry import integrators
+    from symtop.methods.framework.registry import integrators
 
     compiled = [method for method in integrators().values() if method.implementation in {"compiled", "heyoka"}]
     names = [f"{method.name}[{chart}]" for method in compiled for chart in method.charts()]

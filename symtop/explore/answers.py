@@ -16,9 +16,9 @@ import numpy as np
 import xarray as xr
 
 from symtop import __version__
-from symtop.base.validate import SymtopError, finite, positive
+from symtop.core.errors import SymtopError, finite, positive
 from symtop.measure.conservation import CONSTANTS, residuals
-from symtop.methods.registry import Integrator, integrator, integrators
+from symtop.methods.framework.registry import Integrator, integrator, integrators
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form, horizon_of, scenes
 from symtop.model.top import Angles, SymmetricTop

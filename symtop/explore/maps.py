@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.base.validate import SymtopError, finite, positive
+from symtop.core.errors import SymtopError, finite, positive
 from symtop.explore.answers import START, TOP, Setup, setup
 from symtop.model import charts
-from symtop.model.closed_form import ClosedForm
+from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.top import Angles
-from symtop.run.ensemble import ensemble
+from symtop.run.ensemble.ensemble import ensemble
 
 COLUMNS, ROWS = 48, 32  # steps, spins
 SAMPLES = 9

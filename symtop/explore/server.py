@@ -20,10 +20,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-from symtop.base import datasets
-from symtop.base.strangers import words_of
-from symtop.base.threads import cores
-from symtop.base.validate import SymtopError, whole
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError, whole, words_of
+from symtop.core.parallel import cores
 from symtop.explore import answers, maps
 
 STATIC = Path(__file__).parent / "static"
@@ -43,7 +42,7 @@ POLICY = "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action
 
 def _netcdf(chosen: answers.Setup) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        return datasets.write(answers.dataset(chosen, str), Path(folder) / "explored.nc").read_bytes()
+        return netcdf.write(answers.dataset(chosen, str), Path(folder) / "explored.nc").read_bytes()
 
 
 # What reads the question, what answers it, and the type of the answer.

@@ -10,18 +10,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.judging import claims, claims_reduced as reduced
+from symtop.judging.adapters.adapter import Stepper, integrator
+from symtop.judging.adapters.choice import opened
+from symtop.judging.adapters.separable import SeparableStep
 from symtop.judging.claims_calls import calls
 from symtop.judging.claims_long import QUICK_STEPS
 from symtop.judging.claims_pole import pole
 from symtop.judging.claims_time import time_order
-from symtop.judging.ledger import Finding, undecided
-from symtop.judging.sockets.opening import opened
-from symtop.judging.sockets.separable import SeparableStep
-from symtop.judging.sockets.socket import Stepper, integrator
+from symtop.judging.findings import Finding, undecided
 from symtop.measure.step_map import generic_start
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 
 LONG, SLOPES = (16.0, 2.5), (8.0, 1.5)  # seconds of a long run and of the runs of the order; the second with --quick

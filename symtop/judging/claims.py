@@ -11,7 +11,7 @@ One battery judges every integrator alike, ours, a plug-in's and one from a sock
     pole           the axis passes a pole exactly                                                      (`claims_pole`)
 
 A claim is refuted only far beyond what the measurement itself leaves in doubt; both numbers are in the ledger
-(`symtop.judging.ledger`). Nothing claimed of the energy means what the other claims imply: kept if it is among the
+(`symtop.judging.findings`). Nothing claimed of the energy means what the other claims imply: kept if it is among the
 conserved quantities, bounded if the method is symplectic and its step fixed (Benettin, Giorgilli, J. Stat. Phys. 74
 (1994) 1117). Work and iterations are what the solver reports.
 """
@@ -21,13 +21,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.judging.claims_constants import declared_claims, over_steps
 from symtop.judging.claims_pole import pole, pole_claim
 from symtop.judging.claims_series import order
 from symtop.judging.claims_structure import structure
-from symtop.judging.ledger import CLAIMS, Finding, Ledger, undecided, yes_no
-from symtop.methods.registry import Integrator
+from symtop.judging.findings import CLAIMS, Finding, Ledger, undecided, yes_no
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 
 SCENE = "spheroid"

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from symtop.base.validate import SymtopError
-from symtop.judging.ledger import Finding
-from symtop.judging.sockets.socket import Stepper
+from symtop.core.errors import SymtopError
+from symtop.judging.adapters.adapter import Stepper
+from symtop.judging.findings import Finding
 from symtop.measure.step_map import generic_start
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles

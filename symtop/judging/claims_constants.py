@@ -8,10 +8,10 @@ import math
 
 import numpy as np
 
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.judging import claims_long as long
-from symtop.judging.ledger import Finding, agreement, undecided, yes_no
-from symtop.methods.registry import Integrator
+from symtop.judging.findings import Finding, agreement, undecided, yes_no
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 
 CONSTANTS = ("energy", "p_phi", "p_psi", "axis_length")

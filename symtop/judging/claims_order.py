@@ -17,13 +17,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.base.validate import SymtopError
-from symtop.judging.ledger import Finding
+from symtop.core.errors import SymtopError
+from symtop.judging.findings import Finding
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import Fit
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.simulation import simulate

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.judging.ledger import Finding
+from symtop.judging.findings import Finding
 from symtop.measure.errors import errors_against
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 from symtop.run.simulation import simulate
 
 # the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1

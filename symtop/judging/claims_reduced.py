@@ -11,21 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.judging import claims_long as long
+from symtop.judging.adapters.adapter import SocketSolver
+from symtop.judging.adapters.separable import SeparableStep
 from symtop.judging.claims_constants import of_run
 from symtop.judging.claims_order import NUTATIONS, Order, settings_shown
 from symtop.judging.claims_series import SHOWN, ChartSeries, weighed
 from symtop.judging.claims_structure import ONE_MAP, structure_of
-from symtop.judging.ledger import Finding
-from symtop.judging.sockets.separable import SeparableStep
-from symtop.judging.sockets.socket import SocketSolver
+from symtop.judging.findings import Finding
 from symtop.measure.order import order as order_of
 from symtop.measure.step_map import SHARE, StepMap, angles_at, coarsest, generic_start, restart_gap
 from symtop.measure.step_series import step_series
-from symtop.methods.outcomes import NOT_FINITE, OK, OUTCOMES, sentence
-from symtop.methods.plan import Array, Run
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.outcomes import NOT_FINITE, OK, OUTCOMES, sentence
+from symtop.methods.framework.plan import Array, Run
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, Momenta
 

@@ -12,15 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.judging.claims_order import TRUE_LIMIT, Array, Order, exactness, limit, measured_order, settings_shown
 from symtop.judging.claims_structure import ONE_MAP
 from symtop.judging.claims_table import with_table
-from symtop.judging.ledger import Finding, yes_no
+from symtop.judging.findings import Finding, yes_no
 from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order_verdict
 from symtop.measure.step_map import restart_gap, step_map
 from symtop.measure.step_series import AGREES, SURE, Series, step_series
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 
 SHOWN = 24  # settings of the order that are kept

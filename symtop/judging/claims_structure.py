@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.base.validate import SymtopError
-from symtop.judging.ledger import Finding, agreement, undecided, yes_no
+from symtop.core.errors import SymtopError
+from symtop.judging.findings import Finding, agreement, undecided, yes_no
 from symtop.measure import step_map as maps
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles
 

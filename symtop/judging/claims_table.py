@@ -8,15 +8,15 @@ small that rounding is larger. The conditions show it at any d beyond rounding.
 import math
 from typing import Any
 
-from symtop.judging.ledger import Finding
+from symtop.judging.findings import Finding
 from symtop.measure import splitting_conditions as splitting
 from symtop.measure.order_conditions import Conditions, conditions, triangle
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.preparation import Scaled
-from symtop.methods.registry import Integrator
-from symtop.methods.rotor import EXACT
-from symtop.methods.runge_kutta import Tableau
-from symtop.methods.splitting_loop import Composition
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.preparation import Scaled
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.runge_kutta.runge_kutta import Tableau
+from symtop.methods.splitting.rotor import EXACT
+from symtop.methods.splitting.splitting_loop import Composition
 from symtop.model.scenes import Scene
 
 

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.judging.claims_series import ChartSeries
-from symtop.judging.ledger import Finding, yes_no
+from symtop.judging.findings import Finding, yes_no
 from symtop.measure.step_map import generic_start
 from symtop.measure.step_series import AGREES, SURE, compared
-from symtop.methods.formulations import FORMULATIONS
-from symtop.methods.plan import Array
+from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.plan import Array
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles

@@ -7,13 +7,13 @@ from typing import Any
 
 import xarray as xr
 
-from symtop.base.validate import SymtopError, one_of
-from symtop.judging import screen, trajectory
+from symtop.core.errors import SymtopError, one_of
+from symtop.judging import text_report, trajectory
 from symtop.judging.battery import Request, claimed
-from symtop.judging.ledger import Finding, Ledger
+from symtop.judging.findings import Finding, Ledger
+from symtop.judging.sandbox import About, judged
 from symtop.judging.trajectory import is_trajectory
-from symtop.judging.watched import About, judged
-from symtop.methods.registry import ENERGY_ERRORS
+from symtop.methods.framework.registry import ENERGY_ERRORS
 from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene, scene as find_scene
 
@@ -28,7 +28,7 @@ class Judged(Ledger):
     implied: frozenset[str] = frozenset()  # claims that follow from those that were made
 
     def __str__(self) -> str:
-        return screen.screen(self.about._asdict(), self.scene, self.findings, implied=self.implied)
+        return text_report.screen(self.about._asdict(), self.scene, self.findings, implied=self.implied)
 
     def dataset(self) -> xr.Dataset:
         """As of any ledger, with attributes that say what was judged."""
@@ -53,7 +53,7 @@ def judge(
         torch     a function step(f, t, y, h) -> y on batches of tensors, y of shape (batch, 6), or "FILE.py:NAME"
         jax       the same on batches of JAX arrays, compiled by jax.jit
         shared    "FILE.so" or "FILE.so:NAME": void step(double *y, double h, const double *par, long n)
-        program   a command that reads one line and writes states (see `symtop.judging.sockets.program`)
+        program   a command that reads one line and writes states (see `symtop.judging.adapters.program`)
 
     or states without a method: a CSV or netCDF file, a Dataset or a mapping (`symtop.judging.trajectory`), whose
     errors, drift and laws of growth are found.

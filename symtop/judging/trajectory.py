@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.base import datasets
-from symtop.base.validate import SymtopError, at_home
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError, at_home
 from symtop.judging.claims_long import KEPT, Constant
-from symtop.judging.ledger import Finding, undecided
+from symtop.judging.findings import Finding, undecided
 from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import errors
 from symtop.measure.trajectory import completed, refuse_other_scene, sampled
@@ -53,7 +53,7 @@ def read(target: Any) -> dict[str, Any]:
         columns = {str(name): np.asarray(target[name]) for name in target if str(name) in (*VECTORS, *SCALARS)}
         return columns | {"time": np.asarray(target["time"])} if "time" in target else columns
     if str(target).lower().endswith(".nc"):
-        return read(datasets.read(at_home(target)))
+        return read(netcdf.read(at_home(target)))
     return _text(at_home(target))
 
 
@@ -93,7 +93,7 @@ def findings(target: Any, scene: Scene, conserves: Collection[str] = (), energy:
     another top or start than the scene's.
     """
     if isinstance(target, (str, Path)) and str(target).lower().endswith(".nc"):
-        target = datasets.read(target)
+        target = netcdf.read(target)
     if isinstance(target, xr.Dataset):
         refuse_other_scene(target, scene)
         target = sampled(target)

@@ -13,12 +13,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from symtop.base.numbers import GOLDEN
+from symtop.core.numbers import GOLDEN
 from symtop.measure.errors import QUANTITIES, error_bound, errors_against
 from symtop.measure.phase import phase
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 from symtop.run.simulation import simulate
 
 SAMPLES = 1001

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from symtop.measure.growth import change_point, growth, law, tops
 from symtop.measure.phase import nutation_phase
 from symtop.measure.statistics import line, student
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate
 

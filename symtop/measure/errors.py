@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.base import datasets
-from symtop.base.numbers import EPSILON
-from symtop.base.over_time import over_time
-from symtop.base.validate import SymtopWarning, one_of
+from symtop.core import netcdf
+from symtop.core.errors import SymtopWarning, one_of
+from symtop.core.numbers import EPSILON
+from symtop.core.over_time import over_time
 from symtop.measure.trajectory import (
     CONSTANTS,
     checked,
@@ -32,7 +32,7 @@ from symtop.measure.trajectory import (
 )
 from symtop.model import charts
 from symtop.model.scenes import Scene, scene as find_scene
-from symtop.run.reference import PRECISIONS, reference
+from symtop.run.reference.truth import PRECISIONS, reference
 
 QUANTITIES: dict[str, str] = {
     "axis": "angle between axes (rad)",
@@ -92,7 +92,7 @@ def errors(
     told = {"scene": chosen.name, "precision": truth.attrs["precision"]}
     if isinstance(run, xr.Dataset) and "integrator" in run.attrs:
         told["integrator"] = run.attrs["integrator"]
-    shown.attrs.update(datasets.CONVENTIONS, title=f"errors on {chosen.name}", **told)
+    shown.attrs.update(netcdf.CONVENTIONS, title=f"errors on {chosen.name}", **told)
     return shown
 
 

@@ -16,13 +16,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.methods.registry import Integrator
-from symtop.methods.rotor import ROTATIONS
-from symtop.methods.splitting_loop import Stages
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.splitting.rotor import ROTATIONS
+from symtop.methods.splitting.splitting_loop import Stages
 from symtop.model import charts
 from symtop.model.scenes import Scene
-from symtop.run.reference import reference
-from symtop.run.witnesses import have_heyoka
+from symtop.run.reference.independent_checks import have_heyoka
+from symtop.run.reference.truth import reference
 
 Wide = np.longdouble
 NUTATIONS = 1.37  # length of a run

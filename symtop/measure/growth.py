@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symtop.base.numbers import TINY
+from symtop.core.numbers import TINY
 from symtop.measure.order import Fit, power_law
 from symtop.measure.statistics import columns_fitted
 

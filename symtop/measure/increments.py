@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.base.numbers import GOLDEN
+from symtop.core.numbers import GOLDEN
 from symtop.measure.conservation import trend
-from symtop.methods.calling import solve
-from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop

@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT, DRIFTING, FEWEST, GROWING, NO_GAP, WRONG_REGIME, barriers
-from symtop.methods.outcomes import NOT_FINITE
-from symtop.model import effective, motion_samples
-from symtop.model.closed_forms import ClosedForms
+from symtop.methods.framework.outcomes import NOT_FINITE
+from symtop.model import effective
+from symtop.model.exact import motion_samples
+from symtop.model.exact.closed_forms import ClosedForms
 from symtop.model.scenes import Scene
 from symtop.model.top import flat
 
@@ -90,7 +91,7 @@ def judge_runs(
 
 @functools.cache
 def _kernel() -> Any:  # noqa: C901  (one loop, read in one piece)
-    from symtop.base.compiled import compile_kernel, register_jitable  # numba
+    from symtop.core.jit import compile_kernel, register_jitable  # numba
 
     true_axis, potential = register_jitable(motion_samples._axis), register_jitable(effective.effective_potential)
 

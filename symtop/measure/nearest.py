@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.base import datasets
-from symtop.base.numbers import TINY
-from symtop.base.validate import SymtopError
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError
+from symtop.core.numbers import TINY
 from symtop.model.scenes import Scene
 
 STORED = "population.nc"
@@ -73,7 +73,7 @@ def nearest(file: Path, scene: Scene, quantity: str, accuracy: float, horizon: f
         return None
     remedy = "run symtop study population --fresh"
     try:
-        data = datasets.read_any(file)  # whole: a tree that is read lazily and closed has ended a process in HDF5
+        data = netcdf.read_any(file)  # whole: a tree that is read lazily and closed has ended a process in HDF5
         tree = data if isinstance(data, xr.DataTree) else xr.DataTree(data)
         return _counted(tree, regime(scene), quantity, accuracy, horizon / scene.nutation_period)
     except KeyError as error:

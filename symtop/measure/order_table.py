@@ -13,7 +13,7 @@ import xarray as xr
 from symtop.measure.accuracy import error_table
 from symtop.measure.extended import extended_errors, extended_order_data
 from symtop.measure.order import Fit, order
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 
 ASYMPTOTIC, DECADES = 12, 3.0  # steps that are added, and the decades of error that they fill

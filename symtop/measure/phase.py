@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.base.numbers import EPSILON
+from symtop.core.numbers import EPSILON
 from symtop.measure.verdicts import STEADY
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.model.scenes import closed_form, scene as find_scene
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 
 REMARK = "an asymmetric free body: tests the solver beside us, not symtop"
 TRAJECTORY, START, OTHER_BODY = "trajectory", "start", "another body"

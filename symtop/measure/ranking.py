@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.base.remembered import of_one_dataset
+from symtop.core.memoize import of_one_dataset
 from symtop.measure.timing import MISSED, met_again
 from symtop.measure.work import TARGETS
 

@@ -12,11 +12,11 @@ from collections.abc import Callable
 from decimal import ROUND_DOWN, Context
 from typing import NamedTuple
 
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.measure.accuracy import error_row
 from symtop.measure.phase import FREQUENCIES
 from symtop.measure.timing import bare_run, timings
-from symtop.methods.registry import Integrator, integrator, integrators, rows
+from symtop.methods.framework.registry import Integrator, integrator, integrators, rows
 from symtop.model.scenes import Scene
 from symtop.run.simulation import likely_step
 

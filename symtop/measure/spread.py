@@ -11,10 +11,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.base.validate import SymtopError, one_of
+from symtop.core.errors import SymtopError, one_of
 from symtop.model import charts, scales
-from symtop.model.closed_forms import ClosedForms
-from symtop.run.members import read_members
+from symtop.model.exact.closed_forms import ClosedForms
+from symtop.run.ensemble.inputs import read_members
 
 Array = NDArray[np.float64]
 

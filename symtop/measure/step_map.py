@@ -29,10 +29,10 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from symtop.base.validate import SymtopError
-from symtop.methods.calling import solve
-from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator
+from symtop.core.errors import SymtopError
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene, closed_form

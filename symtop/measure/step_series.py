@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.measure.step_map import StepMap
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene, closed_form

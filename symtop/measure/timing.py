@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.methods.plan import Run
-from symtop.methods.registry import Integrator
-from symtop.model import closed_form
+from symtop.methods.framework.plan import Run
+from symtop.methods.framework.registry import Integrator
+from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene
 from symtop.run.simulation import make_plan
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.base.validate import SymtopError, positive
+from symtop.core.errors import SymtopError, positive
 from symtop.model import charts
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop

@@ -22,7 +22,7 @@ import xarray as xr
 
 from symtop.measure.accuracy import as_table, error_row
 from symtop.measure.settings import ROUNDED, between, coarse_setting, limits
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 
 Row = dict[str, Any]

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from symtop.base.lazy import LazyKernel
+from symtop.core.lazy_kernel import LazyKernel
 from symtop.model import charts
 from symtop.model.charts import Array
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from symtop.base.parts import inlined
+from symtop.core.jit_functions import inlined
 
 
 @inlined

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from symtop.base.lazy import LazyKernel
+from symtop.core.lazy_kernel import LazyKernel
 from symtop.model.charts import Array
 from symtop.model.view import View, axis_of
 

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from symtop.base.numbers import EPSILON, TINY
+from symtop.core.numbers import EPSILON, TINY
 from symtop.model.charts import Array
 from symtop.model.effective import effective_force, effective_potential, effective_stiffness
 from symtop.model.scenes import NEXT_TO_POLE, STEADY

@@ -9,13 +9,13 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from symtop.base.numbers import EPSILON, TINY
-from symtop.base.validate import SymtopError, finite, label, one_of, positive, shown
-from symtop.base.walk import by_name
+from symtop.core.code_hash import by_name
+from symtop.core.errors import SymtopError, finite, label, one_of, positive, shown
+from symtop.core.numbers import EPSILON, TINY
 from symtop.model.top import Angles, SymmetricTop
 
 if TYPE_CHECKING:
-    from symtop.model.closed_form import ClosedForm
+    from symtop.model.exact.closed_form import ClosedForm
 
 OBSERVABLES = ("nutation", "axis", "attitude")
 UNITS = ("", "SI")
@@ -126,7 +126,7 @@ def _energy_scale(top: SymmetricTop, start: Angles) -> float:
 
 @functools.lru_cache(maxsize=256)
 def _closed_form(top: SymmetricTop, start: Angles) -> "ClosedForm":
-    from symtop.model.closed_form import ClosedForm
+    from symtop.model.exact.closed_form import ClosedForm
 
     return ClosedForm(top, start)
 

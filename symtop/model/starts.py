@@ -14,7 +14,7 @@ Source: Goldstein, Classical Mechanics, sections 4.4 and 4.9.
 import math
 from collections.abc import Sequence
 
-from symtop.base.validate import SymtopError, row
+from symtop.core.errors import SymtopError, row
 
 Rates = tuple[float, float, float, float, float, float]  # theta, phi, psi and their rates
 UNIT = 1e-6  # a quaternion or an axis may differ from unit length by this

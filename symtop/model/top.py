@@ -29,9 +29,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from symtop.base.numbers import newton_between
-from symtop.base.parts import inlined, shared
-from symtop.base.validate import SymtopError, finite, not_negative, positive
+from symtop.core.errors import SymtopError, finite, not_negative, positive
+from symtop.core.jit_functions import inlined, shared
+from symtop.core.numbers import newton_between
 from symtop.model import starts
 from symtop.model.effective import effective_force, effective_potential, effective_stiffness
 
@@ -243,7 +243,7 @@ class SymmetricTop:
         """The two values of cos(theta) between which this motion nutates, lower one first.
 
         They are the roots in [-1, 1] of ``(1-u^2)(alpha - beta u) - (b - a u)^2`` to about 1e-14, or 1e-8 where
-        the two coincide; `symtop.model.closed_form` has them to any precision.
+        the two coincide; `symtop.model.exact.closed_form` has them to any precision.
         """
         return turning_cosines(self, at)
 

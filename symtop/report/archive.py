@@ -23,11 +23,11 @@ from pathlib import Path
 import xarray as xr
 
 from symtop import __version__
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.model.scenes import scenes
 from symtop.report import page
 from symtop.report.tables import table
-from symtop.run import scene_states
+from symtop.run.reference import scene_states
 
 NAME = f"symtop-{__version__}-data"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every file in the bundle: zip has none before
@@ -67,7 +67,7 @@ def bundle(results: Path, target: Path | None = None) -> Path:
     sums = "".join(f"{hashlib.sha256(content).hexdigest()}  {name}\n" for name, content in sorted(files.items()))
     files["SHA256SUMS"] = sums.encode()
     path = target or results / f"{NAME}.zip"
-    with datasets.replacing(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
+    with netcdf.replacing(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in sorted(files.items()):
             entry = zipfile.ZipInfo(f"{NAME}/{name}", EPOCH)
             entry.external_attr = 0o644 << 16
@@ -85,7 +85,7 @@ def _stored(results: Path) -> list[Path]:
 def _test_set() -> dict[str, bytes]:
     chosen = list(scenes().values())
     with tempfile.TemporaryDirectory() as folder:
-        binary = datasets.write(scene_states.states(chosen), Path(folder) / "states.nc").read_bytes()
+        binary = netcdf.write(scene_states.states(chosen), Path(folder) / "states.nc").read_bytes()
     return {
         "scenes/states.nc": binary,
         "scenes/states.csv": scene_states.states_csv(chosen).encode(),
@@ -96,11 +96,11 @@ def _test_set() -> dict[str, bytes]:
 def readme(results: Path, files: Mapping[str, bytes]) -> str:
     """What is in the bundle, in Markdown: how it was made, its files, and every variable of every dataset."""
     words = INTRODUCTION.format(
-        version=__version__, revision=datasets.provenance()["symtop_revision"], times=scene_states.TIMES,
+        version=__version__, revision=netcdf.provenance()["symtop_revision"], times=scene_states.TIMES,
         digits=scene_states.DIGITS, working=scene_states.WORKING,
     )  # fmt: skip
     listed = table(["file", "bytes"], [[name, f"{len(content):,}"] for name, content in sorted(files.items())])
-    described = [_described(f"results/{path.name}", datasets.read_any(path)) for path in sorted(results.glob("*.nc"))]
+    described = [_described(f"results/{path.name}", netcdf.read_any(path)) for path in sorted(results.glob("*.nc"))]
     described.append(_described("scenes/states.nc", scene_states.states(list(scenes().values()))))
     return "\n\n".join([f"# {NAME}", words.strip(), "## Files", listed, "## Datasets", *described]) + "\n"
 
@@ -110,7 +110,7 @@ def _described(name: str, data: xr.Dataset | xr.DataTree) -> str:
     told = [data.attrs.get(key, "") for key in ("title", "question")]
     made = ", ".join(str(data.attrs[key]) for key in ("symtop_revision", "processor") if key in data.attrs)
     parts = [f"### {name}", " ".join(filter(None, map(str, told))), f"Made by: {made}." if made else ""]
-    for group, variables in datasets.groups(data).items():
+    for group, variables in netcdf.groups(data).items():
         rows = [
             [str(key), " x ".join(f"{dimension} ({length})" for dimension, length in variable.sizes.items()),
              str(variable.attrs.get("units", "")), str(variable.attrs.get("long_name", ""))]
@@ -129,7 +129,7 @@ def _packages() -> str:
 
 def _machine() -> str:
     """The machine that makes the bundle, a fact a line."""
-    facts = {key: value for key, value in datasets.provenance().items() if key != "dependencies"}
+    facts = {key: value for key, value in netcdf.provenance().items() if key != "dependencies"}
     facts |= {"cores": str(os.cpu_count()), "system": platform.platform()}
     if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
         facts["memory"] = f"{os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30:.1f} GiB"

@@ -15,11 +15,11 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from symtop.base import datasets
-from symtop.base.validate import SymtopError, at_home
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError, at_home
+from symtop.judging.findings import Finding, spoken
 from symtop.judging.judge_step import Judged
-from symtop.judging.ledger import Finding, spoken
-from symtop.judging.screen import described
+from symtop.judging.text_report import described
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels
 
 LEAST = 1e-17  # what is smaller is drawn here
@@ -153,6 +153,6 @@ def write_badge(ledger: Judged, path: str | Path) -> Path:
 
 def _written(text: str, path: str | Path) -> Path:
     target = at_home(path)
-    with datasets.replacing(target, target.suffix) as partial:
+    with netcdf.replacing(target, target.suffix) as partial:
         partial.write_text(text, encoding="utf-8")
     return target

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.base.validate import SymtopError, at_home
+from symtop.core.errors import SymtopError, at_home
 from symtop.measure.spread import LEVELS, QUANTITIES, at_places, member_errors, spread
 from symtop.report.style import LEAST_TEXT, headline, look, panels, save
 

@@ -12,7 +12,7 @@ names are products of letters: `mgl`, `dtheta`.
 
 import re
 
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 
 GREEK = {
     "alpha": "α", "beta": "β", "delta": "δ", "theta": "θ", "phi": "φ", "psi": "ψ", "tau": "τ",

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.base.numbers import EPSILON
-from symtop.methods.registry import integrators
+from symtop.core.numbers import EPSILON
+from symtop.methods.framework.registry import integrators
 from symtop.model.scenes import Scene, scenes
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 
 TERMS = {  # of the answers, with what they mean
     "nutation": "one nod of the axis between its two inclinations; its period T is the unit of steps and run lengths",

@@ -16,8 +16,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from symtop.base.validate import SymtopError
-from symtop.methods.registry import integrators, split_name
+from symtop.core.errors import SymtopError
+from symtop.methods.framework.registry import integrators, split_name
 from symtop.report import markdown, method, tables
 from symtop.report.mathml import mathml
 from symtop.report.style import look

@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
-from symtop.base.validate import SymtopError, one_of
+from symtop.core.errors import SymtopError, one_of
 from symtop.measure import spread
 from symtop.measure.errors import QUANTITIES, errors
 from symtop.report.ensemble import bands

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.base.validate import at_home
+from symtop.core.errors import at_home
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES
 from symtop.model.scenes import Scene

@@ -14,7 +14,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.report import embedded
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def look(name: str) -> Look:
     Those that ship with symtop have a fixed look. An added one gets a shade of its family and a marker that no shipped
     one of these shades has; which of them depends on its name alone, not on what else is registered.
     """
-    from symtop.methods.registry import integrators, split_name
+    from symtop.methods.framework.registry import integrators, split_name
 
     name, chart = split_name(name)
     if chart:
@@ -242,8 +242,8 @@ def publish(figure: Any, target: Path) -> None:
 
 
 def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
-    datasets.sweep(target)
-    with datasets.replacing(target, target.suffix) as partial:
+    netcdf.sweep(target)
+    with netcdf.replacing(target, target.suffix) as partial:
         _written(figure, partial, dpi)
 
 

@@ -9,8 +9,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from symtop.base.fingerprint import digest, file_reasons, hashed, packages
-from symtop.base.imports import PACKAGE
+from symtop.core.code_hash import PACKAGE, digest, file_reasons, hashed, packages
 from symtop.runner.settled import announced
 
 PAGE, WORDS = "report.html", "report.md"

@@ -27,10 +27,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.base.numbers import EPSILON, TINY, sign_changes
-from symtop.methods.calling import solve
-from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator
+from symtop.core.numbers import EPSILON, TINY, sign_changes
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.model.view import View, axis_of

@@ -22,22 +22,22 @@ import numpy as np
 import xarray as xr
 from tqdm import tqdm
 
-from symtop.base import datasets
-from symtop.base.cache import cache_root
-from symtop.base.compiled import code_of
-from symtop.base.fingerprint import digest, file_reasons, hashed
-from symtop.base.numbers import GOLDEN
-from symtop.base.progress import beating
-from symtop.base.signals import ending_on_sigterm
-from symtop.base.validate import SymtopError, SymtopWarning, place, positive, spare, whole
-from symtop.methods.fixed_step import FixedStep, inside
-from symtop.methods.loop import Loop, Position
-from symtop.methods.outcomes import OK, OUTCOMES, sentence
-from symtop.methods.registry import Integrator, integrator as find_integrator
+from symtop.core import netcdf
+from symtop.core.code_hash import digest, file_reasons, hashed
+from symtop.core.errors import SymtopError, SymtopWarning, place, positive, spare, whole
+from symtop.core.files import cache_root
+from symtop.core.jit import code_of
+from symtop.core.numbers import GOLDEN
+from symtop.core.progress import beating
+from symtop.core.signals import ending_on_sigterm
+from symtop.methods.framework.fixed_step import FixedStep, inside
+from symtop.methods.framework.loop import Loop, Position
+from symtop.methods.framework.outcomes import OK, OUTCOMES, sentence
+from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.view import View
 from symtop.run import modified_energy as modified
-from symtop.run.guard import MOST_STEPS
+from symtop.run.guard.guard import MOST_STEPS
 
 Array = np.ndarray
 Gauge = Callable[..., dict[str, Array]]  # states and momenta of samples -> quantities
@@ -162,7 +162,7 @@ def long_run(
                     bar.update(after.k - at.k)
                     at = after
                     book.note(at, rows)
-        data = datasets.describe(
+        data = netcdf.describe(
             _windowed(rows, ends), title=f"{method.name} on {chosen.name}, {count} steps", units=chosen.units,
             integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h,
             compensated=str(compensated).lower(), outcome=OUTCOMES[outcome],
@@ -196,7 +196,7 @@ def summary(values: dict[str, Array]) -> list[float]:
 def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
     """A hash of all that decides the bits of a run; one name may stand for other coefficients or code next time.
 
-    Code counts as it is compiled (`symtop.base.walk`), so that a checkpoint outlives a comment.
+    Code counts as it is compiled (`symtop.core.code_hash`), so that a checkpoint outlives a comment.
     """
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (scene.top, scene.start)]
     made = code_of((method, watch, windows, scattered, summary))
@@ -256,9 +256,9 @@ class _Book:
     def _read(self, file: Path) -> xr.Dataset | None:
         """What is in the file; None of a damaged one of the cache, from which nothing can go on."""
         try:
-            data = datasets.read(file)
+            data = netcdf.read(file)
             known = not self.own or data.attrs.get("identity") == self.identity  # its name says whose it is
-            if known and data.attrs.get("content") == datasets.content_hash(data):
+            if known and data.attrs.get("content") == netcdf.content_hash(data):
                 return data
             raise SymtopError("its numbers are not those that were written")  # noqa: TRY301
         except SymtopError as error:
@@ -282,8 +282,8 @@ class _Book:
         numbers = [*at.state, *at.low, *leaves(at.carry)]
         columns: dict[str, Any] = {"position": ("number", numbers), "rows": (("window", "part"), rows)}
         data = xr.Dataset({**columns, "steps_done": ((), at.k)})
-        data.attrs.update(content=datasets.content_hash(data), identity=self.identity)
-        datasets.write(data, self.file)
+        data.attrs.update(content=netcdf.content_hash(data), identity=self.identity)
+        netcdf.write(data, self.file)
         self.saved, self.latest = time.monotonic(), None
 
     @contextlib.contextmanager
@@ -308,7 +308,7 @@ class _Book:
     def write(self, data: xr.Dataset, output: Path) -> None:
         """Write the result; if that fails, the checkpoint is what is left of the run, and the sentence says so."""
         try:
-            datasets.write(data, output)
+            netcdf.write(data, output)
         except SymtopError as error:
             left = "" if self.file is None else f"; the steps are kept in {self.file}, and the same call goes on there"
             raise SymtopError(f"{error}{left}") from error

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.methods.registry import Integrator, integrator
+from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import Scene
 from symtop.model.view import View, axis_of
 

@@ -14,21 +14,21 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.base import datasets
-from symtop.base.numbers import GOLDEN
-from symtop.base.over_time import over_time
-from symtop.base.validate import SymtopError, SymtopWarning, one_of, positive, shown, truth, whole
-from symtop.methods.calling import solve
-from symtop.methods.outcomes import sentence
-from symtop.methods.plan import Plan, Run
-from symtop.methods.registry import Integrator, integrator
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError, SymtopWarning, one_of, positive, shown, truth, whole
+from symtop.core.numbers import GOLDEN
+from symtop.core.over_time import over_time
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.outcomes import sentence
+from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.continuous import continuous
 from symtop.model.readings import readings
 from symtop.model.scenes import OBSERVABLES, Scene, closed_form, horizon_of, scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.model.view import View
-from symtop.run.forecast import repeats
-from symtop.run.guard import MOST_STEPS, warning
+from symtop.run.guard.forecast import repeats
+from symtop.run.guard.guard import MOST_STEPS, warning
 
 MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
 WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
@@ -154,9 +154,9 @@ def simulate(
     ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step. A whole number of
     steps fills the horizon, the one nearest to horizon/step_size: the attribute ``step_size`` is the step made.
 
-    Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
-    error is expected; the run is the same either way. Give a function to be handed the sentence instead, or False for
-    no warning. `budget` is the most steps of a fixed-step run
+    Before the run the `guard` (`symtop.run.guard.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a
+    large error is expected; the run is the same either way. Give a function to be handed the sentence instead, or
+    False for no warning. `budget` is the most steps of a fixed-step run
     (`MOST_STEPS` by default; more are refused) and the most force evaluations, or Taylor steps, of an adaptive one,
     which then ends `out_of_budget` (by default after about half a minute).
 
@@ -180,7 +180,7 @@ def simulate(
         else:
             warnings.warn(caution, SymtopWarning, stacklevel=2)
     run = solve(method, chart, chosen.top, chosen.start, plan, context) if done is None else done
-    return datasets.describe(
+    return netcdf.describe(
         as_dataset(chosen, chart, plan, run), title=f"{method.name} on {chosen.name}", units=chosen.units,
         integrator=method.name, scene=chosen.name, chart=chart, implementation=method.implementation, horizon=end,
         step_size=plan.step_size, tolerance=plan.tolerance, steps=run.steps, force_evaluations=run.force_evaluations,

@@ -9,8 +9,8 @@ from typing import Any, Self
 import xarray as xr
 from tqdm import tqdm
 
-from symtop.base.cache import is_terminal
-from symtop.base.progress import beating
+from symtop.core.files import is_terminal
+from symtop.core.progress import beating
 from symtop.runner import plugins, store
 from symtop.runner.execute import execute
 from symtop.runner.pools import Workers

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.runner import store
 from symtop.runner.cases import Round
 from symtop.runner.pools import Workers
@@ -38,7 +38,7 @@ class Checked(NamedTuple):
 
 def differences(stored: Combined, again: Combined) -> list[str]:
     """In what two datasets, or trees of them, differ besides measured times and where they were made."""
-    ours, theirs = datasets.groups(stored), datasets.groups(again)
+    ours, theirs = netcdf.groups(stored), netcdf.groups(again)
     return [f"group {name} is in one of them only" for name in sorted(ours.keys() ^ theirs.keys())] + [
         f"{name}: {difference}" if name else difference
         for name in sorted(ours.keys() & theirs.keys())
@@ -55,7 +55,7 @@ def _differences(stored: xr.Dataset, again: xr.Dataset) -> list[str]:
             differing.append(f"{name} has another shape: {dict(one.sizes)} and {dict(other.sizes)}")
         elif not any(word in name for word in CLOCKED) and not _same(one, other):
             differing.append(f"{name} differs{_how_much(one, other)}")
-    kept = sorted((set(stored.attrs) | set(again.attrs)) - set(datasets.provenance()) - {"content", *TOLD.values()})
+    kept = sorted((set(stored.attrs) | set(again.attrs)) - set(netcdf.provenance()) - {"content", *TOLD.values()})
     pairs = [(key, stored.attrs.get(key), again.attrs.get(key)) for key in kept]
     return [
         *differing,
@@ -102,6 +102,6 @@ def check(
         differing += [f"{label}: {text}" for text in differences(chosen[path.name][1], data)]
     whole = results / f"{study.name}.nc"
     if whole.is_file() and len(stored) == len(cases.paths):
-        kept, made = _bare(datasets.read_any(whole)), _bare(cases.combined())
+        kept, made = _bare(netcdf.read_any(whole)), _bare(cases.combined())
         differing += [f"{whole.name}: {text}" for text in differences(kept, made)]
     return Checked(study.name, len(stored), len(chosen), differing)

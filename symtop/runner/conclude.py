@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from symtop.base import datasets, locks
-from symtop.base.validate import label, shown
+from symtop.core import files, netcdf
+from symtop.core.errors import label, shown
 from symtop.runner import depends, plugins, scripts, seen, store
 from symtop.runner.cases import Round
 from symtop.runner.study import Case, Chart, Combined, Opening, Picture, Study, StudyError, Table, door, sentences
@@ -53,13 +53,13 @@ def code_of(study: Study, save: Save | None) -> str:
 def conclude(cases: Round, stamp: str, save: Save | None, *, quick: bool) -> dict[str, Any]:
     """Combine, draw, judge and write."""
     study, results = cases.study, cases.results
-    with locks.locked(results / f"{study.name}.nc", wait=True):
+    with files.locked(results / f"{study.name}.nc", wait=True):
         for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
-            datasets.sweep(file)
+            netcdf.sweep(file)
         combined = cases.combined()
         units = store.units_of(case.scene for case in cases.paths.values())
-        combined = datasets.describe(combined, study.title, units=units, question=study.question)
-        datasets.write(combined, results / f"{study.name}.nc")
+        combined = netcdf.describe(combined, study.title, units=units, question=study.question)
+        netcdf.write(combined, results / f"{study.name}.nc")
         store.forget(results, study, cases.paths)
         findings = findings_of(study, combined, results, save, failures=cases.failures, cases=len(cases.paths))
         findings |= {"quick": quick, "stamp": stamp if not cases.failures else ""}
@@ -91,7 +91,7 @@ def findings_of(
         "failures": failures,
         "cases": cases,
         "quick": False,
-        "provenance": datasets.provenance(),
+        "provenance": netcdf.provenance(),
     }
 
 

@@ -1,8 +1,9 @@
-"""What a case's numbers depend on, found without running it: a mapping from labels to hashes (`base.fingerprint`).
+"""What a case's numbers depend on, found without running it: a mapping from labels to hashes (`core.code_hash`).
 
 A case is measured by a function of its study, on a scene, with one integrator or several. Each of them is walked. The
 registry imports the families of integrators by name and leads to none of them: a case depends on the files of the
-integrators that it runs. Editing `methods/gauss.py` makes the cases of the Gauss methods stale and no other.
+integrators that it runs. Editing `methods/runge_kutta/gauss.py` makes the cases of the Gauss methods stale and no
+other.
 
 A case runs the integrators that its study declares (`Study.uses`), or the one it names and any that the code of its
 measure may look up: literal names in a file that asks for integrators or runs, and all of them where a file asks the
@@ -17,11 +18,10 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from symtop.base import datasets, fingerprint, imports
-from symtop.base.fingerprint import Reasons
-from symtop.base.walk import Walk
-from symtop.methods import registry
-from symtop.methods.registry import Integrator, integrators, rows, split_name
+from symtop.core import code_hash, netcdf
+from symtop.core.code_hash import Reasons, Walk
+from symtop.methods.framework import registry
+from symtop.methods.framework.registry import Integrator, integrators, rows, split_name
 from symtop.model.scenes import scenes
 from symtop.run import simulation
 from symtop.runner import plugins
@@ -45,8 +45,8 @@ def _tree(file: Path) -> ast.Module:
 
 def _asks_for(file: Path) -> set[str]:
     """Names by which a file imports integrators, the registry or runs from a known package."""
-    statements = imports.imported(file)
-    return {name for module, names in statements if module.split(".")[0] in imports.roots for name in names} & ASKING
+    statements = code_hash.imported(file)
+    return {name for module, names in statements if module.split(".")[0] in code_hash.roots for name in names} & ASKING
 
 
 def _may_run_any(file: Path) -> bool:
@@ -94,7 +94,7 @@ def basis(measure: Callable[..., Any]) -> Basis:
     """What a study's measure depends on."""
     walk = Walk("measure")
     walk.add(measure)
-    asking = [file for file in imports.closure(walk.files, RESOLVERS) - RESOLVERS if _asks_for(file)]
+    asking = [file for file in code_hash.closure(walk.files, RESOLVERS) - RESOLVERS if _asks_for(file)]
     names = walk.strings.union(*map(_strings, asking)) & integrators().keys()
     if {integrators, rows} & walk.functions or any(map(_may_run_any, asking)):
         names.add(EVERY)
@@ -125,7 +125,7 @@ def used(study: Study, case: Case) -> list[str]:
 
 def settings_key(study: Study, case: Case) -> str:
     """Hash of what a case was asked to do, which an edit of the code does not change."""
-    return fingerprint.hashed(
+    return code_hash.hashed(
         json.dumps([study.name, case.scene, case.integrator, case.group, dict(case.settings)], sort_keys=True)
     )
 
@@ -137,7 +137,7 @@ def reasons(study: Study, case: Case) -> Reasons:
 
 def _asked(study: Study, case: Case) -> Reasons:
     """What a case alone depends on."""
-    processor = {"processor": datasets.provenance()["processor"]} if study.is_timed(case) else {}
+    processor = {"processor": netcdf.provenance()["processor"]} if study.is_timed(case) else {}
     return {"settings": settings_key(study, case), **processor}
 
 
@@ -150,17 +150,17 @@ def _shared(study: Study, place: str, names: Iterable[str]) -> Reasons:
     for name in [place] if place != EVERY else sorted(catalogue):
         walk.add(catalogue.get(name), f"scene {name}")
     return {
-        **fingerprint.merged([base.values, walk.values(), *(values for values, _ in walked)]),
+        **code_hash.merged([base.values, walk.values(), *(values for values, _ in walked)]),
         **hashes(base.files.union(*(files for _, files in walked))),
         **plugins.reasons([place, *names]),
-        **fingerprint.packages(),
+        **code_hash.packages(),
     }
 
 
 @functools.lru_cache(maxsize=1024)
 def hashes(files: frozenset[Path]) -> Reasons:
     """Hashes of files, each read once."""
-    return fingerprint.file_reasons(files)
+    return code_hash.file_reasons(files)
 
 
 def digest(study: Study, case: Case) -> str:
@@ -176,7 +176,7 @@ def digests(study: Study, cases: Iterable[Case]) -> list[str]:
         names = tuple(used(study, case))
         if (case.scene, *names) not in shared:
             shared[case.scene, *names] = _shared(study, case.scene, names)
-        return fingerprint.digest(_asked(study, case) | shared[case.scene, *names])
+        return code_hash.digest(_asked(study, case) | shared[case.scene, *names])
 
     return [of(case) for case in cases]
 
@@ -185,4 +185,4 @@ def script_digest(script: Path, *drawing: object) -> str:
     """Hash of what makes a study's pictures, tables and verdict: its script, all that it imports, and `drawing`."""
     walk = Walk("drawing", files={script})
     walk.add(drawing)
-    return fingerprint.digest(fingerprint.packages("matplotlib") | walk.values() | hashes(walk.closure()))
+    return code_hash.digest(code_hash.packages("matplotlib") | walk.values() | hashes(walk.closure()))

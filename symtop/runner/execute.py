@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from pathlib import Path
 
-from symtop.base import locks
-from symtop.base.validate import SymtopError
-from symtop.methods.registry import integrators, split_name
+from symtop.core import files
+from symtop.core.errors import SymtopError
+from symtop.methods.framework.registry import integrators, split_name
 from symtop.runner import plugins, store, work
 from symtop.runner.pools import CLUSTER, HERE, Workers
 from symtop.runner.study import Study
@@ -76,7 +76,7 @@ def _run_until_done(
             _drain(study, list(left.values()) if suspect is None else [suspect], workers, now, settle, timed=timed)
         except BrokenExecutor:
             workers.drop(now)
-            begun = [task for task in left.values() if locks.was_begun(Path(task.path))]
+            begun = [task for task in left.values() if files.was_begun(Path(task.path))]
             fruitless = 0 if begun else fruitless + 1
             if fruitless == MOST_FRUITLESS:
                 raise SymtopError(

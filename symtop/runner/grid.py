@@ -6,8 +6,8 @@ whose question it suits. What a study leaves out, it names with the reason.
 
 from collections.abc import Callable, Iterable, Mapping
 
-from symtop.base.validate import SymtopError, one_of
-from symtop.methods.registry import Integrator, integrator, rows
+from symtop.core.errors import SymtopError, one_of
+from symtop.methods.framework.registry import Integrator, integrator, rows
 from symtop.model.scenes import Scene, scenes
 
 

@@ -9,14 +9,13 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from symtop.base import fingerprint, imports
-from symtop.base.python_files import execute, python_file
-from symtop.base.strangers import door
-from symtop.base.validate import SymtopError
-from symtop.methods.registry import integrators, is_built_in, split_name
+from symtop.core import code_hash
+from symtop.core.errors import SymtopError, door
+from symtop.core.python_files import execute, python_file
+from symtop.methods.framework.registry import integrators, is_built_in, split_name
 from symtop.model.scenes import added_scenes, scenes
 
-_loaded: dict[Path, fingerprint.Reasons] = {}  # files of plug-ins in use, with what they were made of
+_loaded: dict[Path, code_hash.Reasons] = {}  # files of plug-ins in use, with what they were made of
 _owners: dict[str, Path] = {}  # of an integrator or a scene: its plug-in
 
 
@@ -35,7 +34,7 @@ def load(path: str | Path) -> list[str]:
     parts = sorted(_parts(file, set(sys.modules) - modules))
     labels = {path: f"file {path.relative_to(file.parent).as_posix()} of plug-in {file.name}" for path in parts}
     labels[file] = f"plug-in {file.name}"
-    _loaded[file] = {label: fingerprint.file_hash(path) for path, label in labels.items()}
+    _loaded[file] = {label: code_hash.file_hash(path) for path, label in labels.items()}
     for name, entry in (*integrators().items(), *scenes().items()):
         if not any(entry is known for known in before):
             _owners[name] = file
@@ -58,7 +57,7 @@ def _imported(file: Path, folder: Path) -> Iterator[Path]:
     if (folder / "__init__.py").is_file():
         above.append(folder.parent)
     try:
-        statements = imports.imported(file)
+        statements = code_hash.imported(file)
     except (OSError, ValueError):
         return
     for module, names in statements:
@@ -81,7 +80,7 @@ def _file_of(module: str, folder: Path) -> Iterator[Path]:
 
 def _counts(file: Path, folder: Path) -> bool:
     """Is it a file of the folder, and of no package that counts in another way, or by its version?"""
-    if folder not in file.parents or not file.is_file() or imports.root_of(file.resolve()):
+    if folder not in file.parents or not file.is_file() or code_hash.root_of(file.resolve()):
         return False
     return "site-packages" not in file.parts and not any(
         Path(prefix) in file.parents and Path(prefix) not in (folder, *folder.parents)
@@ -98,9 +97,9 @@ def loaded() -> list[str]:
     return [str(path) for path in _loaded]
 
 
-def reasons(names: Iterable[str]) -> fingerprint.Reasons:
+def reasons(names: Iterable[str]) -> code_hash.Reasons:
     """Hashes of the plug-ins that registered some integrators and scenes."""
-    return fingerprint.merged(_loaded[_owners[name]] for name in names if name in _owners)
+    return code_hash.merged(_loaded[_owners[name]] for name in names if name in _owners)
 
 
 def is_local(name: str) -> bool:

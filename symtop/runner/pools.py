@@ -10,9 +10,9 @@ from collections.abc import Callable
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from typing import Any
 
-from symtop.base import cluster, processes
-from symtop.base.threads import cores
-from symtop.model import closed_form
+from symtop.core import cluster, parallel
+from symtop.core.parallel import cores
+from symtop.model.exact import closed_form
 from symtop.runner import trial, work
 from symtop.runner.sideline import Beside, Sideline
 from symtop.runner.work import ALONE, Company
@@ -55,7 +55,7 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
 
     @staticmethod
     def _spawned(size: int) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(size, processes.context(), work.begin_worker, (os.getpid(),))
+        return ProcessPoolExecutor(size, parallel.context(), work.begin_worker, (os.getpid(),))
 
     def _idle(self) -> Executor:
         """Workers that have nothing to compute: those that are open, if there are several."""
@@ -73,7 +73,7 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
     def open_beside(self) -> None:
         """Start the process of `beside`, which compiles the closed form: every worker would, in 12 s, and interpret it.
 
-        Whoever needs it meanwhile interprets it, and loads it as soon as it is on disk (`symtop.base.lazy`).
+        Whoever needs it meanwhile interprets it, and loads it as soon as it is on disk (`symtop.core.lazy_kernel`).
         """
         self._sideline.open(closed_form.compile_now)
 
@@ -140,10 +140,10 @@ class Workers(contextlib.AbstractContextManager["Workers"]):
 
 
 def _kill(pool: ProcessPoolExecutor) -> None:
-    processes = list((getattr(pool, "_processes", None) or {}).values())
-    for process in processes:
+    parallel = list((getattr(pool, "_processes", None) or {}).values())
+    for process in parallel:
         process.terminate()
-    for process in processes:
+    for process in parallel:
         process.join(2.0)
         if process.is_alive():  # in compiled code, which hears no signal
             process.kill()

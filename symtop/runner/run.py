@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from symtop.base import fingerprint
-from symtop.base.progress import beating
-from symtop.base.validate import positive
+from symtop.core import code_hash
+from symtop.core.errors import positive
+from symtop.core.progress import beating
 from symtop.runner import plugins, scripts, seen, store
 from symtop.runner.cases import Round, progress_bar
 from symtop.runner.conclude import Asked, Save, code_of, conclude, conclude_stored
@@ -71,7 +71,7 @@ def begin(study: Study, results: Path, workers: Workers, *, quick: bool = False,
     cases = Round(study, results)
     first = cases.named(study.grid(quick=quick, full=full))
     code = code_of(study, save)
-    stamp = fingerprint.hashed(*sorted(path.name for path in first), code)  # of what the findings depend on
+    stamp = code_hash.hashed(*sorted(path.name for path in first), code)  # of what the findings depend on
     before = _drawn(study, results, stamp)
     if before is not None and not fresh and seen.untouched(results, study, stamp, first):
         return _known(before, began)

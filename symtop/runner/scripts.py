@@ -13,10 +13,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
-from symtop.base import imports, walk
-from symtop.base.python_files import execute, python_file
-from symtop.base.strangers import door
-from symtop.base.validate import SymtopError, one_of
+from symtop.core import code_hash
+from symtop.core.errors import SymtopError, door, one_of
+from symtop.core.python_files import execute, python_file
 from symtop.runner.study import Study
 
 STUDIES = "symtop_studies"  # the package that every shipped study belongs to
@@ -39,8 +38,8 @@ def _once(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
 
 
 def _package(name: str, place: Path, scripts: Iterable[Path]) -> ModuleType:
-    imports.add_root(name, place)
-    walk.by_code.update(scripts)
+    code_hash.add_root(name, place)
+    code_hash.by_code.update(scripts)
     return _once(name, place / "__init__.py", [str(place)])
 
 

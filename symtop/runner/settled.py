@@ -13,10 +13,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from symtop.base.fingerprint import digest, file_hash, hashed, packages, processor
-from symtop.base.imports import PACKAGE
+from symtop.core.code_hash import PACKAGE, digest, file_hash, hashed, packages, processor
 
-ENTRY_POINTS = "symtop.integrators"  # as in `symtop.methods.registry`, which takes 0.3 s to import
+ENTRY_POINTS = "symtop.integrators"  # as in `symtop.methods.framework.registry`, which takes 0.3 s to import
 STUDIES = ("symtop_studies", "studies")  # folders beside the package, as in `scripts`
 NOTE = Path("cases") / "settled.json"
 

@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from symtop.base import datasets, fingerprint
-from symtop.base.validate import SymtopError
+from symtop.core import code_hash, netcdf
+from symtop.core.errors import SymtopError
 from symtop.runner import depends, store
 from symtop.runner.cases import Round
 from symtop.runner.study import Case, Study
@@ -56,7 +56,7 @@ def changed(study: Study, case: Case, path: Path) -> list[str]:
     before = _attribute(path, "made_of")
     if not before:
         return ["its file does not say what it was made of"]
-    return fingerprint.changes(before, store.short(depends.reasons(study, case)))
+    return code_hash.changes(before, store.short(depends.reasons(study, case)))
 
 
 def other_settings(case: Case, stored: list[Path]) -> list[str]:
@@ -73,7 +73,7 @@ def other_settings(case: Case, stored: list[Path]) -> list[str]:
 def _attribute(path: Path, name: str) -> Mapping[str, Any]:
     """A mapping that a case's file holds as JSON; empty if the file is damaged or another program's."""
     try:
-        content = json.loads(datasets.read(path).attrs[name])
+        content = json.loads(netcdf.read(path).attrs[name])
     except (SymtopError, KeyError, TypeError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}

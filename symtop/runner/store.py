@@ -27,10 +27,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.base import datasets
-from symtop.base.fingerprint import LENGTH, Reasons
-from symtop.base.locks import locked
-from symtop.base.validate import SymtopError
+from symtop.core import netcdf
+from symtop.core.code_hash import LENGTH, Reasons
+from symtop.core.errors import SymtopError
+from symtop.core.files import locked
 from symtop.model.scenes import scenes
 from symtop.runner import depends
 from symtop.runner.study import Case, Combined, Study
@@ -79,12 +79,12 @@ def prepare(results: Path, study: Study) -> None:
 
 def save_case(data: xr.Dataset, path: Path, study: Study, case: Case) -> None:
     """Store what a case measured, with what it was made from."""
-    described = datasets.describe(
+    described = netcdf.describe(
         data, f"{study.name}: {case.integrator} on {case.scene}", units=units_of([case.scene]), study=study.name,
         settings=dict(case.settings), sources=digest_of(path), made_of=short(depends.reasons(study, case)), seed=SEED,
-        content=datasets.content_hash(data),
+        content=netcdf.content_hash(data),
     )  # fmt: skip
-    datasets.write(described, path)
+    netcdf.write(described, path)
     failure_path(path).unlink(missing_ok=True)
 
 
@@ -99,10 +99,10 @@ def load_case(path: Path) -> xr.Dataset | None:
     if not path.is_file():
         return None
     try:
-        data = datasets.read_own(path)
+        data = netcdf.read_own(path)
     except SymtopError:
         return None
-    whole = data.attrs.get("sources") == digest_of(path) and data.attrs.get("content") == datasets.content_hash(data)
+    whole = data.attrs.get("sources") == digest_of(path) and data.attrs.get("content") == netcdf.content_hash(data)
     return data if whole else None
 
 
@@ -208,7 +208,7 @@ def _blank(kind: "np.dtype[Any]") -> tuple[Any, Any]:
 
 def write_text(path: Path, text: str) -> None:
     """Replace a small text file in one move."""
-    with datasets.replacing(path) as partial:
+    with netcdf.replacing(path) as partial:
         partial.write_text(text, encoding="utf-8")
 
 
@@ -251,11 +251,11 @@ def tidy(results: Path, study: Study) -> None:
         path = lock.with_name(f"{lock.stem[1:]}.nc")
         with locked(path, wait=False) as ours:
             if ours:
-                datasets.sweep(path)
+                netcdf.sweep(path)
                 trace_path(path).unlink(missing_ok=True)
     with locked(results / f"{study.name}.nc", wait=False) as ours:
         if ours:
             for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
-                datasets.sweep(file)
+                netcdf.sweep(file)
             for partial in (results / "figures").glob(f".{study.name}-*.part*"):
                 partial.unlink(missing_ok=True)

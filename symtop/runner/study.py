@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import xarray as xr
 
-from symtop.base.signals import is_of_user
-from symtop.base.strangers import words_of
-from symtop.base.validate import SymtopError, label, shown
-from symtop.methods.registry import split_name
+from symtop.core.errors import SymtopError, label, shown, words_of
+from symtop.core.signals import is_of_user
+from symtop.methods.framework.registry import split_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

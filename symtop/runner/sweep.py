@@ -2,7 +2,7 @@
 
 A cell, one integrator on one scene, is an error table (`symtop.measure.accuracy`). Cells are computed on threads, which
 compiled kernels let run at once. With a file, cells are kept in it as they are done, each with the digest of all that
-its numbers depend on (`symtop.base.fingerprint`), as the cases of a study are: what is up to date is not run again.
+its numbers depend on (`symtop.core.code_hash`), as the cases of a study are: what is up to date is not run again.
 """
 
 import functools
@@ -16,15 +16,15 @@ import numpy as np
 import xarray as xr
 from tqdm import tqdm
 
-from symtop.base import datasets, fingerprint
-from symtop.base.progress import beating
-from symtop.base.threads import MOST_THREADS, cores, in_threads
-from symtop.base.validate import SymtopError, place, positive, row, truth, whole
-from symtop.base.walk import Walk
+from symtop.core import code_hash, netcdf
+from symtop.core.code_hash import Walk
+from symtop.core.errors import SymtopError, place, positive, row, truth, whole
+from symtop.core.parallel import MOST_THREADS, cores, in_threads
+from symtop.core.progress import beating
 from symtop.measure.accuracy import as_table, enough_samples, error_row
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.settings import ANGLES
-from symtop.methods.registry import Integrator, integrator as find_integrator
+from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.simulation import chart_of, make_plan
 from symtop.runner import depends
@@ -115,7 +115,7 @@ def sweep(
             [[chart_of(method, one.observes, observe) for method in methods] for one in chosen],
         )
         units = chosen[0].units if len({one.units for one in chosen}) == 1 else ""
-        return _described(datasets.describe(data, "errors and work of a sweep", units=units))
+        return _described(netcdf.describe(data, "errors and work of a sweep", units=units))
 
     kept = time.monotonic()
     with beating(
@@ -126,15 +126,15 @@ def sweep(
                 done[cell.made_of] = table
                 bar.update()
                 if file is not None and time.monotonic() - kept > KEEP_EVERY:
-                    datasets.write(combined(), file)
+                    netcdf.write(combined(), file)
                     kept = time.monotonic()
         except BaseException:
             if file is not None and done:
-                datasets.write(combined(), file)
+                netcdf.write(combined(), file)
             raise
     data = combined()
     if file is not None and (rest or pairs != [*stored]):  # in another order, the file would not be what is returned
-        datasets.write(data, file)
+        netcdf.write(data, file)
     return data
 
 
@@ -195,13 +195,13 @@ def _made_of(scene: Scene, method: Integrator, asked: object) -> str:
     walk = Walk("sweep")
     walk.add((scene, method, repr(asked)))
     measured, files = _measure()
-    return fingerprint.digest(
-        {**fingerprint.packages(), **walk.values(), **measured, **depends.hashes(files | walk.closure())}
+    return code_hash.digest(
+        {**code_hash.packages(), **walk.values(), **measured, **depends.hashes(files | walk.closure())}
     )
 
 
 @functools.cache
-def _measure() -> tuple[fingerprint.Reasons, frozenset[Path]]:
+def _measure() -> tuple[code_hash.Reasons, frozenset[Path]]:
     base = depends.basis(error_row)
     return base.values, base.files
 
@@ -244,7 +244,7 @@ def _stored(file: Path) -> dict[tuple[str, str], _Stored]:
     """The cells of an earlier sweep by scene and integrator; SymtopError for a file that is no sweep's."""
     if not file.exists():
         return {}
-    data = datasets.read(file)
+    data = netcdf.read(file)
     if "made_of" not in data:
         raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")
     cells = {}

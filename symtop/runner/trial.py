@@ -15,7 +15,7 @@ from concurrent.futures import Executor
 from typing import NamedTuple
 
 from symtop.measure.timing import bare_run
-from symtop.methods.registry import integrator
+from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import scene
 
 METHOD, CHART, SCENE, STEPS, STEP = "strang", "axis", "spheroid", 4000, 1e-3  # a run takes 0.1 ms

@@ -21,10 +21,9 @@ from typing import NamedTuple
 import xarray as xr
 from tqdm import tqdm
 
-from symtop.base import datasets, locks
-from symtop.base.signals import is_of_user
-from symtop.base.strangers import words_of
-from symtop.base.validate import SymtopError
+from symtop.core import files, netcdf
+from symtop.core.errors import SymtopError, words_of
+from symtop.core.signals import is_of_user
 from symtop.runner import depends, plugins, scripts, store
 from symtop.runner.study import Case, Study
 
@@ -82,7 +81,7 @@ def compute(task: Task, study: Study | None = None, *, wait: bool = False) -> Re
             f"the sources or dependencies of {case.integrator} on {case.scene} are not those that the study was "
             "started with; if a file was edited meanwhile, run the study again"
         )
-    with locks.locked(path, wait=wait) as ours:
+    with files.locked(path, wait=wait) as ours:
         if not ours:
             return Result("busy")
         if not task.fresh and store.load_case(path) is not None:
@@ -91,7 +90,7 @@ def compute(task: Task, study: Study | None = None, *, wait: bool = False) -> Re
 
 
 def _compute(study: Study, task: Task, path: Path) -> Result:
-    datasets.sweep(path)
+    netcdf.sweep(path)
     store.trace_path(path).unlink(missing_ok=True)  # of a worker that was killed
     try:
         with limited(task.limit, store.trace_path(path)):

@@ -7,12 +7,12 @@ import pytest
 
 from benchmarks import bench, ensemble, kernels, lanes, measured, targets, truth, twin, whole_run
 from symtop.measure.timing import Timing, timings
-from symtop.methods import loop as loops
-from symtop.methods.fixed_step import inside
-from symtop.methods.many import Many
-from symtop.methods.registry import methods
+from symtop.methods.framework import loop as loops
+from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.many import Many
+from symtop.methods.framework.registry import methods
 from symtop.model import charts
-from symtop.model.closed_forms import ClosedForms
+from symtop.model.exact.closed_forms import ClosedForms
 from symtop.report import page
 from symtop.runner import store
 

@@ -14,8 +14,8 @@ import symtop
 from benchmarks import engines
 from benchmarks.engines import drivers, measure, study
 from benchmarks.engines.common import body_of
-from symtop.methods import registry
-from symtop.methods.engines import SINGLE
+from symtop.methods.engines.engines import SINGLE
+from symtop.methods.framework import registry
 
 SCENES = {body_of(symtop.scene(name)).velocity.tobytes(): symtop.scene(name) for name in measure.STEPS}
 

@@ -14,9 +14,9 @@ import symtop
 from benchmarks import peers
 from benchmarks.peers import callbacks, common, measure, own
 from benchmarks.peers.adapters import sundae
-from symtop.methods.euler_lagrange import field_angles, with_rates
-from symtop.methods.plan import Plan
-from symtop.methods.space import field_axis
+from symtop.methods.framework.euler_lagrange import field_angles, with_rates
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.space import field_axis
 from symtop.run.simulation import make_plan
 
 ROOT = Path(__file__).resolve().parents[2]

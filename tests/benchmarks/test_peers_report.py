@@ -12,7 +12,7 @@ import xarray as xr
 import symtop
 from benchmarks import measured
 from benchmarks.peers import measure, study, summary, together
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.report import page, style
 from symtop.runner import conclude, run as runner, store
 
@@ -45,7 +45,7 @@ def _stored(times, spread=0.01):
         coords={"call": list(measure.CALLS), "scene": ["spheroid"], "integrator": [f"{name}-one" for name in names]},
     )
     facts = measured.circumstances() | {"measured": "2001-02-03", "processor": "an abacus"}
-    return datasets.describe(data, "peers").assign_attrs(facts)
+    return netcdf.describe(data, "peers").assign_attrs(facts)
 
 
 def test_both_ratios_against_scipy_stand_side_by_side_for_each_chart_and_language():
@@ -162,7 +162,7 @@ def test_cleaning_spares_what_the_studies_do_not_make(tmp_path):
 
 
 def test_the_stored_measurement_is_whole_and_its_inner_loops_did_the_work():
-    data = datasets.read(ROOT / "results" / "peers.nc")
+    data = netcdf.read(ROOT / "results" / "peers.nc")
     timed = np.isfinite(data["axis"].values)
     assert timed.sum() > 100
     assert np.isfinite(data["seconds"].values[:, timed]).all()  # both calls of every run

@@ -6,9 +6,9 @@ import pytest
 from click.testing import CliRunner
 
 import symtop
-from symtop.base import datasets
 from symtop.cli.main import main
-from symtop.methods.citations import entries, keys
+from symtop.core import netcdf
+from symtop.methods.framework.citations import entries, keys
 
 
 def cited(*arguments):
@@ -26,7 +26,7 @@ def test_without_a_file_the_package_is_cited_with_its_version():
 @pytest.mark.parametrize("name", ["strang", "gauss-4", "midpoint"])
 def test_a_run_cites_the_sources_of_its_method(tmp_path, name):
     data = symtop.simulate("spheroid", name, step_size=0.01, horizon=0.1)
-    text = cited(datasets.write(data, tmp_path / "run.nc")).stdout
+    text = cited(netcdf.write(data, tmp_path / "run.nc")).stdout
     sources = keys(symtop.integrator(name))
     assert sources
     for key in sources:
@@ -36,13 +36,13 @@ def test_a_run_cites_the_sources_of_its_method(tmp_path, name):
 
 def test_every_source_is_cited_once(tmp_path):
     data = symtop.ensemble(symtop.population(3, seed=1), "strang", step_size=0.01, horizon=0.1)
-    twice = datasets.write(data, tmp_path / "runs.nc")
+    twice = netcdf.write(data, tmp_path / "runs.nc")
     assert cited(twice).stdout == cited(twice, twice).stdout
 
 
 def test_a_method_without_a_known_source_is_said(tmp_path):
     data = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.1).assign_attrs(integrator="of-a-user")
-    done = cited(datasets.write(data, tmp_path / "run.nc"))
+    done = cited(netcdf.write(data, tmp_path / "run.nc"))
     assert "no source is known of of-a-user" in done.stderr
     assert done.stdout.count("@") == 1
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from symtop.base import datasets
-from symtop.base.validate import SymtopError
 from symtop.cli.main import main
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError
 
 
 def call(*arguments):
@@ -25,7 +25,7 @@ def test_run_prints_the_errors_and_writes_the_dataset(tmp_path):
     done = call("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", path)
     assert done.exit_code == 0, done.output
     assert "angle between axes" in done.output
-    assert datasets.read(path).attrs["integrator"] == "midpoint"
+    assert netcdf.read(path).attrs["integrator"] == "midpoint"
 
 
 def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
@@ -33,7 +33,7 @@ def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
     done = call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path)
     assert done.exit_code == 3, done.output
     assert "theta left (0, pi)" in done.output
-    assert datasets.read(path).attrs["outcome"] == "left_chart"
+    assert netcdf.read(path).attrs["outcome"] == "left_chart"
 
 
 def test_tables_are_complete_and_json_is_json():
@@ -144,7 +144,7 @@ def test_a_command_of_one_name_says_nothing_of_an_order(words, told):
         (["long", "spheroid", "strang", "--steps", "10"], "symtop.run.long_run.long_run"),
         (
             ["ensemble", "strang", "--members", "2", "--step-size", "0.1", "--horizon", "1"],
-            "symtop.run.ensemble.ensemble",
+            "symtop.run.ensemble.ensemble.ensemble",
         ),
     ],
 )
@@ -255,7 +255,7 @@ def test_a_row_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_path):
         path = tmp_path / f"{chart}.nc"
         done = call("run", "spheroid", f"rk4[{chart}]", "--step-size", 0.02, "--output", path, "--json")
         assert done.exit_code == 0, done.output
-        assert datasets.read(path).attrs["chart"] == chart
+        assert netcdf.read(path).attrs["chart"] == chart
         changes[chart] = json.loads(done.output)["errors"]["p_phi"]["largest"]
     assert changes["axis"] == 0.0 < changes["angles"]
     assert "rk4[axis]" in call("run", "--help").output

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 import symtop
 from symtop.cli.engine_advice import SETTINGS, i_use
 from symtop.cli.main import main
-from symtop.methods.registry import engines
+from symtop.methods.framework.registry import engines
 
 
 def test_every_setting_has_a_map_and_every_map_of_the_engines_a_setting():

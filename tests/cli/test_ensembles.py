@@ -116,7 +116,7 @@ def test_how_tops_were_computed_is_said_in_words(name, told):
 
 
 def test_members_that_raise_are_told_in_one_sentence(tmp_path, monkeypatch):
-    registry = importlib.import_module("symtop.methods.registry")
+    registry = importlib.import_module("symtop.methods.framework.registry")
     monkeypatch.setattr(registry, "_registry", registry.integrators())
     plugin = tmp_path / "raises_for_some.py"
     plugin.write_text(

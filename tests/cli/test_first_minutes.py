@@ -13,7 +13,7 @@ import symtop
 from symtop.cli import completion
 from symtop.cli.main import main
 from symtop.measure.verdicts import ACCURATE
-from symtop.run.guard import EXPECTED
+from symtop.run.guard.guard import EXPECTED
 
 AXIS_ONLY = """\
 import symtop
@@ -181,17 +181,17 @@ def test_completion_lists_names_once_and_again_if_a_file_changes(tmp_path, monke
 def test_a_cold_kernel_is_announced_once(monkeypatch):
     import numpy as np
 
-    from symtop.base import compiled
+    from symtop.core import jit
 
     heard = []
-    monkeypatch.setattr(compiled, "on_cold", [lambda: heard.append(1)])
+    monkeypatch.setattr(jit, "on_cold", [lambda: heard.append(1)])
 
     def kernel(x):
         return x + float(np.pi) * COLD
 
-    assert compiled.compile_kernel(kernel)(0.0) > 0.0
+    assert jit.compile_kernel(kernel)(0.0) > 0.0
     assert heard == [1]
-    assert compiled.compile_kernel(kernel)(0.0) > 0.0  # from the disk
+    assert jit.compile_kernel(kernel)(0.0) > 0.0  # from the disk
     assert heard == [1]
 
 
@@ -258,7 +258,7 @@ def test_the_clock_goes_on_while_somebody_holds_the_lock_of_python(tmp_path):
 
 
 def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
-    from symtop.base import progress
+    from symtop.core import progress
 
     monkeypatch.setattr(progress, "BEAT", 0.01)
     drawn = []

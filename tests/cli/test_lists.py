@@ -10,7 +10,7 @@ from click.testing import CliRunner
 import symtop
 from symtop.cli.common import table
 from symtop.cli.main import main
-from symtop.methods.registry import engines, methods
+from symtop.methods.framework.registry import engines, methods
 
 
 def printed(*words, columns=80):

@@ -12,7 +12,7 @@ from symtop.cli.main import main
 from symtop.report.tables import columns, table
 from tests.pages import ROOT, pages
 
-registry = importlib.import_module("symtop.methods.registry")
+registry = importlib.import_module("symtop.methods.framework.registry")
 
 PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in pages()}
 MOST_LINES, MOST_WORDS = 150, 1200  # of the README

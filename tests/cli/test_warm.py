@@ -6,9 +6,9 @@ import pytest
 from click.testing import CliRunner
 
 import symtop
-from symtop.base.cache import cache_root
 from symtop.cli import warm
 from symtop.cli.main import main
+from symtop.core.files import cache_root
 
 
 def test_every_compiled_method_is_run_in_each_of_its_charts():

@@ -17,7 +17,7 @@ from symtop.cli.main import main
 from tests.commands import ended, symtop
 from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
 
-registry = importlib.import_module("symtop.methods.registry")
+registry = importlib.import_module("symtop.methods.framework.registry")
 scenes = importlib.import_module("symtop.model.scenes")
 
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
@@ -160,7 +160,9 @@ def absent(text):
 
 
 def test_the_files_that_pages_name_are_there():
-    assert absent("`methods/loop.py`, `methods/fused.py` and `studies/drift/study.py`") == ["methods/fused.py"]
+    assert absent("`methods/framework/loop.py`, `methods/fused.py` and `studies/drift/study.py`") == [
+        "methods/fused.py"
+    ]
     texts = {page.name: page.read_text(encoding="utf-8") for page in {*pages(), ROOT / "docs" / "design.md"}}
-    assert len(re.findall(r"`\w+/\w+\.py`", texts["design.md"])) > 5
+    assert len(re.findall(r"`[\w/]+/\w+\.py`", texts["design.md"])) > 5
     assert [(page, absent(text)) for page, text in texts.items() if absent(text)] == []

@@ -20,12 +20,12 @@ import pytest
 from click.testing import CliRunner
 
 import symtop
-from symtop.base import datasets
-from symtop.base.validate import SymtopError, SymtopWarning
 from symtop.cli.main import main
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError, SymtopWarning
 from symtop.explore import answers
 from symtop.explore.server import STATIC, address, serve
-from symtop.methods.registry import engines
+from symtop.methods.framework.registry import engines
 from symtop.model import charts
 from symtop.model.scenes import closed_form
 from tests.browser import Browser
@@ -135,7 +135,7 @@ def test_the_script_makes_the_same_dataset_to_the_bit(method, tmp_path, monkeypa
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SymtopWarning)  # the guard's, which the page has shown
         exec(compile(answers.script(chosen), "explored.py", "exec"), {})
-    assert datasets.read(tmp_path / "explored.nc").equals(answers.dataset(chosen, str))
+    assert netcdf.read(tmp_path / "explored.nc").equals(answers.dataset(chosen, str))
     assert "reached t = 70" in capsys.readouterr().out
 
 
@@ -212,7 +212,7 @@ def test_exports_over_http(site, tmp_path):
     status, body, _ = request(site, "POST", "/netcdf", json.dumps(chosen), **JSON)
     assert status == 200
     (tmp_path / "run.nc").write_bytes(body)
-    assert datasets.read(tmp_path / "run.nc").equals(answers.dataset(answers.setup(chosen), str))
+    assert netcdf.read(tmp_path / "run.nc").equals(answers.dataset(answers.setup(chosen), str))
     status, body, _ = request(site, "POST", "/script", json.dumps(chosen), **JSON)
     assert body.decode() == answers.script(answers.setup(chosen))
 

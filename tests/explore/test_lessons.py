@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.explore import answers, maps
 from symtop.explore.server import STATIC, address, serve
 from tests.browser import FAINT, Browser

@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 
 import symtop
-from symtop.methods.plan import Run
+from symtop.methods.framework.plan import Run
 
 midpoint = symtop.integrator("midpoint").solvers["angles"]
 

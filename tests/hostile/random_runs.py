@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 import symtop
-from symtop.methods.registry import integrators
+from symtop.methods.framework.registry import integrators
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop

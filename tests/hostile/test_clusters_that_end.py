@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from symtop.base.cluster import Watched
+from symtop.core.cluster import Watched
 from tests.commands import PROBE, ended, leftovers, stop, symtop
 
 pytest.importorskip("distributed")

@@ -8,10 +8,11 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.base import datasets
-from symtop.base.compiled import compile_kernel, is_kept
-from symtop.run import long_run as longrun, reference as references
-from symtop.run.kept import kept
+from symtop.core import netcdf
+from symtop.core.jit import compile_kernel, is_kept
+from symtop.run import long_run as longrun
+from symtop.run.disk_cache import kept
+from symtop.run.reference import truth as references
 
 FLIPS = [pytest.param(12, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)]
 
@@ -92,8 +93,8 @@ def test_a_damaged_file_is_data_or_one_sentence(tmp_path, flips):
     """Whoever reads it, in a runner or not: no error but SymtopError."""
     draw, path, refused = random.Random(7), tmp_path / "case.nc", 0
     tree = xr.DataTree.from_dict({"one": _MADE.assign_attrs(title="x"), "two": _MADE})
-    for data, read in ((_MADE, datasets.read), (tree, datasets.read_any)):
-        datasets.write(data, path)
+    for data, read in ((_MADE, netcdf.read), (tree, netcdf.read_any)):
+        netcdf.write(data, path)
         for _ in range(flips):
             whole = flipped(path, draw)
             try:

@@ -9,10 +9,10 @@ import pytest
 from click.testing import CliRunner
 
 import symtop
-from symtop.base.signals import InterruptedByUser, told_apart
 from symtop.cli.main import main
-from symtop.methods.calling import solve
-from symtop.methods.plan import Plan
+from symtop.core.signals import InterruptedByUser, told_apart
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan
 from symtop.runner import plugins
 from tests.commands import ended, symtop as command
 
@@ -93,7 +93,7 @@ def test_an_interrupt_of_the_user_is_not_that_of_a_plugin(misbehaving):
 
 def test_a_solver_that_expects_steps_forwards_is_ended(misbehaving, monkeypatch):
     """Probes of reversibility ask for a step backwards: `claims` waited for ever for a loop up to the horizon."""
-    monkeypatch.setattr("symtop.methods.calling.PATIENCE", 0.2)
+    monkeypatch.setattr("symtop.methods.framework.calling.PATIENCE", 0.2)
     scene, method = symtop.scene("spheroid"), symtop.integrator("forwards-only")
     assert solve(method, "angles", scene.top, scene.start, Plan.steps(0.01, [1])).outcome == "ok"
     with pytest.raises(symtop.SymtopError, match=r"forwards-only failed: TimeoutError: it was not done after 0\.2 s"):

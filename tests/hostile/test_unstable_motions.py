@@ -9,11 +9,11 @@ import pytest
 
 import symtop
 from symtop.model import charts
-from symtop.model.closed_form import ClosedForm
-from symtop.model.precise_form import PreciseForm
+from symtop.model.exact.closed_form import ClosedForm
+from symtop.model.exact.precise_form import PreciseForm
 from symtop.model.top import flat
-from symtop.run import guard
-from symtop.run.departure import conditioning, departure
+from symtop.run.guard import guard
+from symtop.run.reference.sensitivity import conditioning, departure
 from symtop.run.simulation import make_plan
 
 # I1, I3, mgl, theta, theta', psi', method, observed, tolerance, horizon: of random runs, those that nobody warned of
@@ -63,7 +63,7 @@ def test_what_two_integrations_differ_by_is_the_start_and_not_the_closed_form(ti
     From a momentum that is rounded once more, as in an integration that starts from (e, L) in doubles, it is not.
     """
     pytest.importorskip("heyoka")
-    from symtop.run.witnesses import integrate
+    from symtop.run.reference.independent_checks import integrate
 
     scene = sleeper(tilt, ratio)
     times = np.linspace(0.0, 2.0 * scene.nutation_period, 21)[1:]

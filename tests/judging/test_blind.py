@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import symtop
-from symtop.judging.screen import described
+from symtop.judging.text_report import described
 
 BLIND = Path(__file__).parent / "blind"
 

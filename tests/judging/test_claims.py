@@ -17,17 +17,17 @@ from symtop.judging import claims_constants as constants, claims_long as long, c
 from symtop.judging.claims import judge
 from symtop.judging.claims_order import limit
 from symtop.judging.claims_series import order
-from symtop.judging.ledger import CLAIMS, VERDICTS, Finding, read
+from symtop.judging.findings import CLAIMS, VERDICTS, Finding, read
 from symtop.measure.growth import behaviour
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
-from symtop.methods.plan import Run
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.plan import Run
+from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
 from symtop.report import style
 from symtop.runner import plugins, run as runner
 from tests.conftest import random_scenes
 
-registry = importlib.import_module("symtop.methods.registry")
+registry = importlib.import_module("symtop.methods.framework.registry")
 LIARS = Path(__file__).parent / "liars"
 SPHEROID = symtop.scene("spheroid")
 CHARTS = ("angles", "axis", "attitude")

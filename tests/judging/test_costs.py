@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.registry import Integrator
 
 SPHEROID = symtop.scene("spheroid")
 ATTEMPTS = 12  # runs that show what an attempt at a step costs

@@ -14,15 +14,15 @@ from scipy.integrate import RK23
 
 import symtop
 from symtop.cli.judge import FORMS as OFFERED
+from symtop.judging.adapters.adapter import integrator, label_of
+from symtop.judging.adapters.choice import FORMS, opened
+from symtop.judging.adapters.python_step import PythonStep
+from symtop.judging.adapters.rotation import RotationStep, to_body, to_space
+from symtop.judging.adapters.separable import SeparableStep
 from symtop.judging.battery import STAGES
-from symtop.judging.ledger import CLAIMS, VERDICTS, read
-from symtop.judging.pulse import pulse
-from symtop.judging.screen import described
-from symtop.judging.sockets.opening import FORMS, opened
-from symtop.judging.sockets.python_step import PythonStep
-from symtop.judging.sockets.rotation import RotationStep, to_body, to_space
-from symtop.judging.sockets.separable import SeparableStep
-from symtop.judging.sockets.socket import integrator, label_of
+from symtop.judging.findings import CLAIMS, VERDICTS, read
+from symtop.judging.heartbeat import pulse
+from symtop.judging.text_report import described
 
 SPHEROID = symtop.scene("spheroid")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
@@ -293,7 +293,7 @@ def test_a_program_that_gives_back_its_line_cannot_be_judged(tmp_path):
 
 @pytest.fixture
 def impatient(monkeypatch):
-    monkeypatch.setattr("symtop.judging.pulse.QUICK_PATIENCE", 0.5)
+    monkeypatch.setattr("symtop.judging.heartbeat.QUICK_PATIENCE", 0.5)
 
 
 @pytest.mark.parametrize(

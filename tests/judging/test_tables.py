@@ -5,7 +5,7 @@ import pytest
 import symtop
 from symtop.judging.claims_series import order
 from symtop.judging.claims_table import table_of
-from symtop.methods import splitting
+from symtop.methods.splitting import splitting
 
 SPHEROID = symtop.scene("spheroid")
 B = (1 / 6, 1 / 3, 1 / 3, 1 / 6)

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.judging.sockets.opening import opened
-from symtop.judging.sockets.tensors import field_of
-from symtop.methods.formulations import FORMULATIONS
+from symtop.judging.adapters.choice import opened
+from symtop.judging.adapters.tensors import field_of
+from symtop.methods.framework.formulations import FORMULATIONS
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "studies" / "examples"

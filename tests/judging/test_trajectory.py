@@ -8,10 +8,10 @@ import xarray as xr
 from click.testing import CliRunner
 
 import symtop
-from symtop.base import datasets
 from symtop.cli.main import main
-from symtop.judging.sockets.opening import opened
-from symtop.methods.formulations import FORMULATIONS
+from symtop.core import netcdf
+from symtop.judging.adapters.choice import opened
+from symtop.methods.framework.formulations import FORMULATIONS
 
 SPHEROID = symtop.scene("spheroid")
 H, STRIDE, SAMPLES = 0.01, 10, 1001
@@ -56,7 +56,7 @@ def test_a_netcdf_file_a_mapping_and_blanks_are_the_same(table, tmp_path):
     (tmp_path / "run.txt").write_text("# " + text(table).replace(",", "  "), encoding="utf-8")
     names = {"axis": ("time", "component"), "momentum": ("time", "component")}
     data = xr.Dataset({name: (names[name], given[name]) for name in names}, {"time": given["time"]})
-    datasets.write(data, tmp_path / "run.nc")
+    netcdf.write(data, tmp_path / "run.nc")
     for file in ("run.txt", "run.nc"):
         found = symtop.judge(str(tmp_path / file))
         assert [one.value for one in found.findings] == [one.value for one in plain.findings]

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.base.numbers import EPSILON
+from symtop.core.numbers import EPSILON
 from symtop.measure import extended
 from symtop.measure.accuracy import SAMPLES, enough_samples, error_table
 from symtop.measure.errors import attitude_error, error_bound, errors_against
 from symtop.measure.extended import extended_errors, extended_order_data
 from symtop.measure.order import LARGEST_ERROR, order
 from symtop.measure.order_table import asymptotic_steps
-from symtop.methods.registry import integrator
+from symtop.methods.framework.registry import integrator
 from symtop.model.charts import axis_from_angles, momentum_parts
 from symtop.model.scenes import scene
-from symtop.run.reference import reference
-from symtop.run.witnesses import have_heyoka
+from symtop.run.reference.independent_checks import have_heyoka
+from symtop.run.reference.truth import reference
 
 DENSE, EVEN = 40_001, 331
 HORIZONS = (10.037, 100.37, 1003.7)  # nutations

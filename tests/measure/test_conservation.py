@@ -56,9 +56,9 @@ def test_the_energy_of_rk45_falls_linearly_and_its_momenta_drift():
 
 def test_momenta_are_recomputed_and_not_copied():
     """A kernel that moves phi by the wrong amount shows it in p_phi."""
-    from symtop.methods import discrete_lagrangian as family
-    from symtop.methods.angles import reduced
-    from symtop.methods.loop import driver
+    from symtop.methods.framework.angles import reduced
+    from symtop.methods.framework.loop import driver
+    from symtop.methods.lagrangian import discrete_lagrangian as family
 
     where = symtop.scene("spheroid")
     par, state = reduced(where.top, where.start)

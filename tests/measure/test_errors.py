@@ -7,9 +7,9 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.measure.errors import QUANTITIES, errors_against
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 
 TIMES = np.linspace(0.0, 8.0, 41)
 TURN = 1e-3  # rad
@@ -101,7 +101,7 @@ def test_a_member_of_fewer_steps_than_samples_has_the_errors_of_its_run():
 
 def test_a_run_that_was_written_and_read_gives_the_same(tmp_path):
     run = symtop.simulate("spheroid", "strang", step_size=0.01)
-    kept = datasets.read(datasets.write(run, tmp_path / "run.nc"))
+    kept = netcdf.read(netcdf.write(run, tmp_path / "run.nc"))
     xr.testing.assert_identical(symtop.errors(run), symtop.errors(kept))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import symtop
 from symtop.measure.increments import from_increments, momenta_of
-from symtop.methods.plan import Plan
+from symtop.methods.framework.plan import Plan
 from symtop.model.scenes import closed_form
 from tests.conftest import random_scenes
 

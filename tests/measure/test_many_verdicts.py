@@ -8,9 +8,9 @@ import xarray as xr
 
 from symtop.measure.many_verdicts import judge_runs, truths
 from symtop.measure.verdicts import VERDICTS, verdict
-from symtop.methods.calling import solve
-from symtop.methods.plan import Plan
-from symtop.methods.registry import integrator
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import integrator
 from symtop.model.charts import axis_distance
 from symtop.model.scenes import closed_form, grazing, scene
 from symtop.model.view import View

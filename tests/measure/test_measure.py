@@ -16,7 +16,7 @@ from symtop.measure.growth import growth
 from symtop.measure.order import order, power_law
 from symtop.measure.settings import ladder
 from symtop.measure.timing import Timing, timings
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 from symtop.run.simulation import sample_times
 from symtop.runner import store
 from symtop.runner.study import Case

@@ -3,7 +3,7 @@
 import pytest
 
 from symtop.measure.order_conditions import conditions, density, size, trees, triangle
-from symtop.methods.dormand_prince import DORMAND_PRINCE
+from symtop.methods.runge_kutta.dormand_prince import DORMAND_PRINCE
 
 RK4 = ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 

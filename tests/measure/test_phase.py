@@ -10,7 +10,7 @@ import symtop
 from symtop.measure.phase import phase, split
 from symtop.model import charts
 from symtop.model.scenes import closed_form
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 
 
 def moved(name, periods=20.0, early=0.0, faster=0.0, turned=0.0, turning=0.0, lifted=0.0, samples=301):

@@ -9,9 +9,9 @@ import symtop
 from symtop.measure.accuracy import error_row
 from symtop.measure.settings import compared, limits
 from symtop.measure.work import CAPPED, TARGETS, TOO_WIDE, Walk, nutation_width, spans, work_table
-from symtop.methods.registry import methods
+from symtop.methods.framework.registry import methods
 from symtop.model import charts
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 
 
 def test_settings_come_close_to_every_target_from_below():

@@ -6,9 +6,9 @@ import pytest
 from scipy import integrate
 
 import symtop
-from symtop.methods.about import paragraphs
-from symtop.methods.citations import entries
-from symtop.methods.fixed_step import inside
+from symtop.methods.framework.about import paragraphs
+from symtop.methods.framework.citations import entries
+from symtop.methods.framework.fixed_step import inside
 
 NAMES = tuple(symtop.integrators())
 COUNTED = """zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.methods.adaptive import Adaptive
-from symtop.methods.many import members_of
-from symtop.methods.outcomes import OUTCOMES
-from symtop.methods.plan import Plan
-from symtop.methods.registry import rows
-from symtop.run.members import read_members
-from symtop.run.schedule import nutation_periods
+from symtop.methods.framework.adaptive import Adaptive
+from symtop.methods.framework.many import members_of
+from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import rows
+from symtop.run.ensemble.inputs import read_members
+from symtop.run.sampling import nutation_periods
 
 SOLVERS = {
     row.name: row.solvers[row.charts()[0]] for row in rows() if isinstance(row.solvers[row.charts()[0]], Adaptive)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.methods import discrete_lagrangian, galerkin
-from symtop.methods.angles import chart_outcome, reduced
-from symtop.methods.fixed_step import inside
-from symtop.methods.outcomes import LEFT_CHART, NOT_FINITE, OK
+from symtop.methods.framework.angles import chart_outcome, reduced
+from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.outcomes import LEFT_CHART, NOT_FINITE, OK
+from symtop.methods.lagrangian import discrete_lagrangian, galerkin
 from symtop.model.top import Angles, SymmetricTop
 
 IN_ANGLES = [

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from symtop.base.compiled import compile_kernel
+from symtop.core.jit import compile_kernel
 
 EVERY = "midpoint galerkin-simpson midpoint-unreduced stormer-verlet strang gauss-4 rk4"
 SCRIPT = """
@@ -32,7 +32,7 @@ print(len(used), sum(sum(one.stats.cache_misses.values()) for one in used),
 """
 
 
-@pytest.mark.slow  # tests/base/test_cold.py has a short run of one method
+@pytest.mark.slow  # tests/core/test_cold.py has a short run of one method
 @pytest.mark.parametrize(("names", "lanes"), [(EVERY, ["strang[axis]", "srkn-14-6[attitude]"])], ids=["every"])
 def test_a_second_process_finds_the_kernels_of_every_family_on_disk(names, lanes, tmp_path):
     environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path)}

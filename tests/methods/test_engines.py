@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 import symtop
 from symtop.judging.claims import judge
 from symtop.measure.settings import compared
-from symtop.methods import registry
-from symtop.methods.calling import solve
-from symtop.methods.engines import SINGLE
-from symtop.methods.many import members_of
-from symtop.methods.plan import Plan
+from symtop.methods.engines.engines import SINGLE
+from symtop.methods.framework import registry
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.many import members_of
+from symtop.methods.framework.plan import Plan
 from symtop.model import charts
 from symtop.model.top import flat
 from symtop.runner.grid import grid_rows

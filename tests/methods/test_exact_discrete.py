@@ -9,12 +9,12 @@ import pytest
 import symtop
 from benchmarks import exactness
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
-from symtop.methods.exact_map import Map, exact_map
-from symtop.methods.fixed_step import inside
-from symtop.methods.oscillators import momentum, on_oscillators
-from symtop.methods.plan import Plan
+from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.plan import Plan
+from symtop.methods.lagrangian.exact_map import Map, exact_map
+from symtop.methods.lagrangian.oscillators import momentum, on_oscillators
 from symtop.model import charts
-from symtop.model.precise_form import PreciseForm
+from symtop.model.exact.precise_form import PreciseForm
 from symtop.model.scenes import closed_form
 
 METHOD = symtop.integrator("exact-discrete")
@@ -77,7 +77,7 @@ def test_the_step_is_the_motion_whatever_its_size(name, steps):
 def test_random_tops_follow_the_closed_form_at_every_step():
     worst = 0.0
     for top, start in random_tops(300):
-        form = symtop.model.closed_form.ClosedForm(top, start)
+        form = symtop.model.exact.closed_form.ClosedForm(top, start)
         for steps in (100.0, 4.37, 2.3):
             h = form.nutation_period / steps
             if not math.isfinite(h):
@@ -117,7 +117,7 @@ def test_a_neighbour_of_the_map_is_no_motion():
 
 def test_a_free_top_and_a_step_back():
     top, start = symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(0.7, 0.2, 0.1, 0.3, -0.8, 1.1)
-    form = symtop.model.closed_form.ClosedForm(top, start)
+    form = symtop.model.exact.closed_form.ClosedForm(top, start)
     done = run(top, start, 0.7, 30)
     assert charts.attitude_distance(done.states[:, :4], form.quaternion(0.7 * np.arange(31))).max() < 1e-13
     rest = run(symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(0.7, 0.2, 0.1, 0.0, 0.0, 0.0), 0.7, 3)

@@ -10,10 +10,10 @@ import symtop
 from symtop.measure.conservation import residuals, trend
 from symtop.measure.growth import growth
 from symtop.measure.step_map import one_step as map_of, symplectic_defect
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.gauss import STAGES, gauss_rule, march_axis, march_frame
-from symtop.methods.registry import integrator
-from symtop.methods.space import SpaceTop, field_axis, frame_to_attitude, on_axis, on_frame
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.registry import integrator
+from symtop.methods.framework.space import SpaceTop, field_axis, frame_to_attitude, on_axis, on_frame
+from symtop.methods.runge_kutta.gauss import STAGES, gauss_rule, march_axis, march_frame
 from symtop.model import charts
 from symtop.model.scenes import steady
 from symtop.run.linear_stability import linear_limits, trace

@@ -9,13 +9,13 @@ import symtop
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
-from symtop.methods.angles import reduced
-from symtop.methods.discrete_lagrangian import march
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.loop import driver
-from symtop.methods.node_sums import forces, node_sums, opening
-from symtop.methods.quadrature import Quadrature
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.angles import reduced
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import driver
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.lagrangian.discrete_lagrangian import march
+from symtop.methods.lagrangian.node_sums import forces, node_sums, opening
+from symtop.methods.lagrangian.quadrature import Quadrature
 from tests.conftest import random_scenes
 
 DISCRETE = ("midpoint", "trapezoidal", "stormer-verlet")
@@ -91,7 +91,7 @@ def test_the_step_map_is_symplectic(name, where):
 def explicit_euler(top, start, plan):
     """Order 1, not symplectic, not symmetric: what the structure tests must catch."""
     par, (theta, p, phi, psi) = reduced(top, start)
-    from symtop.methods.plan import Run
+    from symtop.methods.framework.plan import Run
     from symtop.model.effective import effective_force
 
     h = plan.step_size
@@ -183,8 +183,8 @@ def test_discrete_momenta_are_those_of_the_discrete_lagrangian(name, nodes, weig
 def test_rk45_is_scipys_to_the_bit():
     from scipy.integrate import solve_ivp
 
-    from symtop.methods.euler_lagrange import field_angles, with_rates
-    from symtop.methods.scipy_ivp import RightHandSide
+    from symtop.methods.framework.euler_lagrange import field_angles, with_rates
+    from symtop.methods.library.scipy_ivp import RightHandSide
 
     where = symtop.scene("spheroid")
     run = symtop.simulate(where, "rk45", tolerance=1e-7, samples=81)

@@ -7,18 +7,18 @@ import pytest
 
 import symtop
 from symtop.measure.timing import timings
-from symtop.methods import blocks, lanes, loop as loops
-from symtop.methods.blocks import ALIKE, LEAST, divided, turns
-from symtop.methods.fixed_step import FixedStep, inside
-from symtop.methods.lanes import W
-from symtop.methods.many import Many, in_turn, members_of
-from symtop.methods.outcomes import OUTCOMES
-from symtop.methods.plan import Plan
-from symtop.methods.registry import rows
-from symtop.methods.runge_kutta import runge_kutta
-from symtop.methods.space import on_axis
-from symtop.methods.splitting import composition
-from symtop.methods.splitting_space import march_axis
+from symtop.methods.framework import blocks, lanes, loop as loops
+from symtop.methods.framework.blocks import ALIKE, LEAST, divided, turns
+from symtop.methods.framework.fixed_step import FixedStep, inside
+from symtop.methods.framework.lanes import W
+from symtop.methods.framework.many import Many, in_turn, members_of
+from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import rows
+from symtop.methods.framework.space import on_axis
+from symtop.methods.runge_kutta.runge_kutta import runge_kutta
+from symtop.methods.splitting.splitting import composition
+from symtop.methods.splitting.splitting_space import march_axis
 from symtop.model.top import flat
 
 SOLVERS = {row.name: solver for row in rows() for solver in filter(None, map(inside, row.solvers.values()))}

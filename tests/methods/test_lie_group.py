@@ -10,14 +10,14 @@ from scipy.spatial.transform import Rotation
 import symtop
 from symtop.measure.published import published_values
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
-from symtop.methods import lie_variational
-from symtop.methods.calling import solve
-from symtop.methods.generalised_alpha import generalised_alpha
-from symtop.methods.lie_runge_kutta import lie_runge_kutta
-from symtop.methods.plan import Plan
-from symtop.methods.preparation import Body
-from symtop.methods.registry import integrator
-from symtop.methods.space import SpaceTop, field_axis, on_axis
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.preparation import Body
+from symtop.methods.framework.registry import integrator
+from symtop.methods.framework.space import SpaceTop, field_axis, on_axis
+from symtop.methods.lie_group import lie_variational
+from symtop.methods.lie_group.generalised_alpha import generalised_alpha
+from symtop.methods.lie_group.lie_runge_kutta import lie_runge_kutta
 from symtop.model import charts
 from tests.conftest import random_scenes
 from tests.slopes import assert_order, measured_order

@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from symtop.methods.coefficients import SUZUKI_4
-from symtop.methods.generalised_alpha import generalised_alpha
-from symtop.methods.lanes import W
-from symtop.methods.lie_runge_kutta import LieTable, lie_runge_kutta
-from symtop.methods.lie_variational import EULER_POINCARE, Variational, lie_variational
-from symtop.methods.outcomes import OUTCOMES
+from symtop.methods.framework.lanes import W
+from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.lie_group.generalised_alpha import generalised_alpha
+from symtop.methods.lie_group.lie_runge_kutta import LieTable, lie_runge_kutta
+from symtop.methods.lie_group.lie_variational import EULER_POINCARE, Variational, lie_variational
+from symtop.methods.splitting.coefficients import SUZUKI_4
 from tests.methods.test_lanes import FAR, SOLVERS, assert_runs_alone, left_alone, members, times_faster
 from tests.methods.test_newton_lanes import spread
 

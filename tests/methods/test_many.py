@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.methods import loop as loops, splitting_space
-from symtop.methods.fixed_step import FixedStep, inside
-from symtop.methods.many import groups, members_of
-from symtop.methods.outcomes import OUTCOMES
-from symtop.methods.plan import Plan
-from symtop.methods.registry import rows
-from symtop.methods.space import on_axis
+from symtop.methods.framework import loop as loops
+from symtop.methods.framework.fixed_step import FixedStep, inside
+from symtop.methods.framework.many import groups, members_of
+from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import rows
+from symtop.methods.framework.space import on_axis
+from symtop.methods.splitting import splitting_space
 from symtop.model.top import flat
 
 SCENES = ("spheroid", "grazing", "fast", "simo-wong", "kinon-betsch", "steady")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from symtop.methods.discrete_lagrangian import discrete_lagrangian
-from symtop.methods.lanes import W
-from symtop.methods.outcomes import OUTCOMES
-from symtop.methods.unreduced import built_in as unreduced
+from symtop.methods.framework.lanes import W
+from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.lagrangian.discrete_lagrangian import discrete_lagrangian
+from symtop.methods.lagrangian.unreduced import built_in as unreduced
 from symtop.model.scenes import scene
 from symtop.model.top import flat
 from tests.methods.test_lanes import SOLVERS, assert_runs_alone, left_alone, members, times_faster

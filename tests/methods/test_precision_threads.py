@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.base.multiprecision import context
-from symtop.methods import taylor
-from symtop.methods.gauss import gauss_rule
+from symtop.core.multiprecision import context
+from symtop.methods.runge_kutta.gauss import gauss_rule
+from symtop.methods.taylor import taylor
 
 pytest.importorskip("heyoka")
 SCENES = ("spheroid", "goldstein")

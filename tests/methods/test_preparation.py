@@ -9,18 +9,19 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.base.compiled import compile_kernel
-from symtop.methods import fixed_step, loop as loops, splitting_angles, splitting_space
-from symtop.methods.angles import reduced, require_chart
-from symtop.methods.coefficients import METHODS, exact_sum
-from symtop.methods.euler_lagrange import with_rates
-from symtop.methods.fixed_step import FixedStep, inside
-from symtop.methods.many import refused
-from symtop.methods.plan import Plan
-from symtop.methods.preparation import Body, Start
-from symtop.methods.space import on_attitude, on_axis, on_frame
-from symtop.methods.splitting import composition
-from symtop.methods.unreduced import with_momenta
+from symtop.core.jit import compile_kernel
+from symtop.methods.framework import fixed_step, loop as loops
+from symtop.methods.framework.angles import reduced, require_chart
+from symtop.methods.framework.euler_lagrange import with_rates
+from symtop.methods.framework.fixed_step import FixedStep, inside
+from symtop.methods.framework.many import refused
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.preparation import Body, Start
+from symtop.methods.framework.space import on_attitude, on_axis, on_frame
+from symtop.methods.lagrangian.unreduced import with_momenta
+from symtop.methods.splitting import splitting_angles, splitting_space
+from symtop.methods.splitting.coefficients import METHODS, exact_sum
+from symtop.methods.splitting.splitting import composition
 from symtop.model.top import Angles, SymmetricTop, flat
 
 PREPARATIONS = [reduced, with_rates, with_momenta, on_axis, on_attitude, on_frame]

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.base.validate import SymtopError
-from symtop.methods import gauss, registry
-from symtop.methods.registry import Integrator, integrator
+from symtop.core.errors import SymtopError
+from symtop.methods.framework import registry
+from symtop.methods.framework.registry import Integrator, integrator
+from symtop.methods.runge_kutta import gauss
 
 
 def test_the_registry_is_a_dict_that_a_notebook_shows_as_a_table():

@@ -12,10 +12,10 @@ from symtop.measure.accuracy import error_table
 from symtop.measure.conservation import trend
 from symtop.measure.order import power_law
 from symtop.measure.step_map import one_step, return_miss, step_map, symplectic_defect
-from symtop.methods import reversible_steps
-from symtop.methods.angles import reduced
-from symtop.methods.plan import Plan
-from symtop.methods.reversible_steps import Reversible
+from symtop.methods.framework.angles import reduced
+from symtop.methods.framework.plan import Plan
+from symtop.methods.splitting import reversible_steps
+from symtop.methods.splitting.reversible_steps import Reversible
 from symtop.model import charts
 from symtop.model.effective import effective_force, effective_potential
 from symtop.model.scenes import closed_form, grazing

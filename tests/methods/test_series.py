@@ -9,15 +9,15 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 import symtop
-from symtop.base.registers import Components, Vectors
-from symtop.base.validate import SymtopError
-from symtop.methods.attitude_series import attitude_sum
-from symtop.methods.axis_series import axis_sum
-from symtop.methods.plan import Plan
-from symtop.methods.series import series
-from symtop.methods.series_steps import ORDERS, order_for
+from symtop.core.errors import SymtopError
+from symtop.core.simd import Components, Vectors
+from symtop.methods.framework.plan import Plan
+from symtop.methods.taylor.attitude_series import attitude_sum
+from symtop.methods.taylor.axis_series import axis_sum
+from symtop.methods.taylor.series import series
+from symtop.methods.taylor.series_steps import ORDERS, order_for
 from symtop.model import charts
-from symtop.model.closed_form import ClosedForm
+from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import closed_form
 
 CHARTS = ("axis", "attitude")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.methods.gauss import STAGES, gauss_rule, march_axis, march_frame
-from symtop.methods.space import field_axis, field_frame, frame_to_attitude, on_axis, on_frame
+from symtop.methods.framework.space import field_axis, field_frame, frame_to_attitude, on_axis, on_frame
+from symtop.methods.runge_kutta.gauss import STAGES, gauss_rule, march_axis, march_frame
 from symtop.model import charts
 
 ONE = np.array([1])

@@ -7,10 +7,10 @@ from symtop_studies.reduction.tables import Column, unreduced_cost, unreduced_fo
 import symtop
 from symtop.measure.conservation import trend
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
-from symtop.methods import unreduced as kernel
-from symtop.methods.loop import driver
-from symtop.methods.quadrature import RULES, Quadrature
-from symtop.methods.unreduced import march, unreduced, with_momenta
+from symtop.methods.framework.loop import driver
+from symtop.methods.lagrangian import unreduced as kernel
+from symtop.methods.lagrangian.quadrature import RULES, Quadrature
+from symtop.methods.lagrangian.unreduced import march, unreduced, with_momenta
 from tests.conftest import random_scenes
 from tests.methods.test_integrators import fitted
 

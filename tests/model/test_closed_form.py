@@ -13,8 +13,8 @@ import symtop
 from benchmarks import accuracy
 from benchmarks.accuracy import LIMITS, deviation, short
 from benchmarks.families import REGIMES, tops
-from symtop.base.validate import SymtopError
-from symtop.model import (
+from symtop.core.errors import SymtopError
+from symtop.model.exact import (
     closed_form,
     half_angles,
     motion_constants,
@@ -25,12 +25,12 @@ from symtop.model import (
     theta_functions,
     turning_points,
 )
-from symtop.model.closed_form import ClosedForm
-from symtop.model.precise_constants import precise_constants
-from symtop.model.precise_form import PreciseForm
+from symtop.model.exact.closed_form import ClosedForm
+from symtop.model.exact.precise_constants import precise_constants
+from symtop.model.exact.precise_form import PreciseForm
 from symtop.model.scenes import grazing, scene, sleeping
 from symtop.model.top import Angles, SymmetricTop, flat
-from symtop.run.bounds import ROUNDING
+from symtop.run.reference.bounds import ROUNDING
 
 EPS = float(np.finfo(float).eps)
 SEPARATRIX = SymmetricTop(1.0, 0.5, -1.0), Angles(0.0, theta_dot=2.0)

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from benchmarks.families import tops
-from symtop.base.lazy import LazyKernel
-from symtop.base.validate import SymtopError
-from symtop.methods import exact
-from symtop.methods.plan import Plan
-from symtop.model import charts, closed_form
-from symtop.model.closed_form import ClosedForm
-from symtop.model.closed_forms import NUMBERS, ClosedForms
+from symtop.core.errors import SymtopError
+from symtop.core.lazy_kernel import LazyKernel
+from symtop.methods.framework.plan import Plan
+from symtop.methods.library import exact
+from symtop.model import charts
+from symtop.model.exact import closed_form
+from symtop.model.exact.closed_form import ClosedForm
+from symtop.model.exact.closed_forms import NUMBERS, ClosedForms
 from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.model.view import space_momenta
 from tests.model.test_closed_form import SEPARATRIX

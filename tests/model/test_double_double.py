@@ -7,8 +7,8 @@ from fractions import Fraction
 import mpmath as mp
 import pytest
 
-from symtop.base.parts import two_product
-from symtop.model import double_double as dd, elementary, quad_double as qd
+from symtop.core.jit_functions import two_product
+from symtop.model.exact import double_double as dd, elementary, quad_double as qd
 
 UNIT = 2.0**-106
 

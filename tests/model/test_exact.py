@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from benchmarks.families import REGIMES, random_top
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.model.charts import (
     attitude_distance,
     axis_from_angles,
@@ -21,8 +21,8 @@ from symtop.model.charts import (
     quaternion_from_angles,
     space_state,
 )
-from symtop.model.closed_form import ClosedForm
-from symtop.model.precise_form import PreciseForm
+from symtop.model.exact.closed_form import ClosedForm
+from symtop.model.exact.precise_form import PreciseForm
 from symtop.model.top import Angles, SymmetricTop
 from tests.model.theta_functions import theta_quaternion
 
@@ -492,7 +492,8 @@ def test_working_precision_of_the_caller_does_not_matter():
 
 
 def test_importing_the_module_does_not_import_slow_libraries():
-    code = "import sys, symtop.model.closed_form; print(*({'mpmath', 'scipy', 'numba', 'heyoka'} & set(sys.modules)))"
+    slow = "{'mpmath', 'scipy', 'numba', 'heyoka'}"
+    code = f"import sys, symtop.model.exact.closed_form; print(*({slow} & set(sys.modules)))"
     root = Path(__file__).parents[2]
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
     assert found.stdout.strip() == ""

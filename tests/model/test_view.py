@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.methods.calling import solve
-from symtop.methods.plan import Plan
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan
 from symtop.model.charts import CHARTS, DIMENSIONS
 from symtop.model.view import View, axis_of, space_momenta
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 
 TOP, START = symtop.scene("spheroid").top, symtop.scene("spheroid").start
 

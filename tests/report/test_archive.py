@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.base import datasets
-from symtop.base.validate import SymtopError
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError
 from symtop.report import archive, style
 from symtop.runner import conclude, store
 from symtop.runner.study import Case, Picture, Study, Table
@@ -42,8 +42,8 @@ def results(tmp_path_factory):
     """A results folder with one small study, a case, a figure that nothing shows and a file of somebody else's."""
     folder = tmp_path_factory.mktemp("bundled") / "results"
     (case,) = STUDY.cases(True)
-    data = datasets.describe(store.combine([(case, STUDY.measure(case))]), "Small", question=STUDY.question)
-    datasets.write(data, folder / "small.nc")
+    data = netcdf.describe(store.combine([(case, STUDY.measure(case))]), "Small", question=STUDY.question)
+    netcdf.write(data, folder / "small.nc")
     found = conclude.findings_of(STUDY, data, folder, style.save, failures=[], cases=1)
     store.write_json(folder / "peers.json", found | {"study": "peers", "measured": "once"})
     (folder / "cases" / "small").mkdir(parents=True)
@@ -82,7 +82,7 @@ def test_the_readme_names_every_file_and_describes_every_variable(bundled):
     assert "| x | scene (1) x integrator (1) x step_size (2) | rad | a number |" in readme
     states = readme.partition("### scenes/states.nc")[2]
     assert re.findall(r"\| theta_lo \| scene \(\d+\) x sample \(10\) \| rad \| \S", states)
-    assert datasets.provenance()["symtop_revision"] in readme
+    assert netcdf.provenance()["symtop_revision"] in readme
     assert max(map(len, archive.INTRODUCTION.splitlines())) <= 120
 
 
@@ -93,7 +93,7 @@ def test_versions_and_machine_are_told(bundled):
 
 def test_the_states_can_be_read_from_the_bundle(bundled, tmp_path):
     (tmp_path / "states.nc").write_bytes(bundled["scenes/states.nc"])
-    states = datasets.read(tmp_path / "states.nc")
+    states = netcdf.read(tmp_path / "states.nc")
     assert list(states["scene"].values) == list(symtop.scenes())
     assert states["quaternion_lo"].dims == ("scene", "sample", "part")
 

@@ -6,9 +6,9 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import symtop
+from symtop.judging.findings import Finding
 from symtop.judging.judge_step import Judged
-from symtop.judging.ledger import Finding
-from symtop.judging.watched import About
+from symtop.judging.sandbox import About
 from symtop.report.card import badge, card, figures, write_badge
 
 

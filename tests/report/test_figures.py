@@ -9,7 +9,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 
 import symtop
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.report import figures, style
 from symtop.runner import run as runner
 
@@ -53,7 +53,7 @@ def faults(name, figure) -> list[str]:
 
 @pytest.mark.parametrize("name", runner.names())
 def test_every_figure_can_be_read_in_print(name, quick_results):
-    data = datasets.read_any(quick_results / f"{name}.nc")
+    data = netcdf.read_any(quick_results / f"{name}.nc")
     drawn = [one for one in runner.load(name).pictures(data) if not hasattr(one.figure, "suffix")]
     assert drawn
     assert {one.name: faults(name, one.figure) for one in drawn} == {one.name: [] for one in drawn}

@@ -4,7 +4,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.report import method
 from symtop.report.mathml import mathml
 

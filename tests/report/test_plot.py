@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.methods.registry import split_name
+from symtop.methods.framework.registry import split_name
 from symtop.report import markdown, page, style
 from symtop.runner import run as runner
 from symtop.runner.study import Case, Table

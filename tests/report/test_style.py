@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 import symtop
-from symtop.methods import registry
+from symtop.methods.framework import registry
 from symtop.report import style
 
 

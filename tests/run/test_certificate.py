@@ -8,14 +8,15 @@ import pytest
 
 import symtop
 from benchmarks.families import tops
-from symtop.model import charts, closed_form as forms, motion_layout as at
-from symtop.model.closed_form import ClosedForm
+from symtop.model import charts
+from symtop.model.exact import closed_form as forms, motion_layout as at
+from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import Scene, closed_form, scene, scenes
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run import bounds as bounds_module, certificate as module
-from symtop.run.bounds import ROUNDING, SUSPICIOUS, closed_bounds, closed_values, disagreement
-from symtop.run.certificate import Certificate, certificate
-from symtop.run.witnesses import MAP_STEPS, iterated, iterated_with_error
+from symtop.run.reference import bounds as bounds_module, certificate as module
+from symtop.run.reference.bounds import ROUNDING, SUSPICIOUS, closed_bounds, closed_values, disagreement
+from symtop.run.reference.certificate import Certificate, certificate
+from symtop.run.reference.independent_checks import MAP_STEPS, iterated, iterated_with_error
 
 TIMES = np.array([0.3, 17.0, 1e3, 1e6])
 
@@ -105,7 +106,7 @@ def test_a_certificate_shows_a_form_that_is_wrong(cache, monkeypatch):
     honest = closed_form(where)
     wrong = ClosedForm(where.top, where.start)
     wrong._constants[at.QUARTERS] *= 1.0 + 4e-16
-    for holder in (bounds_module, module, sys.modules["symtop.run.witnesses"]):
+    for holder in (bounds_module, module, sys.modules["symtop.run.reference.independent_checks"]):
         monkeypatch.setattr(holder, "closed_form", lambda _: wrong)
     made = certificate(where, "integration")
     assert made.share > 1e3

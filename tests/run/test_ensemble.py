@@ -7,11 +7,11 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.methods.lanes import W
-from symtop.methods.many import members_of
-from symtop.model.closed_forms import NUMBERS, ClosedForms
-from symtop.run import pieces
-from symtop.run.schedule import nutation_periods, schedule
+from symtop.methods.framework.lanes import W
+from symtop.methods.framework.many import members_of
+from symtop.model.exact.closed_forms import NUMBERS, ClosedForms
+from symtop.run.ensemble import chunks
+from symtop.run.sampling import nutation_periods, schedule
 from symtop.run.simulation import sample_times
 
 SOME = symtop.population(36, seed=5)
@@ -70,7 +70,7 @@ def test_methods_that_choose_their_steps_run_as_well(name, setting, asked):
     some = SOME.isel(member=slice(0, 8))
     data = symtop.ensemble(some, name, nutations=2.7, samples=20, quiet=True, **setting, **asked)
     assert_alone(some, name, data, 20, **(setting or {"tolerance": None}))
-    assert data.attrs["execution"] == (pieces.IN_PYTHON if name == "rk45" else pieces.IN_TURN)
+    assert data.attrs["execution"] == (chunks.IN_PYTHON if name == "rk45" else chunks.IN_TURN)
 
 
 @pytest.mark.slow
@@ -89,9 +89,9 @@ def test_every_method_runs_and_every_member_is_the_run_of_simulate():
 def test_threads_and_pieces_change_nothing(monkeypatch):
     asked = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
     one = symtop.ensemble(SOME, "strang[axis]", threads=1, **asked)
-    monkeypatch.setattr(pieces, "PIECE", 21 * 5)
+    monkeypatch.setattr(chunks, "PIECE", 21 * 5)
     assert symtop.ensemble(SOME, "strang[axis]", threads=3, **asked).identical(one)
-    monkeypatch.setattr(pieces, "PIECE_STEPS", 100)
+    monkeypatch.setattr(chunks, "PIECE_STEPS", 100)
     assert symtop.ensemble(SOME, "strang[axis]", threads=2, **asked).identical(one)
 
 
@@ -104,7 +104,7 @@ def test_pieces_are_shares_of_the_work_and_whole_blocks(n, steps, most):
     """What is worth more than a millisecond is shared evenly; a few short runs stay in one piece."""
     counts = None if steps is None else np.broadcast_to(steps, n)
     method = symtop.integrator("strang" if steps is not None else "rk45-compiled").row("axis")
-    job = pieces.Job(method, "axis", np.zeros((n, 9)), np.ones(n), counts, None, 11, None, ("axis",))
+    job = chunks.Job(method, "axis", np.zeros((n, 9)), np.ones(n), counts, None, 11, None, ("axis",))
     cut = list(job.pieces())
     assert [piece.start for piece in cut] == [0, *(piece.stop for piece in cut[:-1])]
     assert cut[-1].stop == n
@@ -266,7 +266,7 @@ def test_a_rule_of_python_runs_its_members_by_calls_of_python():
     )
     asked = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
     one, other = (symtop.ensemble(SOME, method, **asked) for method in (strang, python))
-    assert (one.attrs["execution"], other.attrs["execution"]) == (pieces.IN_LANES, pieces.IN_PYTHON)
+    assert (one.attrs["execution"], other.attrs["execution"]) == (chunks.IN_LANES, chunks.IN_PYTHON)
     xr.testing.assert_identical(one.drop_attrs(), other.drop_attrs())
 
 
@@ -277,14 +277,14 @@ def test_the_dataset_says_which_members_ran_side_by_side():
     without = dataclasses.replace(strang, name="strang-in-turn[axis]", solvers={"axis": in_turn})
     asked = {"per_nutation": 20, "nutations": 2, "quiet": True}
     one, other = (symtop.ensemble(SOME, method, **asked) for method in (strang, without))
-    assert (one.attrs["execution"], other.attrs["execution"]) == (pieces.IN_LANES, pieces.IN_TURN)
+    assert (one.attrs["execution"], other.attrs["execution"]) == (chunks.IN_LANES, chunks.IN_TURN)
     xr.testing.assert_identical(one.drop_attrs(), other.drop_attrs())
 
 
 def test_variables_are_those_of_all_and_need_no_closed_form(monkeypatch):
     asked = {"per_nutation": 20, "nutations": 3, "quiet": True}
     wanted = symtop.ensemble(SOME, "strang[attitude]", **asked)
-    monkeypatch.setattr(pieces, "ClosedForms", None)
+    monkeypatch.setattr(chunks, "ClosedForms", None)
     data = symtop.ensemble(SOME, "strang[attitude]", variables=("energy", "axis"), **asked)
     assert [name for name in data if "time" in data[name].dims] == ["axis", "energy"]
     xr.testing.assert_identical(data.axis, wanted.axis)
@@ -317,7 +317,7 @@ def test_numbers_that_leave_the_range_fail_alone():
 
 @pytest.mark.parametrize("path", [None, "runs.nc"])
 def test_a_member_on_which_a_solver_raises_is_lost_alone_and_told(path, tmp_path, monkeypatch):
-    monkeypatch.setattr(pieces, "PIECE", 21 * 5)
+    monkeypatch.setattr(chunks, "PIECE", 21 * 5)
     more = {} if path is None else {"path": tmp_path / path}
     asked = {"step_size": 0.1, "horizon": 2.0, "samples": 21, "quiet": True, **more}
     one = symtop.ensemble(SOME, "rk4[axis]", **asked).load()

@@ -11,13 +11,13 @@ from regimes import trial
 
 import symtop
 from symtop.measure.timing import timings
-from symtop.methods.registry import methods
+from symtop.methods.framework.registry import methods
 from symtop.model import charts
 from symtop.model.readings import axes
 from symtop.model.scenes import closed_form, grazing, steady
-from symtop.run import forecast, guard
-from symtop.run.forecast import Probe, grown, landmarks
-from symtop.run.guard import EXPECTED
+from symtop.run.guard import forecast, guard
+from symtop.run.guard.forecast import Probe, grown, landmarks
+from symtop.run.guard.guard import EXPECTED
 from symtop.run.linear_stability import trace
 from symtop.run.simulation import make_plan
 

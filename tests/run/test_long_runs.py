@@ -17,10 +17,10 @@ from numba import njit
 from symtop_studies.drift.long_runs import members, rounding
 
 import symtop
-from symtop.base.fused import fused
-from symtop.base.validate import SymtopError
 from symtop.cli.main import main
-from symtop.methods import loop as drive
+from symtop.core.errors import SymtopError
+from symtop.core.jit import fused
+from symtop.methods.framework import loop as drive
 from symtop.run import long_run as longrun
 from symtop.run.long_run import chart_of, leaves, long_run, regrown, scattered, windows
 
@@ -131,9 +131,9 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
             child.kill()  # it is waited for even if the machine was too slow for the minute
     assert code == (-signal.SIGKILL if blow == signal.SIGKILL else 128 + signal.SIGTERM)
     monkeypatch.setattr(longrun, "LONGEST", 200_000)
-    from symtop.base import datasets
+    from symtop.core import netcdf
 
-    reached = datasets.read(file)["steps_done"].item()
+    reached = netcdf.read(file)["steps_done"].item()
     assert 10_000 <= reached < 12_000_000
     steps = 12_000_000
     seen = []

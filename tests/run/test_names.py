@@ -7,10 +7,10 @@ import pytest
 
 import symtop
 from symtop.judging.claims import judge
-from symtop.methods import registry
-from symtop.methods.discrete_lagrangian import is_midpoint
-from symtop.methods.galerkin import is_galerkin
-from symtop.run.forecast import forecast
+from symtop.methods.framework import registry
+from symtop.methods.lagrangian.discrete_lagrangian import is_midpoint
+from symtop.methods.lagrangian.galerkin import is_galerkin
+from symtop.run.guard.forecast import forecast
 from symtop.run.linear_stability import linear_limits, sleeping_threshold
 from symtop.run.long_run import long_run
 from symtop.run.modified_energy import modified_energy

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.methods.calling import solve
-from symtop.methods.plan import Plan
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan
 
 SCENE = symtop.scene("spheroid")
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.methods.calling import solve
-from symtop.run import forecast
+from symtop.methods.framework.calling import solve
+from symtop.run.guard import forecast
 from symtop.run.simulation import make_plan
 
 WHERE = symtop.scene("spheroid")

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.base.datasets import content_hash
-from symtop.model.closed_forms import NUMBERS, ClosedForms
-from symtop.run import population as populations
-from symtop.run.population import STRATA, population, sine_cosine
+from symtop.core.netcdf import content_hash
+from symtop.model.exact.closed_forms import NUMBERS, ClosedForms
+from symtop.run.ensemble import population as populations
+from symtop.run.ensemble.population import STRATA, population, sine_cosine
 
 COUNT = 3000
 HASH = "8afda6e1ae62a77eabc29ef01ffbbb0c0777d931e63e1ed78ae8aed761d678b2"  # of 1000 members of seed 1

@@ -14,11 +14,12 @@ import pytest
 from mpmath import mp, mpf, workdps
 
 import symtop
-from symtop.model import charts, closed_form
-from symtop.model.precise_form import PreciseForm
-from symtop.run.certificate import Certificate
-from symtop.run.reference import UNCERTIFIED, _cache_path, reference as reference_function
-from symtop.run.witnesses import check_times, flown, integrate, precise_attitude
+from symtop.model import charts
+from symtop.model.exact import closed_form
+from symtop.model.exact.precise_form import PreciseForm
+from symtop.run.reference.certificate import Certificate
+from symtop.run.reference.independent_checks import check_times, flown, integrate, precise_attitude
+from symtop.run.reference.truth import UNCERTIFIED, _cache_path, reference as reference_function
 
 
 @pytest.fixture
@@ -120,7 +121,7 @@ def test_a_bound_that_is_too_small_would_be_seen():
 
 
 def test_an_integration_that_differs_from_the_closed_form_has_the_distance_as_its_bound(monkeypatch):
-    module = sys.modules["symtop.run.reference"]
+    module = sys.modules["symtop.run.reference.truth"]
     where, times = symtop.scene("goldstein"), np.array([1.0, 2.0, 3.0])
     honest = module.closed_values
 
@@ -146,7 +147,7 @@ def test_the_times_at_which_an_integration_is_read_change_no_bit():
 
 def test_a_certificate_that_contradicts_the_bounds_raises_them(monkeypatch, cache):
     """One of a witness that is 1e-6 away, one of an error three times its bound, and one that finds nothing."""
-    module, times = sys.modules["symtop.run.reference"], [1.0, 2.0, 3.0]
+    module, times = sys.modules["symtop.run.reference.truth"], [1.0, 2.0, 3.0]
     quantities = ("axis", "attitude", "theta", "phi", "psi")
     plain = symtop.reference("goldstein", times)
     for found, floor, factor in (

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.run import scene_states
-from symtop.run.scene_states import ANGLES, COLUMNS, DIGITS, TIMES
+from symtop.run.reference import scene_states
+from symtop.run.reference.scene_states import ANGLES, COLUMNS, DIGITS, TIMES
 
 THEIRS = dict(zip(ANGLES, ("theta", "phi", "psi", "thetadot", "phidot", "psidot"), strict=True))
 

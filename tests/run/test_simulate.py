@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.base import datasets, over_time
-from symtop.base.numbers import GOLDEN
+from symtop.core import netcdf, over_time
+from symtop.core.numbers import GOLDEN
 from symtop.run.simulation import WIDEST_GAP, sample_times
 
 
@@ -131,17 +131,17 @@ def test_the_dataset_is_the_one_of_xarray_itself(scene, row, monkeypatch):
 
 def test_files_are_whole_reproducible_and_readable(tmp_path):
     run = symtop.simulate("spheroid", "stormer-verlet", step_size=0.01)
-    first = datasets.write(run, tmp_path / "a" / "run.nc")
-    second = datasets.write(symtop.simulate("spheroid", "stormer-verlet", step_size=0.01), tmp_path / "b.nc")
+    first = netcdf.write(run, tmp_path / "a" / "run.nc")
+    second = netcdf.write(symtop.simulate("spheroid", "stormer-verlet", step_size=0.01), tmp_path / "b.nc")
     assert first.read_bytes() == second.read_bytes()
-    back = datasets.read(first)
+    back = netcdf.read(first)
     assert back.identical(run)
     assert sorted(path.name for path in tmp_path.rglob("*") if path.is_file()) == ["b.nc", "run.nc"]
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_scraps(tmp_path, monkeypatch):
     run = symtop.simulate("spheroid", "stormer-verlet", step_size=0.01)
-    path = datasets.write(run, tmp_path / "run.nc")
+    path = netcdf.write(run, tmp_path / "run.nc")
     before = path.read_bytes()
 
     def full(*_args, **_kwargs):
@@ -149,7 +149,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_scraps(tmp_path, monkeypatch)
 
     monkeypatch.setattr(type(run), "to_netcdf", full)
     with pytest.raises(symtop.SymtopError, match="No space left"):
-        datasets.write(run, path)
+        netcdf.write(run, path)
     assert path.read_bytes() == before
     assert [item.name for item in tmp_path.iterdir()] == ["run.nc"]
 
@@ -158,9 +158,9 @@ def test_damaged_and_foreign_files_are_refused_in_one_sentence(tmp_path):
     path = tmp_path / "noise.nc"
     path.write_bytes(b"not a dataset")
     with pytest.raises(symtop.SymtopError, match="cannot read"):
-        datasets.read(path)
+        netcdf.read(path)
     with pytest.raises(symtop.SymtopError, match="it is a folder"):
-        datasets.write(symtop.simulate("spheroid", "taylor", samples=3), tmp_path)
+        netcdf.write(symtop.simulate("spheroid", "taylor", samples=3), tmp_path)
 
 
 GOOD = {"scene": "spheroid", "integrator": "midpoint", "step_size": 0.01}

@@ -5,9 +5,9 @@ import pytest
 
 import symtop
 from symtop.measure.timing import bare_run, timings
-from symtop.methods.plan import Plan
+from symtop.methods.framework.plan import Plan
 from symtop.model.scenes import closed_form
-from symtop.run.forecast import forecast
+from symtop.run.guard.forecast import forecast
 from symtop.run.simulation import make_plan
 
 STEPS = 20_000
@@ -72,7 +72,7 @@ def test_a_run_of_one_step_costs_less_than_a_hundred_and_fifty_steps():
 
 def test_memory_and_results_do_not_depend_on_how_the_steps_are_batched(monkeypatch):
     """A run that returns to Python every few steps gives the same bits as one that does not."""
-    from symtop.methods import loop as drive
+    from symtop.methods.framework import loop as drive
 
     chosen = symtop.scene("spheroid")
     whole = symtop.simulate(chosen, "midpoint", step_size=0.01, samples=11, guard=False)

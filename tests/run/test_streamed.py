@@ -13,8 +13,8 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.base import locks
-from symtop.run import ensemble as ensembles, pieces, streamed
+from symtop.core import files
+from symtop.run.ensemble import chunked_output, chunks, ensemble as ensembles
 
 SOME = symtop.population(60, seed=5)
 ASKED = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
@@ -29,7 +29,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 @pytest.fixture
 def small_pieces(monkeypatch):
-    monkeypatch.setattr(pieces, "PIECE", 21 * 7)
+    monkeypatch.setattr(chunks, "PIECE", 21 * 7)
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_times_of_runs_of_few_steps_are_a_row_in_the_file_as_well(tmp_path, smal
 def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_path, small_pieces, monkeypatch, threads):
     calm, path = tmp_path / "calm.nc", tmp_path / "runs.nc"
     symtop.ensemble(SOME, "strang[axis]", path=calm, **ASKED).close()
-    made, keep = [], streamed.Stream.keep
+    made, keep = [], chunked_output.Stream.keep
 
     def interrupted(stream, piece, columns):
         if len(made) == 4:
@@ -72,7 +72,7 @@ def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_pa
         made.append(piece.start)
         keep(stream, piece, columns)
 
-    monkeypatch.setattr(streamed.Stream, "keep", interrupted)
+    monkeypatch.setattr(chunked_output.Stream, "keep", interrupted)
     with pytest.raises(KeyboardInterrupt):
         symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **ASKED)
     assert {file.name for file in (tmp_path / "runs.nc.parts").glob("*.npz")} == {
@@ -80,7 +80,7 @@ def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_pa
     }
     assert not path.exists()
     again = []
-    monkeypatch.setattr(streamed.Stream, "keep", lambda *given: again.append(given[1].start) or keep(*given))
+    monkeypatch.setattr(chunked_output.Stream, "keep", lambda *given: again.append(given[1].start) or keep(*given))
     symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **ASKED).close()
     assert (made, again) == ([0, 7, 14, 21], [28, 35, 42, 49, 56])
     assert path.read_bytes() == calm.read_bytes()
@@ -88,7 +88,7 @@ def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_pa
 
 def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_path, small_pieces, monkeypatch):
     path, folder = tmp_path / "runs.nc", tmp_path / "runs.nc.parts"
-    monkeypatch.setattr(streamed.Stream, "finish", lambda *_: xr.Dataset())
+    monkeypatch.setattr(chunked_output.Stream, "finish", lambda *_: xr.Dataset())
     symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
     for changed in ({"samples": 20}, {"per_nutation": 21}, {"variables": ["axis"]}):
         with pytest.raises(symtop.SymtopError, match="beginning of another ensemble"):
@@ -96,7 +96,7 @@ def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_p
     with pytest.raises(symtop.SymtopError, match="beginning of another ensemble"):
         symtop.ensemble(SOME, "cayley[axis]", path=path, **ASKED)
     monkeypatch.undo()
-    monkeypatch.setattr(pieces, "PIECE", 21 * 7)
+    monkeypatch.setattr(chunks, "PIECE", 21 * 7)
     (folder / "7-14.npz").write_bytes((folder / "7-14.npz").read_bytes()[:-300])
     with pytest.raises(symtop.SymtopError, match=r"7-14.npz is damaged .*: remove it"):
         symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
@@ -106,7 +106,7 @@ def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_p
 
 
 def test_what_a_process_has_computed_before_does_not_make_it_another_ensemble(tmp_path, monkeypatch):
-    monkeypatch.setattr(streamed.Stream, "finish", lambda *_: xr.Dataset())
+    monkeypatch.setattr(chunked_output.Stream, "finish", lambda *_: xr.Dataset())
     for name in ("strang[attitude]", "gauss-4[axis]", "rk45-compiled[axis]"):
         asked = {"nutations": 2, "samples": 11, "quiet": True}
         asked |= {"tolerance": 1e-6} if name.startswith("rk45") else {"per_nutation": 20}
@@ -118,7 +118,7 @@ def test_what_a_process_has_computed_before_does_not_make_it_another_ensemble(tm
 
 def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch):
     """A second one on the same path is told so in a sentence; another path, and the same one later, are free."""
-    path, keep, told = tmp_path / "runs.nc", streamed.Stream.keep, []
+    path, keep, told = tmp_path / "runs.nc", chunked_output.Stream.keep, []
     second = f"import symtop; symtop.ensemble(symtop.population(2, seed=5), 'strang', path={str(path)!r}, **{ASKED})"
 
     def disturbed(stream, piece, columns):
@@ -128,7 +128,7 @@ def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch
             symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "other.nc", **ASKED).close()
         keep(stream, piece, columns)
 
-    monkeypatch.setattr(streamed.Stream, "keep", disturbed)
+    monkeypatch.setattr(chunked_output.Stream, "keep", disturbed)
     with symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED) as data:
         assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **ASKED))
     assert [code for code, _ in told] == [1]
@@ -137,17 +137,17 @@ def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch
 
 
 def test_a_piece_that_was_removed_is_not_called_damaged(tmp_path, small_pieces, monkeypatch):
-    path, finish = tmp_path / "runs.nc", streamed.Stream.finish
+    path, finish = tmp_path / "runs.nc", chunked_output.Stream.finish
 
     def robbed(stream, some):
         (tmp_path / "runs.nc.parts" / "7-14.npz").unlink()
         return finish(stream, some)
 
-    monkeypatch.setattr(streamed.Stream, "finish", robbed)
+    monkeypatch.setattr(chunked_output.Stream, "finish", robbed)
     with pytest.raises(symtop.SymtopError, match=r"7-14.npz is not there any more, so somebody has removed it"):
         symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
     monkeypatch.undo()
-    monkeypatch.setattr(pieces, "PIECE", 21 * 7)
+    monkeypatch.setattr(chunks, "PIECE", 21 * 7)
     with symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED) as data:
         assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **ASKED))
 
@@ -166,7 +166,7 @@ def test_pieces_that_do_not_say_whose_they_are_belong_to_nobody(tmp_path, small_
     with pytest.raises(KeyboardInterrupt):
         symtop.ensemble(SOME, "strang[axis]", **asked)
     monkeypatch.undo()
-    monkeypatch.setattr(pieces, "PIECE", 21 * 7)
+    monkeypatch.setattr(chunks, "PIECE", 21 * 7)
     others = symtop.population(60, seed=6)
     with pytest.raises(symtop.SymtopError, match="holds the beginning of another ensemble"):
         symtop.ensemble(others, "strang[axis]", **asked)
@@ -205,14 +205,14 @@ def test_what_a_killed_writer_left_is_swept_and_a_library_without_room_says_so(t
     def no_room(*_):
         raise full
 
-    monkeypatch.setattr(streamed, "_lay_out", no_room)
+    monkeypatch.setattr(chunked_output, "_lay_out", no_room)
     with pytest.raises(symtop.SymtopError, match="is the disk full"):
         symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
     assert not left.exists()
     assert {file.name for file in tmp_path.iterdir()} == {"runs.nc.parts"}
     monkeypatch.undo()
-    monkeypatch.setattr(pieces, "PIECE", 21 * 7)
-    monkeypatch.setattr(pieces.Job, "columns", no_room)  # nothing is left to be computed
+    monkeypatch.setattr(chunks, "PIECE", 21 * 7)
+    monkeypatch.setattr(chunks.Job, "columns", no_room)  # nothing is left to be computed
     symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED).close()
     assert path.exists()
 
@@ -220,7 +220,7 @@ def test_what_a_killed_writer_left_is_swept_and_a_library_without_room_says_so(t
 def test_a_file_system_without_locks_is_written_to(tmp_path, monkeypatch):
     for number, fails in ((errno.ENOLCK, False), (errno.EIO, True)):
         monkeypatch.setattr(
-            locks.fcntl, "flock", lambda *_, number=number: (_ for _ in ()).throw(OSError(number, "no"))
+            files.fcntl, "flock", lambda *_, number=number: (_ for _ in ()).throw(OSError(number, "no"))
         )
         with pytest.raises(OSError, match="no") if fails else contextlib.nullcontext():
             symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "runs.nc", **ASKED).close()

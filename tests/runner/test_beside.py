@@ -11,9 +11,9 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 
-from symtop.base import locks
-from symtop.base.validate import SymtopError
 from symtop.cli.main import main
+from symtop.core import files
+from symtop.core.errors import SymtopError
 from symtop.runner import run as runner, store
 from symtop.runner.pools import Workers
 from tests.commands import contents, leftovers
@@ -21,7 +21,7 @@ from tests.commands import contents, leftovers
 SCRIPT = """
 import os, signal
 import xarray as xr
-from symtop.base.validate import SymtopError
+from symtop.core.errors import SymtopError
 from symtop.runner.study import Case, Study
 
 def cases(quick):
@@ -262,7 +262,7 @@ def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
     others = [tmp_path / name for name in (".other.nc.x.part", "figures/.other-a.png.z.part.png")]
     for file in (*left, *others):
         file.touch()
-    with locks.locked(tmp_path / "first.nc", wait=True):
+    with files.locked(tmp_path / "first.nc", wait=True):
         store.tidy(tmp_path, study)
         assert all(file.is_file() for file in left)  # somebody writes them
     store.tidy(tmp_path, study)
@@ -278,7 +278,7 @@ def test_a_study_that_says_nothing_is_told_when_it_is_asked(script, tmp_path):
 
 
 def test_the_process_beside_compiles_the_closed_form_for_all():
-    compiled = "__import__('symtop.model.closed_form', fromlist=['_'])._build.compiled is not None"
+    compiled = "__import__('symtop.model.exact.closed_form', fromlist=['_'])._build.compiled is not None"
     with Workers(2) as workers:
         assert not workers.beside(eval, compiled).result()
     with Workers(2) as workers:

@@ -8,11 +8,11 @@ import time
 import pytest
 from click.testing import CliRunner
 
-from symtop.base.validate import SymtopError
 from symtop.cli.main import main
-from symtop.run import pieces
-from symtop.run.ensemble import ensemble
-from symtop.run.population import population
+from symtop.core.errors import SymtopError
+from symtop.run.ensemble import chunks
+from symtop.run.ensemble.ensemble import ensemble
+from symtop.run.ensemble.population import population
 from symtop.runner import run as runner
 from symtop.runner.pools import Workers
 from tests.commands import PROBE, contents, ended, leftovers, symtop
@@ -96,7 +96,7 @@ def test_a_case_that_fails_there_is_recorded_here(cluster, tmp_path):
 
 def test_an_ensemble_computed_there_is_the_one_computed_here(cluster, tmp_path, monkeypatch):
     members, asked = population(90, seed=4), {"per_nutation": 20, "nutations": 2, "samples": 11, "quiet": True}
-    monkeypatch.setattr(pieces, "PIECE", 11 * 20)
+    monkeypatch.setattr(chunks, "PIECE", 11 * 20)
     for name in ("strang", "cayley-tuned[axis]"):
         here = ensemble(members, name, **asked)
         assert ensemble(members, name, scheduler=cluster.scheduler_address, **asked).identical(here)
@@ -107,7 +107,7 @@ def test_an_ensemble_computed_there_is_the_one_computed_here(cluster, tmp_path, 
 
 @pytest.mark.parametrize("address", ["nowhere", "tcp://127.0.0.1:1", "ftp://x", "tcp://[::1:0"])
 def test_a_scheduler_that_is_none_is_one_sentence(address, tmp_path, monkeypatch):
-    monkeypatch.setattr("symtop.base.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("symtop.core.cluster.PATIENCE", 0.5)
     done = CliRunner().invoke(main, ["study", str(PROBE), "--results", str(tmp_path), "--scheduler", address])
     assert done.exit_code == 2, done.output
     assert "scheduler must be the address of a dask scheduler that answers and has workers" in done.output
@@ -115,7 +115,7 @@ def test_a_scheduler_that_is_none_is_one_sentence(address, tmp_path, monkeypatch
 
 
 def test_a_cluster_without_workers_is_one_sentence(monkeypatch):
-    monkeypatch.setattr("symtop.base.cluster.PATIENCE", 2)
+    monkeypatch.setattr("symtop.core.cluster.PATIENCE", 2)
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as empty,
         pytest.raises(SymtopError, match="has workers"),

@@ -13,7 +13,7 @@ from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
 from symtop.runner import plugins
 
-registry = importlib.import_module("symtop.methods.registry")
+registry = importlib.import_module("symtop.methods.framework.registry")
 scenes = importlib.import_module("symtop.model.scenes")
 EXAMPLE = Path(__file__).resolve().parents[2] / "studies" / "examples" / "my_methods.py"
 

@@ -15,9 +15,9 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 
-from symtop.base import compiled, datasets, locks
-from symtop.base.validate import SymtopError
 from symtop.cli.main import main
+from symtop.core import files, jit, netcdf
+from symtop.core.errors import SymtopError
 from symtop.runner import run as runner, store, work
 from tests.commands import PROBE, contents, ended, leftovers, stop, symtop
 from tests.kills import survive
@@ -69,7 +69,7 @@ def test_a_full_disk_in_the_words_of_the_netcdf_library(tmp_path, monkeypatch):
 
     monkeypatch.setattr(xr.Dataset, "to_netcdf", full)
     refused(tmp_path, "NetCDF: HDF error")
-    monkeypatch.setattr(datasets, "LITTLE", 1e30)
+    monkeypatch.setattr(netcdf, "LITTLE", 1e30)
     refused(tmp_path, "no room is left")
 
 
@@ -101,14 +101,14 @@ def kernel(tmp_path, monkeypatch):
     (tmp_path / "twice.py").write_text(TWICE)
     space = {"__name__": "twice", "__file__": str(tmp_path / "twice.py")}
     exec(compile(TWICE, str(tmp_path / "twice.py"), "exec"), space)
-    return lambda: compiled.compile_kernel(space["twice"])
+    return lambda: jit.compile_kernel(space["twice"])
 
 
 def test_a_full_disk_under_the_cache_of_kernels_costs_time_and_no_run(kernel, tmp_path, monkeypatch):
     def full(*arguments):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(compiled._Index, "_save_data", full)
+    monkeypatch.setattr(jit._Index, "_save_data", full)
     assert kernel()(2.0) == 4.0
     assert not list(tmp_path.rglob("*.nbc"))
     monkeypatch.undo()
@@ -180,10 +180,10 @@ def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
     before = contents(tmp_path)
     cases = sorted((tmp_path / "quick" / "cases" / "probe").glob("*.nc"))
     whole = cases[0].read_bytes()
-    values = datasets.read(cases[1])
+    values = netcdf.read(cases[1])
     cases[0].write_bytes(whole[: len(whole) // 2])
-    datasets.write(values.assign(energy=values["energy"] * (1.0 + 1e-15)), cases[1])  # readable, and not what it says
-    datasets.write(xr.Dataset({"energy": ("sample", [1.0])}), cases[2])  # somebody else's
+    netcdf.write(values.assign(energy=values["energy"] * (1.0 + 1e-15)), cases[1])  # readable, and not what it says
+    netcdf.write(xr.Dataset({"energy": ("sample", [1.0])}), cases[2])  # somebody else's
     cases[3].write_bytes(whole)  # another case's file under this name
     assert "4 of 4 cases computed" in probe(tmp_path)[1]
     after = contents(tmp_path)
@@ -208,24 +208,24 @@ def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
     order = []
 
     def wait():
-        with locks.locked(path, wait=True) as ours:
+        with files.locked(path, wait=True) as ours:
             order.append(ours)
 
-    with locks.locked(path, wait=False) as ours:
+    with files.locked(path, wait=False) as ours:
         assert ours
-        with locks.locked(path, wait=False) as second:
+        with files.locked(path, wait=False) as second:
             assert not second
         waiting = threading.Thread(target=wait)
         waiting.start()
         time.sleep(0.1)
         assert order == []
-        assert not locks.was_begun(path)  # it is being computed
+        assert not files.was_begun(path)  # it is being computed
     waiting.join(5.0)
     assert order == [True]
     assert not list(tmp_path.iterdir())
-    locks.lock_path(path).touch()  # what a killed process leaves
-    assert locks.was_begun(path)
-    with locks.locked(path, wait=False) as ours:
+    files.lock_path(path).touch()  # what a killed process leaves
+    assert files.was_begun(path)
+    with files.locked(path, wait=False) as ours:
         assert ours
 
 
@@ -254,7 +254,7 @@ def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(t
     assert code == 0, output
     (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.nc")
     case.unlink()
-    for name in (store.trace_path(case), locks.lock_path(case), case.with_name(f".{case.name}.x.part.nc")):
+    for name in (store.trace_path(case), files.lock_path(case), case.with_name(f".{case.name}.x.part.nc")):
         name.touch()
     code, output = probe(tmp_path)
     assert "1 of 4 cases computed" in output
@@ -332,7 +332,7 @@ BAD = """
 import itertools, os, time
 import numpy as np
 import symtop
-from symtop.methods.plan import Run
+from symtop.methods.framework.plan import Run
 
 def raises(top, start, plan):
     raise RuntimeError("no luck")
@@ -383,7 +383,7 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
         found = [line for line in lines if f"bad-{name} on " in line]
         assert len(found) == 2, err
         assert all(said in line for line in found), found
-    data = datasets.read(results / "probe.nc")
+    data = netcdf.read(results / "probe.nc")
     assert list(data["outcome"].sel(integrator="bad-nan").values) == ["not_finite", "not_finite"]
     good = data.drop_sel(integrator="bad-nan")
     assert set(good["outcome"].values.ravel()) == {"ok"}
@@ -464,5 +464,5 @@ def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
     other = path.with_name(path.name.replace(store.digest_of(path), "0" * 20))
     with pytest.raises(SymtopError, match="not those that the study was started with"):
         work.compute(task._replace(path=str(other)))
-    with locks.locked(path, wait=False):
+    with files.locked(path, wait=False):
         assert work.compute(task).state == "busy"

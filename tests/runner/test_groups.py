@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from symtop.base import datasets
-from symtop.base.validate import SymtopError
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError
 from symtop.runner import check, store
 from symtop.runner.study import Case
 
@@ -33,18 +33,18 @@ def test_a_group_covers_its_own_scenes_and_integrators_and_names_may_meet():
 
 
 def test_a_tree_is_read_as_it_was_written(tmp_path):
-    data = datasets.describe(tree(), "Groups", question="Does it come back?")
-    path = datasets.write(data, tmp_path / "groups.nc")
-    again = datasets.read_any(path)
+    data = netcdf.describe(tree(), "Groups", question="Does it come back?")
+    path = netcdf.write(data, tmp_path / "groups.nc")
+    again = netcdf.read_any(path)
     assert check.differences(data, again) == []
     assert again["phases/energy"].dtype == np.uint8
     assert again.attrs["question"] == "Does it come back?"
     assert again["windows/energy"].attrs["long_name"] == "total energy"
-    flat = datasets.write(LONG, tmp_path / "flat.nc")
-    assert isinstance(datasets.read_any(flat), xr.Dataset)
+    flat = netcdf.write(LONG, tmp_path / "flat.nc")
+    assert isinstance(netcdf.read_any(flat), xr.Dataset)
     path.write_bytes(path.read_bytes()[:2000])
     with pytest.raises(SymtopError, match="cannot read"):
-        datasets.read_any(path)
+        netcdf.read_any(path)
 
 
 def test_a_check_names_the_group_that_differs():

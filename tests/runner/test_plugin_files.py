@@ -6,8 +6,8 @@ import sys
 import pytest
 from click.testing import CliRunner
 
-from symtop.base.fingerprint import changes
 from symtop.cli.main import main
+from symtop.core.code_hash import changes
 from symtop.runner import plugins
 
 REGISTER = "import symtop\nsymtop.register(symtop.runge_kutta({name!r}, ((), (1.0,)), W, order=2))\n"

@@ -3,9 +3,9 @@
 import pytest
 from click.testing import CliRunner
 
-from symtop.base import datasets
 from symtop.cli.main import main
-from symtop.methods.registry import split_name
+from symtop.core import netcdf
+from symtop.methods.framework.registry import split_name
 
 PLUGIN = """\
 import symtop
@@ -32,7 +32,7 @@ def test_a_plugins_method_and_scene_are_in_every_study(studies, plugin, tmp_path
     done = CliRunner().invoke(main, ["study", *studies, *words])
     assert done.exit_code == 0, done.output
     for study in studies:
-        data = datasets.groups(datasets.read_any(tmp_path / "quick" / "only" / f"{study}.nc")).values()
+        data = netcdf.groups(netcdf.read_any(tmp_path / "quick" / "only" / f"{study}.nc")).values()
         groups = [group for group in data if group.variables]
         methods = {split_name(str(row))[0] for group in groups for row in group["integrator"].values}
         assert {"simpson-of-a-user", "strang"} <= methods, study

@@ -2,7 +2,7 @@
 
 import pytest
 
-from symtop.methods.registry import integrators
+from symtop.methods.framework.registry import integrators
 from symtop.runner.execute import Queue
 from symtop.runner.study import Case
 from symtop.runner.work import Task

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from symtop_studies.work_precision.timing_rounds import TimedRun
 
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.runner import execute, run as runner
 from symtop.runner.cases import Round
 from symtop.runner.pools import Workers
@@ -77,13 +77,13 @@ def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, 
     results = tmp_path / "r"
     assert runner.run(study, results, quiet=True)["failures"] == []
     (later,) = cases_of(results, timed=True)
-    assert set(np.ravel(datasets.read(later)["process"])) == {os.getpid()}  # the control: few cases need no workers
+    assert set(np.ravel(netcdf.read(later)["process"])) == {os.getpid()}  # the control: few cases need no workers
     later.unlink()
     monkeypatch.setattr(execute, "WORTH_A_POOL", 1)
     with Workers(2) as workers:
         done = runner.run(study, results, quiet=True, workers=workers)
     assert (done["computed"], done["failures"]) == (1, [])
-    again = datasets.read(later)
+    again = netcdf.read(later)
     assert os.getpid() not in set(np.ravel(again["process"]))
     assert set(np.ravel(again["later"])) == {2.0}
 

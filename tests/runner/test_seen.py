@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.runner import run as runner, store
 from tests.commands import PROBE
 from tests.runner.test_rounds import ROUNDS
@@ -68,11 +68,11 @@ def test_what_was_copied_or_touched_is_read_once(bring):
 
 def test_a_dataset_that_is_gone_or_damaged_is_made_again(bring):
     bring()
-    whole = datasets.read_any(bring.dataset)
+    whole = netcdf.read_any(bring.dataset)
     for spoil in (bring.dataset.unlink, lambda: bring.dataset.write_bytes(b"\0" * 9)):
         spoil()
         assert bring()[0] == 0
-        assert datasets.read_any(bring.dataset).identical(whole)
+        assert netcdf.read_any(bring.dataset).identical(whole)
 
 
 @pytest.mark.parametrize("nonsense", ["", "[]", '{"stamp": 1}', '{"stamp": "", "files": []}'])

@@ -8,10 +8,10 @@ import sys
 import pytest
 from click.testing import CliRunner
 
-from symtop.base import fingerprint
 from symtop.cli import study as command
 from symtop.cli.main import main
-from symtop.methods import registry
+from symtop.core import code_hash
+from symtop.methods.framework import registry
 from symtop.runner import scripts, settled
 
 SCRIPT = """
@@ -111,7 +111,7 @@ def test_other_code_another_package_and_another_grid_are_not_the_same(monkeypatc
     assert made == settled.made_by("")  # the control
     assert made != settled.made_by("quick")
     with monkeypatch.context() as patch:
-        patch.setattr(fingerprint, "version", lambda name: "0.0" if name == "numba" else "1.0")
+        patch.setattr(code_hash, "version", lambda name: "0.0" if name == "numba" else "1.0")
         assert made != settled.made_by("")
     (tmp_path / "symtop").mkdir()
     (tmp_path / "studies").mkdir()

@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 
-from symtop.base.validate import SymtopError
 from symtop.cli.main import main
+from symtop.core.errors import SymtopError
 from symtop.runner import run as runner
 from symtop.runner.study import Case, StudyError, sentences
 

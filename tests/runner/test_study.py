@@ -19,12 +19,12 @@ from click.testing import CliRunner
 from symtop_studies.reduction import commutation
 
 import symtop
-from symtop.base import datasets, fingerprint
-from symtop.base.imports import PACKAGE
 from symtop.cli.main import main
-from symtop.methods import registry
-from symtop.methods.fixed_step import inside
-from symtop.methods.registry import Integrator, is_built_in
+from symtop.core import code_hash, netcdf
+from symtop.core.code_hash import PACKAGE
+from symtop.methods.framework import registry
+from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.registry import Integrator, is_built_in
 from symtop.report import style
 from symtop.runner import check, depends, run as runner, store
 from symtop.runner.conclude import code_of
@@ -34,7 +34,7 @@ from tests.commands import PROBE, ended, symtop as symtop_command
 
 def measured(path: Path) -> list[xr.Dataset]:
     """The datasets of a study: one, or one a group."""
-    return [group for group in datasets.groups(datasets.read_any(path)).values() if group.variables]
+    return [group for group in netcdf.groups(netcdf.read_any(path)).values() if group.variables]
 
 
 def test_every_study_leaves_a_dataset_figures_and_findings(quick_results):
@@ -57,20 +57,20 @@ def test_the_second_time_nothing_is_computed_and_damaged_cases_are(quick_results
     study = runner.load("convergence")
     again = runner.run(study, tmp_path, quick=True, quiet=True, save=style.save)
     assert again["computed"] == 0
-    before = datasets.read(tmp_path / "convergence.nc")
+    before = netcdf.read(tmp_path / "convergence.nc")
     victims = sorted((tmp_path / "cases" / "convergence").glob("*.nc"))[:3]
     victims[0].write_bytes(victims[0].read_bytes()[:1000])
     victims[1].write_bytes(b"\0" * 4096)
     victims[2].unlink()
     mended = runner.run(study, tmp_path, quick=True, quiet=True, save=style.save)
     assert mended["computed"] == 3
-    assert datasets.read(tmp_path / "convergence.nc").equals(before)
+    assert netcdf.read(tmp_path / "convergence.nc").equals(before)
 
 
 def test_every_sentence_and_table_of_the_report_follows_from_a_stored_dataset(quick_results):
     """Nothing is said that the dataset on disk does not say again; `seconds` aside, nothing else is asked."""
     for name in runner.names():
-        study, stored = runner.load(name), datasets.read_any(quick_results / f"{name}.nc")
+        study, stored = runner.load(name), netcdf.read_any(quick_results / f"{name}.nc")
         said = json.loads((quick_results / f"{name}.json").read_text(encoding="utf-8"))
         assert study.verdict(stored) == said["verdict"], name
         assert json.loads(json.dumps([table._asdict() for table in study.tables(stored)])) == said["tables"], name
@@ -95,8 +95,8 @@ def test_the_report_is_one_page_without_outside_references(quick_results):
 
 def pretend_edited(patch, path):
     """Let one file have another hash."""
-    real = fingerprint.file_hash
-    patch.setattr(fingerprint, "file_hash", lambda file: real(file) + ("edited" if file == path else ""))
+    real = code_hash.file_hash
+    patch.setattr(code_hash, "file_hash", lambda file: real(file) + ("edited" if file == path else ""))
     depends.hashes.cache_clear()
 
 
@@ -130,19 +130,19 @@ STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "
 @pytest.mark.parametrize(
     ("edited", "stale"),
     [
-        ("methods/gauss.py", GAUSS | COLLECTIVE),
-        ("methods/galerkin.py", {"galerkin-simpson"}),
-        ("methods/unreduced.py", {"midpoint-unreduced", "trapezoidal-unreduced"}),
-        ("methods/discrete_lagrangian.py", STRAIGHT),
-        ("methods/newton.py", STRAIGHT | {"galerkin-simpson"}),
-        ("methods/scipy_ivp.py", SCIPY),
-        ("methods/dormand_prince.py", {"rk45-compiled"}),
-        ("methods/runge_kutta.py", {"rk4", "rk45-compiled"}),
-        ("methods/formulations.py", {"rk4", "rk45-compiled"} | SCIPY),
-        ("methods/euler_lagrange.py", {"rk4", "rk45-compiled"} | SCIPY),
-        ("methods/exact.py", {"exact"}),
-        ("methods/splitting_loop.py", SPLITTING),
-        ("methods/taylor.py", {"taylor", "taylor-longdouble", "taylor-quad"}),
+        ("methods/runge_kutta/gauss.py", GAUSS | COLLECTIVE),
+        ("methods/lagrangian/galerkin.py", {"galerkin-simpson"}),
+        ("methods/lagrangian/unreduced.py", {"midpoint-unreduced", "trapezoidal-unreduced"}),
+        ("methods/lagrangian/discrete_lagrangian.py", STRAIGHT),
+        ("methods/framework/newton.py", STRAIGHT | {"galerkin-simpson"}),
+        ("methods/library/scipy_ivp.py", SCIPY),
+        ("methods/runge_kutta/dormand_prince.py", {"rk45-compiled"}),
+        ("methods/runge_kutta/runge_kutta.py", {"rk4", "rk45-compiled"}),
+        ("methods/framework/formulations.py", {"rk4", "rk45-compiled"} | SCIPY),
+        ("methods/framework/euler_lagrange.py", {"rk4", "rk45-compiled"} | SCIPY),
+        ("methods/library/exact.py", {"exact"}),
+        ("methods/splitting/splitting_loop.py", SPLITTING),
+        ("methods/taylor/taylor.py", {"taylor", "taylor-longdouble", "taylor-quad"}),
         ("cli/main.py", set()),
         ("report/figures.py", set()),
         ("measure/accuracy.py", set()),
@@ -170,9 +170,9 @@ def test_findings_are_made_again_when_what_judges_them_is_edited(edited, again, 
 
 def test_what_all_cases_depend_on_makes_all_stale():
     convergence = runner.load("convergence")
-    for edited in ("model/top.py", "model/scenes.py", "run/simulation.py", "methods/registry.py"):
+    for edited in ("model/top.py", "model/scenes.py", "run/simulation.py", "methods/framework/registry.py"):
         assert stale_after(edited, of_everyone()) == set(symtop.integrators()), edited
-    for edited in ("run/reference.py", "methods/taylor.py", "measure/accuracy.py"):
+    for edited in ("run/reference/truth.py", "methods/taylor/taylor.py", "measure/accuracy.py"):
         assert stale_after(edited, convergence) == {case.integrator for case in convergence.cases(True)}, edited
 
 
@@ -290,7 +290,9 @@ def test_a_copy_of_the_package_with_one_kernel_edited(tmp_path):
     assert {row["integrator"] for row in rows if row["state"] == "stale"} == {"gauss-4"}
     assert sum(row["state"] == "done" for row in rows) == 10
     code, out, _ = ended(symtop_command(*words, "--status", "--why", cwd=tmp_path, PYTHONPATH=tmp_path))
-    assert out == ("probe: 10 done, 2 stale\n  2 stale: file symtop/methods/gauss.py: gauss-4 on goldstein, loop\n")
+    assert out == (
+        "probe: 10 done, 2 stale\n  2 stale: file symtop/methods/runge_kutta/gauss.py: gauss-4 on goldstein, loop\n"
+    )
     code, out, _ = ended(symtop_command(*words, cwd=tmp_path, PYTHONPATH=tmp_path))
     assert "2 of 12 cases computed" in out
     code, out, _ = ended(symtop_command(*words, "--status", cwd=tmp_path, PYTHONPATH=tmp_path))
@@ -335,8 +337,8 @@ def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_pa
 def test_every_file_says_where_it_comes_from(tmp_path):
     assert probe(tmp_path).exit_code == 0
     for path in (tmp_path / "quick").rglob("*.nc"):
-        data = datasets.read(path)
-        asked = set(datasets.provenance())
+        data = netcdf.read(path)
+        asked = set(netcdf.provenance())
         if path.parent.name == "probe":
             asked |= {"study", "settings", "sources", "made_of", "seed", "content"}
             assert data.attrs["sources"] in path.name
@@ -351,9 +353,9 @@ def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
     assert done.exit_code == 0, done.output
     assert "4 of 4 cases computed again, the same to the last bit" in done.output
     victim = next((tmp_path / "quick" / "cases" / "probe").glob("*.nc"))
-    data = datasets.read(victim)
+    data = netcdf.read(victim)
     data["energy"][3] = np.nextafter(data["energy"].values[3], np.inf)
-    datasets.write(data.assign_attrs(content=datasets.content_hash(data)), victim)  # well made, and wrong
+    netcdf.write(data.assign_attrs(content=netcdf.content_hash(data)), victim)  # well made, and wrong
     done = probe(tmp_path, "--check", "--fresh")
     assert done.exit_code == 1
     assert "energy differs by up to" in done.output
@@ -401,7 +403,7 @@ def test_the_full_grid_and_the_ordinary_one_keep_each_others_cases(tmp_path):
         assert computed(*words)[0]["computed"] == count, words
         cases = list((tmp_path / "r" / "cases" / "grids").glob("*.nc"))
         assert len(cases) == (2 if words == [] and count else 4)
-        assert datasets.read(tmp_path / "r" / "grids.nc")["steps"].values.max() == (1000.0 if words else 10.0)
+        assert netcdf.read(tmp_path / "r" / "grids.nc")["steps"].values.max() == (1000.0 if words else 10.0)
     assert [row["state"] for row in computed("--status")["grids"]] == ["done", "done"]
 
 
@@ -425,7 +427,7 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
     assert found["failures"] == [
         "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
     ]
-    assert list(datasets.read(tmp_path / "stability.nc")["integrator"].values) == ["midpoint[angles]"]
+    assert list(netcdf.read(tmp_path / "stability.nc")["integrator"].values) == ["midpoint[angles]"]
     assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten
 
 
@@ -460,7 +462,7 @@ def test_timed_cases_run_one_at_a_time_in_workers_that_are_there_already(tmp_pat
     monkeypatch.setenv("CREW", str(tmp_path / "crew"))
     (tmp_path / "clocked.py").write_text(CLOCKED.replace("range(16)", f"range({8 + count})"))
     runner.run(runner.load(str(tmp_path / "clocked.py")), tmp_path / "r", jobs=2, quiet=True)
-    found = [datasets.read(path) for path in (tmp_path / "r").rglob("cases/clocked/*.nc")]
+    found = [netcdf.read(path) for path in (tmp_path / "r").rglob("cases/clocked/*.nc")]
     spans = {timed: sorted((float(one["begin"][0]), float(one["end"][0])) for one in found if one["timed"][0] == timed)
              for timed in (0.0, 1.0)}  # fmt: skip
     crew = {timed: {int(one["process"][0]) for one in found if one["timed"][0] == timed} for timed in (0.0, 1.0)}

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.measure.accuracy import error_row
 from symtop.runner import sweep as module
 
@@ -46,7 +46,7 @@ def test_one_thread_and_many_and_a_file_give_the_same(data, tmp_path):
     for options in ({"threads": 1}, {"path": file}):
         again = symtop.sweep(["spheroid", "goldstein"], METHODS, **ASKED, **options)
         xr.testing.assert_identical(again.drop_attrs(), data.drop_attrs())
-    xr.testing.assert_identical(datasets.read(file).drop_attrs(), data.drop_attrs())
+    xr.testing.assert_identical(netcdf.read(file).drop_attrs(), data.drop_attrs())
 
 
 def test_a_sweep_that_was_stopped_goes_on_from_its_file(tmp_path, monkeypatch):
@@ -110,10 +110,10 @@ def test_a_file_with_other_cells_is_refused_and_left_as_it_is(tmp_path, monkeypa
             symtop.sweep(scene, names, path=file, **asked)
     assert file.read_bytes() == before
     turned = symtop.sweep("spheroid", ["strang", "rk4[axis]"], path=file, **asked)
-    xr.testing.assert_identical(datasets.read(file).drop_attrs(), turned.drop_attrs())
+    xr.testing.assert_identical(netcdf.read(file).drop_attrs(), turned.drop_attrs())
     monkeypatch.setattr(module, "_table", table)
     more = symtop.sweep(["goldstein", "spheroid"], ["midpoint", "strang", "rk4[axis]"], path=file, **asked)
-    xr.testing.assert_identical(datasets.read(file).drop_attrs(), more.drop_attrs())
+    xr.testing.assert_identical(netcdf.read(file).drop_attrs(), more.drop_attrs())
     for name in ("strang", "rk4[axis]"):
         one = {"scene": "spheroid", "integrator": name}
         assert more["axis"].sel(one).values == turned["axis"].sel(one).values
@@ -142,7 +142,7 @@ def test_a_cell_that_raised_is_tried_again_and_one_that_ended_early_is_not(tmp_p
         assert data["outcome"].sel(integrator="stormer-verlet").values[0].tolist() == ["left_chart", "ok"]
         assert ran == again
         ran.clear()
-        xr.testing.assert_identical(datasets.read(file).drop_attrs(), data.drop_attrs())
+        xr.testing.assert_identical(netcdf.read(file).drop_attrs(), data.drop_attrs())
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ import math
 
 import pytest
 
-from symtop.base import datasets
-from symtop.base.threads import cores
+from symtop.core import netcdf
+from symtop.core.parallel import cores
 from symtop.runner import run as runner, trial
 from symtop.runner.pools import InProcess, Workers
 
@@ -37,7 +37,7 @@ def study(tmp_path):
 def computed(study, results, workers):
     """The datasets of its cases, in the order in which they began."""
     runner.run(study, results, workers=workers, quiet=True)
-    cases = [datasets.read_own(file) for file in (results / "cases" / "slept").glob("*.nc")]
+    cases = [netcdf.read_own(file) for file in (results / "cases" / "slept").glob("*.nc")]
     return sorted(cases, key=lambda case: float(case["begun"]))
 
 

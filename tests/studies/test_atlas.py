@@ -15,15 +15,15 @@ from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, 
 from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
 
 import symtop
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.measure.errors import errors_against
 from symtop.measure.verdicts import JUDGED, VERDICTS, verdict
-from symtop.methods.registry import integrator, methods
+from symtop.methods.framework.registry import integrator, methods
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
 from symtop.report import style
 from symtop.report.style import OUTCOME_COLORS
-from symtop.run.reference import reference
+from symtop.run.reference.truth import reference
 from symtop.runner import run as runner, store
 from symtop.runner.study import Case
 
@@ -396,8 +396,8 @@ def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
                                                           "periods": 1.0, "shown": 0.01})  # fmt: skip
     data = store.combine([(Case("grazing", "strang"), small), (Case("grazing", "midpoint"), large)])
     symtop_file = tmp_path / "maps.nc"
-    datasets.write(data, symtop_file)
-    again = datasets.read(symtop_file)
+    netcdf.write(data, symtop_file)
+    again = netcdf.read(symtop_file)
     assert again["outcome"].dtype == np.uint8
     assert (again["outcome"].sel(integrator="strang").values[0, 2] == NOT_RUN).all()
     shapes = {name: one.outcome.shape for name, one in atlas.maps(again, "grazing").items()}

@@ -12,9 +12,9 @@ from symtop_studies.reduction.tables import Column, Ratio, commutation_table, un
 
 import symtop
 from symtop.measure.order import power_law
-from symtop.methods import registry
-from symtop.methods.discrete_lagrangian import rule_of
-from symtop.methods.quadrature import Quadrature
+from symtop.methods.framework import registry
+from symtop.methods.lagrangian.discrete_lagrangian import rule_of
+from symtop.methods.lagrangian.quadrature import Quadrature
 from symtop.report.style import number
 from tests.conftest import random_scenes
 

@@ -10,9 +10,9 @@ from symtop_studies.convergence import figures, study, tables, words
 
 import symtop
 from symtop.judging.claims_order import measured_order
-from symtop.judging.ledger import CLAIMS
+from symtop.judging.findings import CLAIMS
 from symtop.measure.order import BESIDE, order_verdict
-from symtop.methods.registry import integrator, methods, rows, split_name
+from symtop.methods.framework.registry import integrator, methods, rows, split_name
 from symtop.report import style
 from symtop.runner import store
 from symtop.runner.study import Case

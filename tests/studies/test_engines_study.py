@@ -8,7 +8,7 @@ import xarray as xr
 from symtop_studies.engines import documentation, figures, listed, study, tables, words
 
 import symtop
-from symtop.methods.registry import engines, integrator
+from symtop.methods.framework.registry import engines, integrator
 from symtop.report import style
 
 GOLDSTEIN = symtop.scene("goldstein")

@@ -19,10 +19,10 @@ from symtop_studies.stability.solver_tolerance import solver_sweep, textbook_mid
 from symtop_studies.stability.windows import narrow_window
 
 import symtop
-from symtop.methods.calling import solve
-from symtop.methods.discrete_lagrangian import rule_of
-from symtop.methods.plan import Plan
-from symtop.methods.registry import integrator, methods
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import integrator, methods
+from symtop.methods.lagrangian.discrete_lagrangian import rule_of
 from symtop.model import charts, scenes
 from symtop.model.effective import effective_force
 from symtop.model.scenes import Scene, closed_form, grazing, sleeping

@@ -7,7 +7,7 @@ from symtop_studies.drift import keeping
 from symtop_studies.drift.phase_loss import phase_loss
 
 import symtop
-from symtop.methods.registry import integrator
+from symtop.methods.framework.registry import integrator
 
 
 def loss(length=2500.0, paid=100.0, exponent=1.0):

@@ -8,7 +8,7 @@ from symtop_studies.phase_diagram.tables import TARGETS, diagram
 
 import symtop
 from symtop.measure.phase import split
-from symtop.methods.registry import integrator
+from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
 
 FAR = runs.horizons()

@@ -27,17 +27,17 @@ from symtop_studies.population.verdicts import Cell
 
 import symtop
 from symtop import advise
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.measure.accuracy import error_row
 from symtop.measure.nearest import nearest
 from symtop.measure.timing import Timing
 from symtop.measure.work import TARGETS, nutation_width
-from symtop.methods.registry import integrator
+from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.report import style
 from symtop.report.style import look
-from symtop.run.guard import EXPECTED
+from symtop.run.guard.guard import EXPECTED
 from symtop.runner.check import differences
 
 INF, NAN = math.inf, math.nan
@@ -542,7 +542,7 @@ def test_two_seeds_agree_on_every_sure_winner_of_all_rows():
 
 
 def test_quick_results_hold_every_verdict(quick_results):
-    data = datasets.read_any(quick_results / "population.nc")
+    data = netcdf.read_any(quick_results / "population.nc")
     assert set(data.children) == {"short", "long", "tops", "prices"}
     taken, won = verdicts.best(data, Cell("short", "axis", 1e-3), "evaluations")
     assert won is not None
@@ -556,7 +556,7 @@ def test_quick_results_hold_every_verdict(quick_results):
 
 
 def test_a_row_looks_as_in_every_other_figure(quick_results):
-    drawn = figures.draw_run_lengths(datasets.read_any(quick_results / "population.nc"), "evaluations").figure
+    drawn = figures.draw_run_lengths(netcdf.read_any(quick_results / "population.nc"), "evaluations").figure
     lines = [line for axis in drawn.axes for line in axis.get_lines() if line.get_label().endswith("]")]
     assert {line.get_label() for line in lines} > {"strang[axis]", "midpoint[angles]"}
     for line in lines:
@@ -565,7 +565,7 @@ def test_a_row_looks_as_in_every_other_figure(quick_results):
 
 
 def test_the_titles_say_what_their_figures_show(quick_results):
-    data = datasets.read_any(quick_results / "population.nc")
+    data = netcdf.read_any(quick_results / "population.nc")
     titles = {one.name: " ".join(one.figure.get_suptitle().split("\n")) for one in figures.pictures(data)}
     assert "wins" not in titles["run-lengths-alone"]  # it shows who has solved how many tops
     drawn = figures.draw_run_lengths(data, "alone").figure
@@ -595,7 +595,7 @@ def test_the_titles_say_what_their_figures_show(quick_results):
 
 
 def test_the_silent_runs_at_small_steps_are_told_by_kind_of_top(quick_results):
-    data = datasets.read_any(quick_results / "population.nc")
+    data = netcdf.read_any(quick_results / "population.nc")
     share, group = words.hidden(data), data["short"].to_dataset().isel(scene=0)
     counts = dict.fromkeys(verdicts.strata(data), 0.0)
     for name in verdicts.judged_rows(data):
@@ -615,7 +615,7 @@ def test_the_silent_runs_at_small_steps_are_told_by_kind_of_top(quick_results):
 
 
 def test_the_wrong_runs_by_steps_are_those_of_the_rows_with_a_fixed_step(quick_results):
-    data = datasets.read_any(quick_results / "population.nc")
+    data = netcdf.read_any(quick_results / "population.nc")
     each, share = words.hidden_by_steps(data), words.hidden(data)
     assert [step for step, _, _ in each] == sorted(step for step, _, _ in each)
     fine = [(wrong, silent) for step, wrong, silent in each if step >= words.FINE]

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from symtop.base import datasets
-from symtop.methods.registry import integrators, methods, split_name
+from symtop.core import netcdf
+from symtop.methods.framework.registry import integrators, methods, split_name
 from symtop.model.scenes import scenes
 from symtop.runner.grid import grid_rows
 
@@ -43,7 +43,7 @@ def without_a_chart(data: xr.Dataset) -> list[str]:
 @pytest.mark.parametrize("study", STUDIES)
 def test_every_stored_dataset_says_in_which_chart_a_method_ran(study, quick_results):
     groups = [
-        group for group in datasets.groups(datasets.read_any(quick_results / f"{study}.nc")).values() if group.variables
+        group for group in netcdf.groups(netcdf.read_any(quick_results / f"{study}.nc")).values() if group.variables
     ]
     assert groups
     assert [name for group in groups for name in without_a_chart(group)] == []

@@ -29,7 +29,7 @@ from symtop_studies.work_precision.timing_rounds import (
 )  # fmt: skip
 
 import symtop
-from symtop.base import datasets
+from symtop.core import netcdf
 from symtop.measure import ranking
 from symtop.measure.timing import Timing
 from symtop.measure.work import TARGETS, least_work, work_table
@@ -312,7 +312,7 @@ def test_a_study_may_have_a_second_round_made_from_the_first(tmp_path, monkeypat
 
 
 def test_a_front_shows_the_runs_that_its_title_counts(quick_results):
-    data = datasets.read(quick_results / "work_precision.nc")
+    data = netcdf.read(quick_results / "work_precision.nc")
     for picture in work_figures.pictures(data)[:3]:
         title = " ".join(picture.figure.get_suptitle().split("\n"))
         owners = title.partition(" make")[0].split(" and ")

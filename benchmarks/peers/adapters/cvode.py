@@ -11,8 +11,8 @@ from typing import Any
 from benchmarks.peers import callbacks, common
 from benchmarks.peers.common import Inner, Library, Motion
 from benchmarks.peers.sundials import NORMAL, Sundials, Vector, c_double, c_int, c_long, c_void_p, function
-from symtop.methods.plan import Plan
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE, DISTRIBUTION = "cvode", "scikit-sundae"

@@ -10,8 +10,8 @@ from typing import Any
 
 from benchmarks.peers import common
 from benchmarks.peers.common import Inner, Library, Motion
-from symtop.methods.plan import Plan
-from symtop.methods.registry import Integrator
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "scikit-sundae"

@@ -3,11 +3,11 @@
 import dataclasses
 
 import symtop
-from symtop.methods import splitting_space
-from symtop.methods.coefficients import YOSHIDA_4
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.space import on_axis
-from symtop.methods.splitting_loop import Stages
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.space import on_axis
+from symtop.methods.splitting import splitting_space
+from symtop.methods.splitting.coefficients import YOSHIDA_4
+from symtop.methods.splitting.splitting_loop import Stages
 
 drift = (YOSHIDA_4.drift[0] + 1e-9, *YOSHIDA_4.drift[1:])
 

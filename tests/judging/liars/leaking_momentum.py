@@ -3,12 +3,12 @@
 import dataclasses
 
 import symtop
-from symtop.methods import splitting_space as family
-from symtop.methods.coefficients import STRANG
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.loop import driver
-from symtop.methods.space import observe_axis, on_axis
-from symtop.methods.splitting_loop import Stages
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import driver
+from symtop.methods.framework.space import observe_axis, on_axis
+from symtop.methods.splitting import splitting_space as family
+from symtop.methods.splitting.coefficients import STRANG
+from symtop.methods.splitting.splitting_loop import Stages
 
 
 def increment(par, rule, state, carry, h):

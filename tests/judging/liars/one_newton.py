@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 
 import symtop
-from symtop.base.compiled import register_jitable
-from symtop.methods import discrete_lagrangian as family
-from symtop.methods.angles import chart_outcome, reduced
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.loop import driver
-from symtop.methods.node_sums import forces, node_sums, opening
+from symtop.core.jit import register_jitable
+from symtop.methods.framework.angles import chart_outcome, reduced
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import driver
+from symtop.methods.lagrangian import discrete_lagrangian as family
+from symtop.methods.lagrangian.node_sums import forces, node_sums, opening
 
 
 def increment(par, rule, state, carry, h):

@@ -1,10 +1,10 @@
 """Velocity Verlet with h and h^2/2 swapped in the position, as a public library once shipped it."""
 
 import symtop
-from symtop.methods import splitting_angles
-from symtop.methods.angles import chart_outcome, reduced
-from symtop.methods.fixed_step import FixedStep
-from symtop.methods.loop import driver
+from symtop.methods.framework.angles import chart_outcome, reduced
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import driver
+from symtop.methods.splitting import splitting_angles
 
 
 def begin(par, rule, state, h):

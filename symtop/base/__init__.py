@@ -1,1 +1,0 @@
-"""Ground floor: checks of input, labelled datasets."""

@@ -1,0 +1,1 @@
+"""What every room uses: errors, files, hashes of code, compilation, processes, netCDF."""

@@ -1,0 +1,187 @@
+"""Errors of the user and errors of other people's code, each as one sentence.
+
+The checks of arguments (`positive`, `whole`, `one_of`, ...) raise a `SymtopError` that names the argument, its value
+and what is allowed. `door` is for calls of foreign code, a plug-in's solver or a user's study: whatever it raises,
+errors beside `Exception` included, becomes a SymtopError; Ctrl-C and SIGTERM pass.
+"""
+
+import difflib
+import math
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+
+from symtop.core.signals import is_of_user
+
+LONGEST_PART = 255  # bytes of a name in a folder
+SHOWN = 80  # characters of a name that is told
+MAGIC = (b"\x89HDF", b"CDF")  # the first bytes of netCDF files
+
+
+class SymtopError(ValueError):
+    """An argument that symtop cannot use.
+
+    The message is one sentence that names the argument, the value it had and what is allowed.
+    The command line prints it without a traceback and exits with code 2.
+    """
+
+    def __init__(self, sentence: object = "") -> None:
+        super().__init__(" ".join(str(sentence).split()))  # some values print in many lines
+
+
+class SymtopWarning(UserWarning):
+    """A result that is valid but probably not what its user wants."""
+
+
+def shown(value: object) -> str:
+    """A value in words, whatever it is: its own `repr` may raise anything."""
+    try:
+        return repr(value)
+    except Exception:  # noqa: BLE001
+        return f"a {type(value).__name__} that cannot be printed"
+
+
+def finite(name: str, value: object) -> float:
+    """Return `value` as a float; refuse anything that is not one finite real number."""
+    # float() would read a number in them
+    if isinstance(value, (bool, str, bytes, bytearray)) or type(value).__name__ == "MaskedConstant":
+        raise SymtopError(f"{name} must be a finite number, not {shown(value)}")
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise SymtopError(f"{name} must be a finite number, not {shown(value)}") from None
+    if not math.isfinite(number):
+        raise SymtopError(f"{name} must be a finite number, not {number!r}")
+    return number
+
+
+def not_negative(name: str, value: object) -> float:
+    """A finite number that is at least zero."""
+    number = finite(name, value)
+    if number < 0.0:
+        raise SymtopError(f"{name} must be at least 0, not {number!r}")
+    return number
+
+
+def positive(name: str, value: object) -> float:
+    """Return `value` as a float; refuse anything that is not finite and above zero."""
+    number = finite(name, value)
+    if number <= 0.0:
+        raise SymtopError(f"{name} must be above zero, not {number!r}")
+    return number
+
+
+def whole(name: str, value: object, least: int, most: float = math.inf) -> int:
+    """Return `value` as an int; refuse anything that is not a whole number from `least` to `most`."""
+    number = finite(name, value)
+    if number != int(number) or number < least:
+        raise SymtopError(f"{name} must be a whole number of at least {least}, not {shown(value)}")
+    if number > most:
+        raise SymtopError(f"{name} must be at most {most:g}, not {shown(value)}")
+    return int(number)
+
+
+def truth(name: str, value: object) -> bool:
+    """Return `value` if it is True or False, also NumPy's."""
+    if type(value).__name__ in ("bool", "bool_"):
+        return bool(value)
+    raise SymtopError(f"{name} must be True or False, not {shown(value)}")
+
+
+def place(name: str, value: object) -> Path:
+    """Return a file's name as a path, ``~`` the user's folder; refuse what can name none. No disk is looked at."""
+    if isinstance(value, (str, os.PathLike)):
+        path = at_home(value)
+        if (
+            path.name
+            and "\0" not in str(path)
+            and all(len(part.encode(errors="replace")) <= LONGEST_PART for part in path.parts)
+        ):
+            return path
+    raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}")
+
+
+def spare(path: Path) -> None:
+    """Refuse to replace what is there and is no netCDF file: a script, a device, a folder; SymtopError."""
+    if path.is_dir():
+        raise SymtopError(f"cannot write {path}: it is a folder")
+    begun = b""
+    if path.is_file():
+        try:
+            with path.open("rb") as file:
+                begun = file.read(4)
+        except OSError as error:
+            raise SymtopError(f"cannot write {path}: {error.strerror or error}") from error
+    if path.exists() and not begun.startswith(MAGIC):
+        raise SymtopError(f"cannot write {path}: it is there, and no netCDF file; remove it or name another path")
+
+
+def at_home(path: str | os.PathLike[str]) -> Path:
+    """A path in which a first ``~`` is the user's folder, as a shell reads it; as it stands if nobody has that name."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        return Path(path)
+
+
+def row(name: str, values: object) -> list[float]:
+    """Return `values` as a list of finite floats; refuse anything that is not a row of them."""
+    try:
+        entries = None if isinstance(values, (str, bytes, dict)) else list(values)  # type: ignore[call-overload]
+    except TypeError:  # nothing to go through, such as an array without dimensions
+        entries = None
+    if entries is None:
+        raise SymtopError(f"{name} must be a row of numbers, not {shown(values)}")
+    return [finite(f"an entry of {name}", value) for value in entries]
+
+
+def label(name: str, value: object) -> str:
+    """Return `value` if it can name a scene or an integrator in a file, a table and a command."""
+    if isinstance(value, str) and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}", value):
+        return value
+    raise SymtopError(f"{name} must be 1 to 64 letters, digits or ._+- (a letter or digit first), not {shown(value)}")
+
+
+def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
+    """Return `value` if it is one of `allowed`; otherwise name the nearest of them."""
+    known = list(allowed)
+    if isinstance(value, str) and value in known:
+        return value
+    near = difflib.get_close_matches(value, known, n=3, cutoff=0.5) if isinstance(value, str) else []
+    hint = (
+        f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known[:12])}{' ...' * (len(known) > 12)}"
+    )
+    raise SymtopError(f"{name} {shown(value)} is unknown; {hint}")
+
+
+LONGEST = 300  # characters of a stranger's words
+
+
+def words_of(error: BaseException) -> str:
+    """The type of an error and what it says, in one line, if it can be said."""
+    try:
+        said = " ".join(str(error).split())
+    except Exception:  # noqa: BLE001  (its own __str__ may raise anything)
+        return f"{type(error).__name__}, which cannot be printed"
+    cut = said if len(said) <= LONGEST else f"{said[:LONGEST]} ..."
+    return f"{type(error).__name__}: {cut}" if cut else type(error).__name__
+
+
+class door:
+    """Within it, whatever is raised becomes a SymtopError: `what` failed, and how. A SymtopError passes as it is."""
+
+    __slots__ = ("what",)
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is not None and not isinstance(error, SymtopError) and not is_of_user(error):
+            raise SymtopError(f"{self.what} failed: {words_of(error)}") from error

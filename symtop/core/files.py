@@ -1,0 +1,146 @@
+"""The folder of what can be made again: compiled kernels, references, checkpoints of long runs.
+
+Every use of an entry sets its time of modification, at most once a day. An entry that nobody used for `UNUSED` days is
+removed, and then the entries used longest ago until the folder is small enough. Another process may be doing the same.
+"""
+
+import contextlib
+import errno
+import functools
+import os
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TextIO
+
+from symtop.core.errors import SymtopError
+
+DAY = 86_400.0  # seconds
+UNUSED = 30  # days
+
+COMPILING = "compiling what runs for the first time; the next time it is found on disk"
+
+
+def is_terminal(stream: TextIO | None) -> bool:
+    """Is somebody watching this stream of the process, which is None where it was closed?"""
+    return stream is not None and stream.isatty()
+
+
+def _tell() -> None:
+    """Say once, to somebody who is watching, that kernels are being compiled, which takes one second to twenty."""
+    on_cold.remove(_tell)
+    if "ipykernel" in sys.modules or is_terminal(sys.stderr):
+        print(f"symtop: {COMPILING}", file=sys.stderr, flush=True)  # noqa: T201  (no warning: nothing is wrong)
+
+
+on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in the cache and has to be compiled
+
+
+def cache_root() -> Path:
+    """The folder for everything symtop caches: ``$SYMTOP_CACHE`` or ``symtop`` in the user's cache folder."""
+    told = os.environ
+    return _root(*(told.get(name) for name in ("SYMTOP_CACHE", "XDG_CACHE_HOME", "HOME", "USERPROFILE")))
+
+
+@functools.lru_cache(maxsize=16)
+def _root(chosen: str | None, caches: str | None, *_homes: str | None) -> Path:
+    """The folder in these surroundings, which `Path.home` reads as well: 60 us, and each new start asks four times."""
+    return Path(chosen) if chosen else Path(caches or Path.home() / ".cache") / "symtop"
+
+
+def touch(entry: Path) -> None:
+    """Note that an entry is used now; nothing happens if it is not there or was used today."""
+    with contextlib.suppress(OSError):
+        if entry.stat().st_mtime < time.time() - DAY:
+            os.utime(entry)
+
+
+def size_of(entry: Path) -> int:
+    """Bytes of a file, or of all files in a folder."""
+    if not entry.is_dir():
+        return entry.stat().st_size
+    return sum(path.stat().st_size for path in entry.rglob("*") if path.is_file())
+
+
+def prune(folder: Path, most_bytes: int) -> None:
+    """Remove the entries of a folder that nobody used for `UNUSED` days, and the oldest beyond `most_bytes`."""
+    oldest, total = time.time() - UNUSED * DAY, 0
+    for entry in by_last_use(folder):
+        with contextlib.suppress(OSError):
+            total += size_of(entry)
+            if total > most_bytes or entry.stat().st_mtime < oldest:
+                shutil.rmtree(entry, ignore_errors=True) if entry.is_dir() else entry.unlink(missing_ok=True)
+
+
+def by_last_use(folder: Path) -> list[Path]:
+    """The entries of a folder, the one used last first; partial files, whose names begin with a dot, are none."""
+    times = {}
+    for entry in folder.glob("[!.]*"):
+        with contextlib.suppress(OSError):
+            times[entry] = entry.stat().st_mtime
+    return sorted(times, key=lambda entry: -times[entry])
+
+
+try:
+    import fcntl
+except ImportError:  # no such locks here: two processes may then compute the same, and write the same file
+    fcntl = None  # type: ignore[assignment]
+
+NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)  # of file systems that have none, as some of clusters
+
+
+def lock_path(path: Path) -> Path:
+    """The lock of a file, and of every other one of its stem."""
+    return path.with_name(f".{path.stem}.lock")
+
+
+def _taken(file: int, *, wait: bool) -> bool:
+    """Take the lock; False if somebody else holds it."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except BlockingIOError:
+        return False
+    except OSError as error:
+        if error.errno not in NO_LOCKS:
+            raise
+    return True
+
+
+@contextlib.contextmanager
+def locked(path: Path, *, wait: bool) -> Iterator[bool]:
+    """Hold a file's lock, so that nobody else computes it; yields False if somebody else holds it and `wait` is false.
+
+    The lock's file is there while it is held, and afterwards if its holder was killed (see `was_begun`).
+    """
+    if fcntl is None:
+        yield True
+        return
+    lock = lock_path(path)
+    while True:
+        try:
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            file = lock.open("a")
+        except OSError as error:
+            raise SymtopError(f"cannot write {lock}: {error.strerror or error}") from error
+        with file:
+            if not _taken(file.fileno(), wait=wait):
+                yield False
+                return
+            if os.fstat(file.fileno()).st_nlink == 0:  # its holder removed it while we waited
+                continue
+            os.utime(file.fileno())  # since when it is held
+            try:
+                yield True
+            finally:
+                lock.unlink(missing_ok=True)
+            return
+
+
+def was_begun(path: Path) -> bool:
+    """Did somebody begin to compute a case, and end before it was done?"""
+    if fcntl is None or not lock_path(path).is_file():
+        return False
+    with locked(path, wait=False) as ours:
+        return ours

@@ -1,0 +1,338 @@
+"""Compilation of kernels with numba, with a disk cache that never serves stale numbers.
+
+numba stamps a cached kernel with the file of the function itself and does not see edits in the files it calls, so that
+an old kernel can return old numbers in silence; and it compiles again what only moved down by a line. Here the folder
+of a kernel is named after a hash of everything it is compiled from (`symtop.core.code_hash`): instructions, constants
+and values of its functions, wherever they stand, and the versions of Python and numba. A kernel found on disk loads in
+a few milliseconds; a cold one compiles in about half a second.
+
+Each kernel has a folder of its own, about 100 kilobytes. Every use of it is noted, once a day. The first time a process
+saves a kernel it removes those that nobody used for 30 days, and the oldest ones beyond `MOST_BYTES`.
+
+Beside it stand the operations that numba lacks.
+
+    fused     a b + c with one rounding. A number on the grid of its last place plus a correction that hardly changes
+              from step to step is rounded the same way every time, a bias of up to half a unit in the last place; the
+              exact product has random digits below that grid, and added before the rounding they remove the bias.
+    tables    tuples, whose length a kernel is compiled for, or arrays of any length, multiplied by one instruction an
+              element: LLVM unrolls a loop over a tuple up to about 16 elements and copies the tuple in each pass
+              beyond.
+"""
+
+import contextlib
+import functools
+import gc
+import hashlib
+import pickle
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+import numba
+from numba import njit, types
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.typing.templates import builtin_registry
+from numba.cpython.unsafe.tuple import tuple_setitem
+from numba.extending import intrinsic, overload, register_jitable as _register
+from numba.np.unsafe.ndarray import to_fixed_tuple
+
+from symtop.core.code_hash import Walk, by_name, digest, hashed
+from symtop.core.files import cache_root, on_cold, prune, touch
+from symtop.core.jit_functions import fused, inlined_parts, shared_parts, two_product
+from symtop.core.sines import polynomials, sincos
+
+__all__ = ["code_of", "compile_kernel", "fused", "is_kept", "register_jitable", "set_item", "to_fixed_tuple"]
+
+set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
+
+MOST_BYTES = 200_000_000  # of kernels that are kept, about 2000 of them
+OPTIONS = {"error_model": "numpy", "nogil": True}  # division by zero gives infinity, as in C; threads run at once
+HASH = hashlib.sha256().digest_size  # bytes before the code in its file
+WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # kernels alone call it: 14 % less to compile
+INLINED = {"forceinline": True, **WITHIN}
+
+_stands_for: dict[int, list[object]] = {}  # id of a function: what numba compiles in its place
+_registered: set[Callable[..., Any]] = set()
+_known = [0]  # entries of numba's registry that `_stands_for` knows
+_pruned: list[Path] = []
+_collecting = threading.Lock()
+_compiling: list[bool] = []  # for each thread that does: did it find the collection of garbage on?
+
+overload(sincos, jit_options=INLINED, strict=False)(lambda *_: polynomials)
+
+
+@by_name
+def register_jitable(function: Callable[..., Any]) -> Any:
+    """Let kernels call a plain function, inlined wherever they do.
+
+    Left to itself LLVM keeps the larger ones, such as the drift of a splitting, as calls that pass their results
+    through memory: 1.3 times the time of a step. A function is registered once: numba would add another overload each
+    time, and what a kernel is made of would hang on how many loops a process has built before.
+    """
+    if function not in _registered:
+        _registered.add(function)
+        _register(**INLINED)(function)
+    return function
+
+
+def _register_parts() -> None:
+    """Register what modules without numba have marked so far, each function once."""
+    for function in inlined_parts:
+        register_jitable(function)
+    for function in shared_parts:
+        if function not in _registered:
+            _registered.add(function)
+            _register(**OPTIONS, **WITHIN)(function)
+
+
+def _overloads(function: FunctionType) -> Iterator[object]:
+    """What numba compiles where a function is called: the functions that overload it, and their options."""
+    entries = builtin_registry.globals
+    for value, kind in entries[_known[0] :]:
+        if isinstance(value, FunctionType) and isinstance(kind, types.Function):
+            _stands_for.setdefault(id(value), []).extend(kind.templates)
+    _known[0] = len(entries)
+    for template in _stands_for.get(id(function), ()):
+        yield getattr(template, "_overload_func", None)
+        yield getattr(template, "_jit_options", None)
+
+
+def code_of(thing: object) -> Walk:
+    """What a kernel, or anything that holds kernels, is compiled from; the same whatever a process has run before."""
+    _register_parts()
+    walk = Walk("kernel", whole=False, also=_overloads)
+    walk.add((thing, OPTIONS, sys.version_info[:2], numba.__version__))
+    return walk
+
+
+class _Folder:
+    """Where a kernel is kept, as numba asks for it."""
+
+    def __init__(self, path: Path, function: Callable[..., Any]) -> None:
+        self.path, self._py_file = path, function.__code__.co_filename
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder; the first one of a process makes room for it."""
+        if not _pruned:
+            _pruned.append(self.path)
+            prune(self.path.parent, MOST_BYTES)
+        self.path.mkdir(parents=True, exist_ok=True)
+
+
+class _Index(IndexDataCacheFile):  # type: ignore[misc]
+    """The index of a kernel and its files, each named after the signature whose code it holds.
+
+    numba counts them: two processes that save at the same time give two signatures one file, and from then on each
+    process that asks for one of them gets the code of the other. And it runs what it finds: a single byte that has
+    flipped on the disk ended the process (SIGSEGV, SIGILL) in one trial out of five. Here the code follows its hash,
+    and an index that cannot be read is empty.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Write the code, then the index: a process that is killed in between leaves no name without a file."""
+        name = f"code.{hashed(repr(key))}.nbc"
+        self._save_data(name, data)
+        self._save_index(self._load_index() | {key: name})
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            index: dict[Any, str] = super()._load_index()
+        except Exception:  # noqa: BLE001  (a damaged pickle raises nearly anything)
+            return {}
+        return index
+
+    def _save_data(self, name: str, data: Any) -> None:
+        code = self._dump(data)
+        with self._open_for_write(self._data_path(name)) as file:
+            file.write(hashlib.sha256(code).digest() + code)
+
+    def _load_data(self, name: str) -> Any:
+        whole = Path(self._data_path(name)).read_bytes()
+        said, code = whole[:HASH], whole[HASH:]
+        if hashlib.sha256(code).digest() != said:
+            raise ValueError("the code on disk is damaged")
+        return pickle.loads(code)  # noqa: S301  (it has its hash)
+
+
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """numba's cache of one kernel, in a folder whose name says all there is to know of it.
+
+    A cache on a full disk, or a damaged one, costs a compilation and not the run.
+    """
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._name, self._py_func = repr(function), function
+        self._impl = CompileResultCacheImpl.__new__(CompileResultCacheImpl)
+        self._impl._locator = _Folder(folder, function)
+        self._impl._lineno = function.__code__.co_firstlineno
+        self._cache_path = str(folder)
+        self._cache_file = _Index(self._cache_path, "code", "")
+        self.enable()
+
+    def _index_key(self, signature: Any, codegen: Any) -> Any:
+        return signature, codegen.magic_tuple()
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
+        loaded = None
+        try:
+            loaded = super().load_overload(signature, target_context)
+            sound = loaded is None or tuple(loaded.signature.args) == tuple(signature)
+        except Exception:  # noqa: BLE001  (a truncated pickle raises nearly anything)
+            sound = False
+        if loaded is None or not sound:
+            for tell in on_cold:
+                tell()
+        if sound:
+            return loaded
+        with contextlib.suppress(Exception):
+            self.flush()  # begin anew: what is damaged, or another signature's, would stand in the way of saving, too
+        return None
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        with contextlib.suppress(OSError):
+            super().save_overload(signature, data)
+
+
+@contextlib.contextmanager
+def _not_collecting() -> Iterator[None]:
+    """While any thread is in here, Python looks for no cyclic garbage."""
+    with _collecting:
+        _compiling.append(gc.isenabled())
+        gc.disable()
+    try:
+        yield
+    finally:
+        with _collecting:
+            first = _compiling[0]  # what the first thread found, whoever leaves
+            _compiling.pop()
+            if first and not _compiling:
+                gc.enable()
+
+
+def _without_collecting(compiling: Callable[..., Any]) -> Callable[..., Any]:
+    """The same while Python looks for no cyclic garbage: numba's trees are none before the end, and grow to millions.
+
+    It takes 9 % less time, and 100 MB more for the largest kernel there is.
+    """
+
+    @functools.wraps(compiling)
+    def compile_now(signature: Any) -> Any:
+        with _not_collecting():
+            return compiling(signature)
+
+    return compile_now
+
+
+@by_name
+def compile_kernel(function: Callable[..., Any]) -> Any:
+    """``njit`` with the disk cache.
+
+    Division by zero gives infinity, as in C: the kernel's outcome says what became of it.
+    A kernel with functions typed at a prompt, which have no source file, compiles without the cache. The constructor of
+    a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
+    """
+    _register_parts()
+    kernel = njit(**OPTIONS)(function)
+    kernel.compile = _without_collecting(kernel.compile)
+    walk = code_of(function)
+    written = [part for part in walk.functions if not part.__module__.startswith("namedtuple_")]
+    if all(Path(part.__code__.co_filename).is_file() for part in written):
+        folder = cache_root() / "kernels" / digest(walk.values())
+        touch(folder)
+        kernel._cache = _Cache(function, folder)
+    return kernel
+
+
+def is_kept(kernel: Any, signature: Any) -> bool:
+    """Is a kernel compiled for this signature, in memory or in the cache?"""
+    if signature in kernel.overloads:
+        return True
+    folder = getattr(kernel._cache, "_cache_file", None)
+    index = folder._load_index() if folder is not None else {}
+    return kernel._cache._index_key(signature, kernel.targetctx.codegen()) in index
+
+
+@intrinsic
+def _fma(typing, a, b, c):  # type: ignore[no-untyped-def]
+    """LLVM's fma: one instruction where the processor has it, exact software where it has not."""
+
+    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return builder.fma(*arguments)
+
+    return types.float64(types.float64, types.float64, types.float64), emit
+
+
+@overload(fused, inline="always")
+def _fused(a, b, c):  # type: ignore[no-untyped-def]
+    if not all(isinstance(value, types.Float) for value in (a, b, c)):
+        return None
+
+    def once(a, b, c):  # type: ignore[no-untyped-def]
+        return _fma(a, b, c)
+
+    return once
+
+
+@overload(two_product, inline="always")
+def _two_product(a, b):  # type: ignore[no-untyped-def]
+    def exactly(a, b):  # type: ignore[no-untyped-def]
+        product = a * b
+        return product, _fma(a, b, -product)
+
+    return exactly
+
+
+@intrinsic
+def _times(typing, values, by):  # type: ignore[no-untyped-def]
+    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        result, factor = arguments
+        for i in range(len(values)):
+            result = builder.insert_value(result, builder.fmul(builder.extract_value(result, i), factor), i)
+        return result
+
+    return values(values, types.float64), emit
+
+
+def times(values: Any, by: float) -> Any:
+    """A row of doubles, each multiplied by the number `by`: a new tuple, or the same array."""
+    if isinstance(values, tuple):
+        return tuple(value * by for value in values)
+    for i in range(len(values)):
+        values[i] = values[i] * by
+    return values
+
+
+def with_item(values: Any, i: int, value: float) -> Any:
+    """A row with number i replaced: a new tuple, or the same array."""
+    if isinstance(values, tuple):
+        return (*values[:i], value, *values[i + 1 :])
+    values[i] = value
+    return values
+
+
+@overload(times, jit_options=INLINED, strict=False)
+def _compiled_times(values: Any, by: float) -> Callable[..., Any]:
+    def tupled(values, by):  # type: ignore[no-untyped-def]
+        return _times(values, by)
+
+    def in_array(values, by):  # type: ignore[no-untyped-def]
+        for i in range(len(values)):
+            values[i] = values[i] * by
+        return values
+
+    return in_array if isinstance(values, types.Array) else tupled
+
+
+@overload(with_item, jit_options=INLINED, strict=False)
+def _compiled_with_item(values: Any, i: int, value: float) -> Callable[..., Any]:
+    def tupled(values, i, value):  # type: ignore[no-untyped-def]
+        return set_item(values, i, value)
+
+    def in_array(values, i, value):  # type: ignore[no-untyped-def]
+        values[i] = value
+        return values
+
+    return in_array if isinstance(values, types.Array) else tupled

@@ -1,0 +1,101 @@
+"""Threads for functions that release Python's lock, and processes that each use one thread for linear algebra.
+
+A process a core with a thread a core in each makes as many threads as cores squared, and OpenBLAS spins while it waits:
+a least-squares fit that takes milliseconds with one thread takes a hundred times as long with two on two busy cores.
+The library reads its variable when it is loaded, so that it is set while a process starts; a user's own setting is
+kept.
+"""
+
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from itertools import islice
+from multiprocessing.context import SpawnContext, SpawnProcess
+from typing import Any, ClassVar, TypeVar
+
+Piece = TypeVar("Piece")
+Result = TypeVar("Result")
+
+MOST_THREADS = 1024
+AHEAD = 2  # pieces a thread that are begun or done before they are asked for: what is waiting takes memory
+_stop = threading.local()
+
+
+class StoppedError(Exception):
+    """The work that this thread is part of was interrupted."""
+
+
+def cores() -> int:
+    """Cores this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1
+
+
+def heed() -> None:
+    """Raise `StoppedError` if the work was interrupted; for long pieces to call between their compiled calls."""
+    asked = getattr(_stop, "asked", None)
+    if asked is not None and asked.is_set():
+        raise StoppedError
+
+
+def _listen(asked: threading.Event) -> None:
+    _stop.asked = asked
+
+
+def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads: int) -> Iterator[Result]:
+    """The results of the pieces, in their order.
+
+    An exception of one piece, or an interrupt while waiting, drops the pieces that have not begun and is raised at
+    once; pieces that have begun end when they next call `heed`. With one thread the work is done in the caller's.
+    """
+    if threads == 1:
+        yield from map(work, pieces)
+        return
+    asked = threading.Event()
+    pool = ThreadPoolExecutor(threads, initializer=_listen, initargs=(asked,))
+    try:
+        yield from in_order(pool, work, pieces, AHEAD * threads)
+    except BaseException:
+        asked.set()
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+def in_order(pool: Executor, work: Callable[[Piece], Result], pieces: Iterable[Piece], ahead: int) -> Iterator[Result]:
+    """The results of the pieces that a pool computes, in their order; `ahead` of them are with the pool at a time."""
+    rest = iter(pieces)
+    begun: list[Future[Result]] = [pool.submit(work, piece) for piece in islice(rest, ahead)]
+    while begun:
+        yield begun.pop(0).result()
+        begun += [pool.submit(work, piece) for piece in islice(rest, 1)]
+
+
+VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")  # of NumPy's and SciPy's builds
+
+
+class OneThread(SpawnProcess):
+    """A process with one thread for linear algebra."""
+
+    def start(self) -> None:
+        """Start it; the environment of this process is afterwards what it was."""
+        added = [name for name in VARIABLES if name not in os.environ]
+        os.environ.update(dict.fromkeys(added, "1"))
+        try:
+            super().start()
+        finally:
+            for name in added:
+                del os.environ[name]
+
+
+class _Context(SpawnContext):
+    Process: ClassVar[Any] = OneThread
+
+
+def context() -> multiprocessing.context.SpawnContext:
+    """What `concurrent.futures.ProcessPoolExecutor` starts such processes with."""
+    return _Context()

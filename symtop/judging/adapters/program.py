@@ -1,0 +1,117 @@
+"""Any program: it reads one line on the standard input and writes states on the standard output.
+
+    in      I1 I3 mgl h n stride y1 y2 ...           numbers, separated by blanks
+    out     the state after 0, stride, 2 stride, ... n steps, as text (any blanks or commas) or as raw doubles
+
+y is (e, L) on the axis, (q, L) on the attitude, (theta, phi, psi and their rates) in angles; n is a multiple of stride,
+and h may be negative. The program is started for every run, so that nothing is left from one to the next.
+"""
+
+import contextlib
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop.core.errors import SymtopError, at_home
+from symtop.judging.adapters.adapter import March, label_of
+from symtop.judging.heartbeat import pulse
+from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.plan import Array
+from symtop.methods.framework.registry import Solver
+from symtop.model.top import SymmetricTop
+
+WORDS = 100  # characters of what a program says when it fails
+SHORT = 1e-3  # relative: digits that a program may leave out
+SLACK = 5.0  # times the seconds that earlier runs make one expect
+
+
+class Program:
+    """A stepper around a command."""
+
+    implementation = "python"
+    adaptive: Solver | None = None
+    own_loop = True
+
+    def __init__(self, command: str, chart: str) -> None:
+        self.words, self.chart, self.form = shlex.split(command), chart, FORMULATIONS[chart]
+        self.words[:1] = [str(at_home(word)) if word.startswith("~") else word for word in self.words[:1]]
+        if not self.words or shutil.which(self.words[0]) is None:
+            raise SymtopError(f"a program must be a command that can be run, not {command!r}")
+        self.name = label_of(Path(self.words[0]).name)
+        self.seconds_a_step = 0.0  # of the slowest run so far
+
+    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: NDArray[np.int64]) -> March:
+        """The state at the marks; SymtopError if the program fails or writes anything else."""
+        stride = max(int(np.gcd.reduce(marks)), 1)
+        last = int(marks[-1])
+        numbers = [top.I1, top.I3, top.mgl, h, last, stride, *y.tolist()]
+        rows = last // stride + 1
+        answer = self._answer(" ".join(map(repr, numbers)) + "\n", h, last)
+        states = _states(answer, rows, y.size, self.name)
+        if not _begins(states[0], y):
+            raise SymtopError(
+                f"{self.name} must write the start that it was given as the first of its states, not "
+                f"{', '.join(f'{value:.4g}' for value in states[0])}"
+            )
+        return March(states[marks // stride], 0)
+
+    def _answer(self, line: str, h: float, steps: int) -> bytes:
+        expected = SLACK * self.seconds_a_step * steps
+        seconds = pulse.patience + expected
+        pulse.begin(h, expected + seconds)
+        began = time.monotonic()
+        with subprocess.Popen(  # noqa: S603  (the command is the user's)
+            self.words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+        ) as process:
+            try:
+                out, said = process.communicate(line.encode(), timeout=seconds)
+            except subprocess.TimeoutExpired:
+                with contextlib.suppress(OSError):
+                    os.killpg(process.pid, signal.SIGKILL)
+                raise SymtopError(
+                    f"{self.name} had not ended {seconds:.0f} s after it was asked for {steps} steps of {h:.3g}"
+                ) from None
+        pulse.end()
+        if process.returncode != 0:
+            words = " ".join(said.decode(errors="replace").split())[-WORDS:]
+            raise SymtopError(f"{self.name} ended with code {process.returncode}: {words or 'it said nothing'}")
+        if steps > 0:
+            self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps) if steps > 50 else 0.0
+        return out
+
+
+def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
+    """The states that a program wrote, shape (rows, size)."""
+    if len(answer) == 8 * rows * size:
+        raw = np.frombuffer(answer)
+        if not _is_text(answer):
+            return raw.reshape(rows, size).copy()
+    try:
+        values = np.array(answer.decode("ascii").replace(",", " ").split(), dtype=float)
+    except ValueError:
+        shown = answer[:40].decode(errors="replace").strip()
+        raise SymtopError(f"{name} must write numbers, as text or as raw doubles, not {shown!r}") from None
+    if values.size != rows * size:
+        raise SymtopError(
+            f"{name} must write {rows} states of {size} numbers (the start and one every stride steps), "
+            f"{rows * size} in all, not {values.size}"
+        )
+    return values.reshape(rows, size)
+
+
+def _begins(state: Array, start: Array) -> bool:
+    """Is a state the start, but for rounding, the sign of a quaternion and whole turns?"""
+    turns = np.stack([state - start, state + start, np.sin(0.5 * (state - start))])  # any of them shows that it is
+    return bool((np.abs(turns).min(axis=0) <= SHORT * np.abs(start).max()).all()) or not np.isfinite(state).all()
+
+
+def _is_text(answer: bytes) -> bool:
+    return all(byte in b"0123456789+-.eEinfaINFA, \t\r\n" for byte in answer)

@@ -1,0 +1,110 @@
+"""A Python function ``step(q, w, h, inertia, torque) -> q, w``: the rotation of a rigid body, as engines integrate it.
+
+    q' = q (0, w) / 2,        inertia w' = (inertia w) x w + torque(q)          all in the body frame
+
+q = (w, x, y, z) turns body vectors into space vectors, w is the angular velocity in the body frame, inertia holds the
+three principal moments (I1, I1, I3) about the pivot, and torque(q) is that of gravity, in the body frame. The angular
+momentum in space, L = R(q) inertia w, is made of both, R(q) with q at length one; a q that loses its length shows it
+as an axis that is not a unit vector.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop.core.errors import SymtopError
+from symtop.judging.adapters.adapter import March, label_of
+from symtop.judging.adapters.python_step import LOOK, state_like
+from symtop.judging.heartbeat import pulse
+from symtop.methods.framework.formulations import FORMULATIONS, Formulation
+from symtop.methods.framework.plan import Array
+from symtop.methods.framework.registry import Solver
+from symtop.methods.framework.space import ended_space, on_attitude
+from symtop.model.top import Angles, SymmetricTop
+from symtop.model.view import space_momenta
+
+
+class Body(NamedTuple):
+    """What a rigid body on a pivot is: principal moments (3,), and its weight times the height of its centre."""
+
+    inertia: Array
+    mgl: float
+
+
+def to_space(q: Any, vector: Any) -> Any:
+    """R(q) vector for q of any length, shapes (..., 4) and (..., 3)."""
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    turned = np.cross(q[..., 1:], vector)
+    return vector + 2.0 * (q[..., :1] * turned + np.cross(q[..., 1:], turned))
+
+
+def to_body(q: Any, vector: Any) -> Any:
+    """R(q)^T vector."""
+    return to_space(q * np.array([1.0, -1.0, -1.0, -1.0]), vector)
+
+
+def _begin(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
+    """The body and the state (q, w) of a start."""
+    state = np.array(on_attitude(top, at)[1])
+    inertia = np.array([top.I1, top.I1, top.I3])
+    return Body(inertia, top.mgl), (*state[:4].tolist(), *(to_body(state[:4], state[4:]) / inertia).tolist())
+
+
+def _show(body: Body, _times: Array, states: Array) -> Array:
+    """States (q, L) of states (q, w)."""
+    with np.errstate(all="ignore"):
+        return np.concatenate([states[:, :4], to_space(states[:, :4], body.inertia * states[:, 4:])], axis=1)
+
+
+def _momenta(body: Body, states: Array) -> tuple[Array, Array]:
+    p_phi, p_psi = space_momenta("attitude", _show(body, states[:, 0], states))
+    return p_phi, p_psi
+
+
+ROTATION = Formulation(
+    FORMULATIONS["attitude"].field, ended_space, FORMULATIONS["attitude"].observe, _begin, _show, _momenta
+)
+
+
+class RotationStep:
+    """A stepper around the function."""
+
+    implementation, chart, form = "python", "attitude", ROTATION
+    adaptive: Solver | None = None
+    own_loop = False
+
+    def __init__(self, function: Callable[..., Any], name: str = "") -> None:
+        self.function = function
+        self.name = label_of(name or getattr(function, "__name__", type(function).__name__))
+
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: NDArray[np.int64]) -> March:
+        """The state at the marks; the torques that it asks for are its force evaluations."""
+        asked, down = 0, np.array([0.0, 0.0, -par.mgl])
+
+        def torque(q: Any) -> Array:
+            nonlocal asked
+            asked += 1
+            moment: Array = np.cross([0.0, 0.0, 1.0], to_body(np.asarray(q, dtype=float), down))
+            return moment
+
+        states, done = np.full((marks.size, 7), np.nan), 0
+        for place, mark in enumerate(marks):
+            for k in range(done, int(mark)):
+                if k % LOOK == 0 and not np.isfinite(y).all():
+                    return March(states, asked)
+                pulse.begin(h)
+                after = self.function(y[:4].copy(), y[4:].copy(), h, par.inertia.copy(), torque)
+                pulse.end()
+                y = _joined(y, after)
+            done, states[place] = int(mark), y
+        return March(states, asked)
+
+
+def _joined(before: Array, after: Any) -> Array:
+    """(q, w) as one state; SymtopError if it is no such pair."""
+    if not isinstance(after, (tuple, list)) or len(after) != 2:
+        raise SymtopError(f"step must return q and w, a pair, not {type(after).__name__}")
+    q, w = (state_like(part, value, "step") for part, value in zip((before[:4], before[4:]), after, strict=True))
+    return np.concatenate([q, w])

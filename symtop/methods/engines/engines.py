@@ -1,0 +1,109 @@
+"""The integrators that physics engines ship, as methods of the registry: family ``engine``.
+
+People choose an engine and get its integrator. Each of these is the map that an engine takes a free body with a torque
+through, written down again from its source and run against it (`make engines`); the top is a body whose centre is
+fixed, in a torque mgl k x e. Only the map is here: no contacts, no joints, no damping, no limit of speed.
+
+Comparisons of methods leave this family out (`registry.methods`); the claims table judges it and a study of its own
+runs it. An engine that works in single precision has its map in both, as ``jolt`` and ``jolt-float32``: the first shows
+the method, the second what rounding makes of it, and of a limit h -> 0 it claims nothing.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from symtop.methods.engines import engine_kicks as kicks, engine_schemes as schemes, no_squish
+from symtop.methods.engines.engine_kicks import Substeps
+from symtop.methods.engines.engine_loop import (
+    ANGULAR_MOMENTUM,
+    VELOCITY,
+    Carried,
+    attitude_loop,
+    axis_loop,
+    nothing,
+    single,
+)
+from symtop.methods.engines.engine_parts import acceleration
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import Loop
+from symtop.methods.framework.registry import ENGINE, Integrator
+
+SINGLE = "-float32"  # what the name of a map in single precision ends with
+
+
+def _entry(
+    name: str, loops: dict[str, Loop], order: int | None, summary: str, reference: str, keeps: str = "", *,
+    carried: Carried = VELOCITY, rule: Any = None, forces: int = 1, symplectic: bool = False,
+    energy_error: str | None = None,
+) -> Integrator:  # fmt: skip
+    """The record of a map from its loops, by chart; `keeps` names the momenta that it conserves."""
+    return Integrator(
+        name=name, family=ENGINE, summary=summary, reference=reference, order=order, explicit=True,
+        symplectic=symplectic, symmetric=symplectic, conserves=frozenset(keeps.split()), energy_error=energy_error,
+        solvers={
+            chart: FixedStep(loop, rule or Substeps(), carried.prepare[chart], forces, implicit=False)
+            for chart, loop in loops.items()
+        },
+    )  # fmt: skip
+
+
+def _engine(
+    name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "", *,
+    carried: Carried = VELOCITY, reused: Callable[..., Any] = nothing, **said: Any,
+) -> Integrator:  # fmt: skip
+    """A map in double, on the axis and on the attitude."""
+    loops = {"axis": axis_loop(step, carried, reused), "attitude": attitude_loop(step, carried, reused)}
+    return _entry(name, loops, order, summary, reference, keeps, carried=carried, **said)
+
+
+def _both(
+    name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "",
+    rule: Any = None, energy_error: str | None = None,
+) -> list[Integrator]:  # fmt: skip
+    """A map in double and in the single precision of the engine, there on the attitude as the engine steps it."""
+    rounded = {"attitude": attitude_loop(step, VELOCITY, number=single)}
+    said = f"{summary}, in single precision"
+    return [
+        _engine(name, step, order, summary, reference, keeps, rule=rule, energy_error=energy_error),
+        _entry(name + SINGLE, rounded, None, said, reference, rule=rule),
+    ]
+
+
+def built_in() -> list[Integrator]:
+    """Seventeen maps, five of them in single precision too."""
+    return [
+        *_both("no-gyro", kicks.no_gyro, None, "Havok, PhysX and Jolt by default: no gyroscopic term",
+               "havok physx jolt", "p_psi", energy_error="bounded"),
+        _engine("no-gyro-linear", kicks.no_gyro_linear, None,
+                "cannon-es, ODE with its gyroscopic mode off: no gyroscopic term, a linear turn", "cannon-es ode",
+                "p_psi", energy_error="bounded"),
+        _engine("mujoco-euler", kicks.explicit, 1, "MuJoCo Euler, PyBullet, DART: explicit gyroscopic term",
+                "mujoco pybullet dart"),
+        _engine("mujoco-implicit", kicks.implicit, 1, "MuJoCo implicit: one Newton step of the velocity",
+                "mujoco", "p_psi"),
+        *_both("bullet", kicks.implicit_then_torque, 1, "Bullet by default: implicit gyroscopic term, then the torque",
+               "bullet", "p_psi"),
+        *_both("jolt", kicks.rescaled_then_torque, 1, "Jolt with its gyroscopic term: |L| kept, then the torque",
+               "jolt"),
+        *_both("physx", kicks.torque_then_rescaled, 1, "PhysX with its gyroscopic flag: the torque, then |L| kept",
+               "physx"),
+        *_both("rapier", kicks.substepped, 1, "Rapier by default: four substeps, |L| kept in each",
+               "rapier", rule=Substeps(4, 0.25)),
+        _engine("ode", kicks.projected_then_torque, 1, "ODE by default: gyroscopic term implicit in the velocity",
+                "ode lacoursiere-2006"),
+        _engine("lammps-rigid", schemes.richardson, 2, "LAMMPS fix rigid: half kicks around an extrapolated rotation",
+                "lammps", "p_phi", carried=ANGULAR_MOMENTUM),
+        _entry("no-squish", {"attitude": no_squish.march}, 2, "LAMMPS fix rigid/nve: turns about the body's axes",
+               "miller-2002 lammps", "p_phi", carried=ANGULAR_MOMENTUM, symplectic=True),
+        _engine("yade", schemes.fincham_at_start, 1, "YADE: rotational leapfrog with the axes of the start of a step",
+                "yade", "p_phi", carried=ANGULAR_MOMENTUM),
+        _engine("fincham", schemes.fincham, 2, "the rotational leapfrog as published", "fincham-1992", "p_phi",
+                carried=ANGULAR_MOMENTUM),
+        _engine("mujoco3-rk4", schemes.runge_kutta_on_rates, 2, "MuJoCo RK4 up to 3.17: stages turn by their rates",
+                "mujoco-3", "p_psi", forces=4),
+        _engine("rkmk4", schemes.runge_kutta_munthe_kaas, 4, "MuJoCo 4.0 RK4, Exudyn: Runge-Kutta-Munthe-Kaas",
+                "munthe-kaas-1999 mujoco exudyn", "p_psi", forces=4),
+        _engine("jsbsim-default", schemes.explicit_euler, 1, "JSBSim by default: explicit Euler", "jsbsim"),
+        _engine("jsbsim-buss2", schemes.adams_bashforth, 2, "JSBSim Buss2 and AB2: Adams-Bashforth and Magnus",
+                "jsbsim buss-2000", reused=acceleration),
+    ]  # fmt: skip

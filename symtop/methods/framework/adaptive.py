@@ -1,0 +1,89 @@
+"""From a compiled loop that chooses its steps to a solver of the registry, for one run and for many.
+
+    loop(numbers, tolerance, times, budget, seen, place, states, momenta) -> (seen, steps, effort, outcome)
+
+goes on from `place`, or begins at the start in `numbers` (`symtop.model.top.flat`) if `seen` is negative, and fills
+`states` and `momenta` (p_phi, p_psi) at `times` until the last of them, a failure or `budget` units of effort, which
+may be passed by one step. It returns the samples that it has filled since the start, and the steps and the effort of
+this call. `place` holds all that its next step depends on, the time that was reached among it, so that a run in several
+calls has the bits of one call.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from symtop.core.parallel import heed
+from symtop.methods.framework.many import Many, Whole, refused
+from symtop.methods.framework.outcomes import LEFT_CHART, OK, OUT_OF_BUDGET, OUTCOMES
+from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.preparation import Requirement
+from symtop.model.top import Angles, SymmetricTop, flat
+
+Loop = Callable[..., tuple[int, int, int, int]]
+
+
+def one(tolerance: float) -> int:
+    """The unit of effort is a force evaluation."""
+    return 1
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """A solver around compiled loops with a tolerance; a run is one call where it ends within `block`."""
+
+    loop: Callable[[float], Loop]  # of a tolerance
+    size: int  # of a sample
+    room: int  # numbers of a place
+    time: int  # which of them is the time that was reached
+    most: float  # units of effort of a run without a budget
+    block: int  # units between returns to Python, so that an interrupt is heard within a second
+    unit: Callable[[float], int] = one  # force evaluations of a unit of effort, of a tolerance
+    check: Requirement | None = None  # what a start must meet
+
+    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        """Start to horizon."""
+        if self.check is not None:
+            self.check(start)
+        times = np.ascontiguousarray(plan.times)
+        states, momenta = np.full((times.size, self.size), np.nan), np.full((times.size, 2), np.nan)
+        made = self._run(flat(top, start), plan.tolerance, times, plan.budget, states, momenta)
+        steps, evaluations, outcome, reached = made
+        return Run(states, momenta[:, 0], momenta[:, 1], steps, evaluations, 0, OUTCOMES[outcome], reached)
+
+    def many(
+        self, numbers: Array, tolerance: Array, times: Array, counts: Whole, budget: float | None = None
+    ) -> tuple[Many, Array]:
+        """The runs of n members one after another, and the times that they reached, (n,).
+
+        `numbers` (n, 9), `tolerance` (n,), `times` (n, samples), of which the first `counts` (n,) of a member are
+        asked for. Each has the bits of a run alone, and a member that fails fails alone. Work is in force evaluations.
+        """
+        done, reached = Many.begun(len(numbers), times.shape[1], self.size), np.zeros(len(numbers))
+        out, times = refused(self.check, numbers), np.ascontiguousarray(times)
+        done.outcome[out] = LEFT_CHART
+        for i, plain in enumerate(map(tuple, numbers.tolist())):
+            heed()
+            if not out[i]:
+                samples = times[i, : counts[i]]
+                made = self._run(plain, float(tolerance[i]), samples, budget, done.states[i], done.momenta[i])
+                done.steps[i], done.work[i], done.outcome[i], reached[i] = made
+        return done, reached
+
+    def _run(
+        self, numbers: tuple[float, ...], tolerance: float, times: Array, budget: float | None, states: Array,
+        momenta: Array,
+    ) -> tuple[int, int, int, float]:  # fmt: skip
+        """Fill in the samples: steps, force evaluations, outcome and the time that was reached."""
+        loop, unit = self.loop(tolerance), self.unit(tolerance)
+        place, most = np.empty(self.room), self.most if budget is None else budget / unit
+        seen, steps, effort, outcome = -1, 0, 0, OK
+        while seen < times.size and outcome == OK and effort < most:
+            block = int(min(self.block, most - effort)) or 1
+            seen, more, work, outcome = loop(numbers, tolerance, times, block, seen, place, states, momenta)
+            steps, effort = steps + more, effort + work
+        if seen < times.size and outcome == OK:
+            outcome = OUT_OF_BUDGET
+        reached = float(times[-1] if outcome == OK else place[self.time])
+        return steps, effort * unit, outcome, reached

@@ -1,0 +1,362 @@
+"""The registry: an integrator is a record of claims and a solver for each chart it works in.
+
+Traits are data. They are *claims* until measured; `None` means that nobody has claimed anything. A record is
+made by a family (`discrete_lagrangian`, `composition`, ...) from a table of numbers, or by hand around any
+function ``solve(top, start, plan) -> Run``. Nothing is decided by an integrator's name: what a measurement needs to
+know of a method is a field of its record.
+
+A method in one of its charts is a *row* of a comparison, ``rk4[axis]``: method and chart are two factors, and a
+comparison of ``rk4[angles]`` with ``strang[axis]`` changes both. `rows` lists them; `integrator` knows them by name.
+
+The maps of physics engines, family ``engine``, are registered, judged and run by name as every integrator is. They are
+what people are given, not what one would choose: `methods`, and so `rows` and every comparison, leaves them out.
+"""
+
+import importlib
+import importlib.metadata
+import re
+import threading
+import warnings
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop.core.code_hash import by_name
+from symtop.core.errors import (
+    SymtopError,
+    SymtopWarning,
+    finite,
+    label,
+    not_negative,
+    one_of,
+    positive,
+    shown,
+    whole,
+    words_of,
+)
+from symtop.core.signals import is_of_user
+from symtop.methods.framework.about import paragraphs
+from symtop.methods.framework.plan import Plan, Run
+from symtop.model.charts import DIMENSIONS
+from symtop.model.top import Angles, Momenta, SymmetricTop
+from symtop.model.view import View
+
+Array = NDArray[np.float64]
+Solver = Callable[[SymmetricTop, Angles, Plan], Run]
+ModifiedEnergy = Callable[[View, Momenta, float], Array]  # of states (n, dimension), momenta of the start and h: (n,)
+
+ENGINE = "engine"  # the family of maps that physics engines ship
+FAMILIES = (
+    "discrete-lagrangian", "splitting", "runge-kutta", "lie-group", "taylor", "library", "exact", ENGINE, "other",
+)  # fmt: skip
+IMPLEMENTATIONS = ("compiled", "python")
+ENERGY_ERRORS = ("kept", "bounded", None)
+ALLOWED: dict[str, tuple[Any, ...]] = {
+    **dict.fromkeys(("explicit", "symplectic", "symmetric"), (True, False, None)), "exact_steps": (True, False),
+    "control": ("step_size", "tolerance", None), "energy_error": ENERGY_ERRORS,
+}  # fmt: skip
+KINDS: dict[str, tuple[Any, str]] = {
+    **dict.fromkeys(("summary", "reference", "about"), (str, "text")), "same_steps_as": (str | None, "a name or None"),
+    **dict.fromkeys(("modified_energy", "sleeps_from"), (Callable | None, "a function or None")),
+}  # fmt: skip
+CONSERVED = ("energy", "p_phi", "p_psi", "axis_length", "cayley_energy")  # what a method may claim to conserve
+SMALLEST_FIRST = {  # the charts that show it, in order of preference
+    "nutation": ("angles", "axis", "attitude"), "axis": ("axis", "angles", "attitude"),
+    "attitude": ("angles", "attitude"),
+}  # fmt: skip
+_ROW = re.compile(r"(.+)\[(\w+)\]")
+_CLAIM = {True: "yes", False: "no", None: "unknown"}
+
+
+def split_name(name: str) -> tuple[str, str]:
+    """The method and the chart in the name of a row, ``rk4[axis]``; the chart is empty in any other name."""
+    row = _ROW.fullmatch(name) if isinstance(name, str) else None
+    return (row[1], row[2]) if row else (name, "")
+
+
+class Setting(NamedTuple):
+    """A value of an integrator's control: a step, a tolerance, or NaN where there is nothing to set."""
+
+    control: str | None  # step_size, tolerance or None
+    value: float
+
+    def kwargs(self) -> dict[str, float]:
+        """The argument of `simulate` that it stands for."""
+        return {} if self.control is None else {self.control: self.value}
+
+    @property
+    def label(self) -> str:
+        """What a sentence calls it."""
+        return f"{(self.control or 'nothing').replace('_', ' ')} {self.value:.4g}"
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """One integrator: its name, its claims, and how to run it.
+
+    `solvers` maps a chart (angles, axis, attitude) to a function. `control` is what a user turns: ``step_size``,
+    ``tolerance`` or nothing. `implementation` says what executes the inner loop, so that languages are never ranked
+    against each other unsaid. `summary` is a line about it, `about` a paragraph; the built-in ones have theirs from
+    `about.md`. Raises SymtopError for a field that makes no sense.
+    """
+
+    name: str
+    family: str
+    summary: str = field(metadata={"words": True})
+    solvers: Mapping[str, Solver] = field(repr=False)
+    control: str | None = "step_size"
+    implementation: str = "compiled"
+    order: int | None = None
+    explicit: bool | None = None
+    symplectic: bool | None = None
+    symmetric: bool | None = None
+    conserves: frozenset[str] | None = None
+    least_tolerance: float = 0.0
+    default_tolerance: float | None = None
+    reference: str = field(default="", metadata={"words": True})
+    energy_error: str | None = None  # "kept" or "bounded"; None says what follows from the other claims
+    modified_energy: ModifiedEnergy | None = None  # what it conserves to O(h^4) less the energy, in closed form
+    sleeps_from: Callable[[float], float] | None = None  # spin of the sleeping top (I1 = I3 = mgl = 1) at a step h
+    exact_steps: bool = False  # a step of any size is the motion itself but for rounding: there is no order
+    same_steps_as: str | None = None  # a compiled integrator that takes the same steps
+    speed: float = 1.0  # of a step, in units of others of its implementation: 0.002 for arithmetic in software
+    about: str = field(default="", repr=False, compare=False, metadata={"words": True})  # a paragraph: what it is, when
+
+    def __post_init__(self) -> None:
+        name, chart = split_name(self.name)
+        label("name", name)
+        if chart and tuple(self.solvers) != (chart,):
+            raise SymtopError(f"name {self.name!r} needs one solver, of {chart}, not of {', '.join(self.solvers)}")
+        if self.order is not None:
+            whole("order", self.order, 1)
+        one_of("family", self.family, FAMILIES)
+        one_of("implementation", self.implementation, IMPLEMENTATIONS)
+        self._check_kinds()
+        given = dict(self.solvers) if isinstance(self.solvers, Mapping) else {}
+        if not given or not set(given) <= {*DIMENSIONS} or not all(map(callable, given.values())):
+            charts = ", ".join(DIMENSIONS)
+            raise SymtopError(f"solvers must map one of {charts} to a function, not {shown(self.solvers)}")
+        object.__setattr__(self, "solvers", MappingProxyType(given))
+        positive("speed", self.speed)
+        if self.exact_steps and (self.order is not None or not self.fixed_step):
+            raise SymtopError("exact_steps must be False for a method that has an order or no step_size")
+        if self.conserves is not None:
+            if isinstance(self.conserves, str) or not isinstance(self.conserves, Collection):
+                raise SymtopError(f"conserves must be a set of names, not {self.conserves!r}")
+            kept = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in self.conserves)
+            object.__setattr__(self, "conserves", kept)
+
+    def _check_kinds(self) -> None:
+        for name, allowed in ALLOWED.items():
+            value = getattr(self, name)
+            if not isinstance(value, str | bool | np.bool_ | None) or value not in allowed:
+                *first, last = map(repr, allowed)
+                raise SymtopError(f"{name} must be {', '.join(first)} or {last}, not {shown(value)}")
+        for name, (kind, words) in KINDS.items():
+            if not isinstance(getattr(self, name), kind):
+                raise SymtopError(f"{name} must be {words}, not {shown(getattr(self, name))}")
+        least, usual = not_negative("least_tolerance", self.least_tolerance), self.default_tolerance
+        if usual is not None and not max(least, 5e-324) <= finite("default_tolerance", usual) < 1.0:
+            raise SymtopError(f"default_tolerance must be above zero, at least {least:g} and below 1, not {usual!r}")
+
+    def check_tolerance(self, tolerance: object) -> float:
+        """The tolerance to use, refused where the arithmetic cannot reach it."""
+        value = self.default_tolerance if tolerance is None else positive("tolerance", tolerance)
+        if value is None:
+            raise SymtopError(f"{self.name} is adaptive and needs a tolerance, for example 1e-6")
+        if value < self.least_tolerance or value >= 1.0:
+            raise SymtopError(
+                f"tolerance of {self.name} must be at least {self.least_tolerance:.3g} and below 1, not {value!r}"
+            )
+        return finite("tolerance", value)
+
+    @property
+    def fixed_step(self) -> bool:
+        """Is a step what a user sets?"""
+        return self.control == "step_size"
+
+    @property
+    def adaptive(self) -> bool:
+        """Is a tolerance what a user sets?"""
+        return self.control == "tolerance"
+
+    def setting(self, value: float) -> Setting:
+        """A value of what a user sets."""
+        return Setting(self.control, value)
+
+    def charts(self) -> tuple[str, ...]:
+        """The charts this integrator works in."""
+        return tuple(self.solvers)
+
+    def chart_for(self, observe: str, among: Collection[str] | None = None) -> str:
+        """The smallest chart that shows the "nutation", the "axis" or the "attitude", one without poles if two tie.
+
+        `among` leaves out all other charts. Raises SymtopError if no chart is left.
+        """
+        for chart in SMALLEST_FIRST[observe]:
+            if chart in self.solvers and (among is None or chart in among):
+                return chart
+        raise SymtopError(f"{self.name} works in {', '.join(self.solvers)} and cannot show the {observe}: observe axis")
+
+    @property
+    def method(self) -> str:
+        """The name without a chart."""
+        return split_name(self.name)[0]
+
+    def row(self, chart: str) -> "Integrator":
+        """The same integrator with nothing but its solver of one chart, named ``method[chart]``."""
+        name = f"{self.method}[{one_of(f'chart of {self.method}', chart, self.solvers)}]"
+        return self if name == self.name else replace(self, name=name, solvers={chart: self.solvers[chart]})
+
+    def record(self) -> dict[str, str]:
+        """What tables show of this integrator: its claims in words, by column."""
+        return {
+            "name": self.name,
+            "family": self.family,
+            "order": "unknown" if self.order is None else str(self.order),
+            **{trait: _CLAIM[getattr(self, trait)] for trait in ("explicit", "symplectic", "symmetric")},
+            "conserves": "unknown" if self.conserves is None else ", ".join(sorted(self.conserves)) or "nothing",
+            "charts": ", ".join(self.charts()),
+            "control": self.control or "none",
+            "implementation": self.implementation,
+            "summary": self.summary,
+        }
+
+
+_BUILT_IN = (
+    "lagrangian.discrete_lagrangian", "lagrangian.unreduced", "lagrangian.galerkin", "lagrangian.exact_discrete",
+    "lie_group.lie_variational", "splitting.splitting", "splitting.reversible_steps", "runge_kutta.runge_kutta",
+    "runge_kutta.dormand_prince", "runge_kutta.gauss", "runge_kutta.kahan", "lie_group.lie_runge_kutta",
+    "lie_group.energy_momentum", "lie_group.generalised_alpha", "runge_kutta.collective_gauss", "library.scipy_ivp",
+    "taylor.taylor", "taylor.series", "library.exact", "engines.engines",
+)  # fmt: skip
+ENTRY_POINTS = "symtop.integrators"  # an Integrator, or a function that returns several
+
+_registry: dict[str, Integrator] = {}
+_loaded: list[str] = []
+_announced: list[str] = []
+_missing: dict[str, str] = {}  # names that cannot be had on this machine, with the reason
+_shipped: set[str] = set()  # by symtop or an installed package: every process has them
+_loading = threading.RLock()  # the first call of one thread loads; a package that is being loaded may register
+
+
+def _load() -> None:
+    with _loading:
+        while len(_loaded) < len(_BUILT_IN):
+            module = importlib.import_module(f"symtop.methods.{_BUILT_IN[len(_loaded)]}")
+            _loaded.append(module.__name__)
+            for entry in module.built_in():
+                told = replace(entry, about=entry.about or paragraphs().get(entry.name, ""))
+                _registry.setdefault(entry.name, told)
+                _shipped.add(entry.name)
+            if hasattr(module, "missing"):
+                _missing.update(module.missing())
+        if not _announced:
+            _announced.append(ENTRY_POINTS)
+            _load_packages()
+
+
+def _load_packages() -> None:
+    """Integrators that installed packages announce; one that fails is named and left out."""
+    for point in importlib.metadata.entry_points(group=ENTRY_POINTS):
+        try:
+            announced = point.load()
+            for entry in [announced] if isinstance(announced, Integrator) else announced():
+                _shipped.add(register(entry).name)
+        except BaseException as error:  # (a stranger's package must not take the registry down)
+            if is_of_user(error):
+                raise
+            sentence = f"the integrators of {point.value} are left out: {words_of(error)}"
+            warnings.warn(sentence, SymtopWarning, stacklevel=4)
+
+
+def register(entry: Integrator, *, replace: bool = False) -> Integrator:
+    """Add an integrator to the registry; a name that is taken is refused unless `replace` is true."""
+    if not isinstance(entry, Integrator):
+        raise SymtopError(f"register needs an Integrator, not {entry!r}")
+    if entry.method != entry.name:
+        raise SymtopError(f"register needs an integrator and not one of its rows, {entry.name!r}")
+    _load()
+    if entry.name in _registry and not replace:
+        raise SymtopError(f"integrator {entry.name!r} is already registered; choose another name or pass replace=True")
+    _registry[entry.name] = entry
+    return entry
+
+
+def is_built_in(name: str) -> bool:
+    """Does every process know this integrator without being told?"""
+    _load()
+    return split_name(name)[0] in _shipped
+
+
+class _Integrators(dict[str, Integrator]):
+    """The registry as a dict; a notebook shows it as a table. A row is found under its name, too, but not listed."""
+
+    def __missing__(self, name: str) -> Integrator:
+        method, chart = _method_and_chart(name, self)
+        if not chart or method not in self:
+            raise KeyError(name)
+        return self[method].row(chart)
+
+    def _repr_html_(self) -> str:
+        import pandas as pd  # 0.2 s
+
+        with pd.option_context("display.max_colwidth", None):
+            return str(pd.DataFrame([entry.record() for entry in self.values()]).to_html(index=False))
+
+
+def _method_and_chart(name: str, registered: Collection[str]) -> tuple[str, str]:
+    """`split_name`, and the same of ``series-axis``, which stands for ``series[axis]`` where a shell reads brackets."""
+    method, chart = split_name(name)
+    head, _, tail = name.rpartition("-") if isinstance(name, str) else ("", "", "")
+    if head in registered and not chart and name not in registered and tail in DIMENSIONS:
+        return head, tail
+    return method, chart
+
+
+@by_name
+def integrators() -> dict[str, Integrator]:
+    """All registered integrators, by name, in order of registration."""
+    _load()
+    return _Integrators(_registry)
+
+
+@by_name
+def methods() -> dict[str, Integrator]:
+    """The integrators that comparisons and recommendations choose from: all but the maps of physics engines."""
+    return {name: entry for name, entry in integrators().items() if entry.family != ENGINE}
+
+
+@by_name
+def engines() -> dict[str, Integrator]:
+    """The maps of physics engines."""
+    return {name: entry for name, entry in integrators().items() if entry.family == ENGINE}
+
+
+@by_name
+def integrator(name: "str | Integrator") -> Integrator:
+    """The integrator of that name, or the row: ``rk4[axis]`` works in no other chart, nor does ``rk4-axis``, the same.
+
+    An Integrator is returned as is. Raises SymtopError for an unknown name, with the nearest ones, and for a chart that
+    the method does not have.
+    """
+    if isinstance(name, Integrator):
+        return name
+    _load()
+    method, chart = _method_and_chart(name, _registry)
+    if isinstance(method, str) and method in _missing:
+        raise SymtopError(_missing[method])
+    entry = _registry[one_of("integrator", method, _registry)]
+    return entry.row(chart) if chart else entry
+
+
+@by_name
+def rows(observe: str | None = None) -> list[Integrator]:
+    """Each of `methods` in each of its charts, or in those that show the "nutation", the "axis" or the "attitude"."""
+    showing = None if observe is None else SMALLEST_FIRST[one_of("observe", observe, SMALLEST_FIRST)]
+    pairs = ((entry, chart) for entry in methods().values() for chart in entry.charts())
+    return [entry.row(chart) for entry, chart in pairs if showing is None or chart in showing]

@@ -1,0 +1,179 @@
+"""The space-frame charts for kernels: state (e, L) on the axis, (q, L) on the attitude. Nothing is singular.
+
+    e' = L x e / I1,    q' = (L q / I1 + twist q k) / 2,    L' = mgl k x e,    twist = p_psi (1/I3 - 1/I1)
+
+The attitude has a third form, the frame (e, L, a). A unit vector a across the axis is carried by a' = L x a / I1; the
+body turns past it about e at the constant rate `twist`, which is applied exactly when a sample is taken. Every equation
+and every constant of this form is linear or quadratic, whereas p_psi = L.e(q) is cubic in (q, L), where no Runge-Kutta
+method keeps it; and what is integrated turns with the axis, not with the spin, so that the attitude is as accurate as
+the axis: 8 (order 4) to 30 times (order 8) better than with a fixed in the body.
+
+p_phi = L_z and p_psi = L.e are not parameters of these charts: they are read off the state, and whatever a kernel does
+to them shows.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.core.jit import register_jitable
+from symtop.methods.framework.outcomes import NOT_FINITE, OK
+from symtop.methods.framework.preparation import Preparation, Shown
+from symtop.model import charts
+
+axis_parts, quaternion_parts = register_jitable(charts.axis_parts), register_jitable(charts.quaternion_parts)
+momentum_parts = register_jitable(charts.momentum_parts)
+
+
+class SpaceTop(NamedTuple):
+    """The numbers of the top that the space-frame equations need."""
+
+    I1: float
+    mgl: float
+    twist: float
+
+
+@register_jitable
+def _numbers(top: Any, at: Any) -> Any:
+    """Kernel parameters of a start."""
+    spin = top.I3 * (at.psi_dot + at.phi_dot * math.cos(at.theta))
+    return SpaceTop(top.I1, top.mgl, spin * (1.0 / top.I3 - 1.0 / top.I1))
+
+
+@register_jitable
+def _momentum(top: Any, at: Any) -> Any:
+    return momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
+
+
+@register_jitable
+def _on_axis(top: Any, at: Any) -> Any:
+    """Kernel parameters and state (e, L) of a start."""
+    return _numbers(top, at), (*axis_parts(math, at.theta, at.phi), *_momentum(top, at))
+
+
+def _on_attitude(top: Any, at: Any) -> Any:
+    """Kernel parameters and state (q, L) of a start."""
+    return _numbers(top, at), (*quaternion_parts(math, at.theta, at.phi, at.psi), *_momentum(top, at))
+
+
+def _on_frame(top: Any, at: Any) -> Any:
+    """Kernel parameters and state (e, L, a) of a start, where a is the body's first axis."""
+    w, x, y, z = quaternion_parts(math, at.theta, at.phi, at.psi)
+    par, state = _on_axis(top, at)
+    return par, (*state, w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
+
+
+on_axis, on_attitude, on_frame = Preparation(_on_axis, 6), Preparation(_on_attitude, 7), Preparation(_on_frame, 9)
+
+
+@register_jitable
+def _rows(e: Any, a: Any, b: Any) -> Any:
+    """The rows of 4 q q^T, from the columns of the rotation matrix (Shepperd 1978)."""
+    return (
+        (1.0 + a[0] + b[1] + e[2], b[2] - e[1], e[0] - a[2], a[1] - b[0]),
+        (b[2] - e[1], 1.0 + a[0] - b[1] - e[2], a[1] + b[0], a[2] + e[0]),
+        (e[0] - a[2], a[1] + b[0], 1.0 - a[0] + b[1] - e[2], b[2] + e[1]),
+        (a[1] - b[0], a[2] + e[0], b[2] + e[1], 1.0 - a[0] - b[1] + e[2]),
+    )
+
+
+def _frame_to_attitude(par: Any, t: float, y: Any) -> Any:
+    """A frame state as an attitude state (q, L); the sign of q is arbitrary."""
+    e, a = (y[0], y[1], y[2]), (y[6], y[7], y[8])
+    b = (e[1] * a[2] - e[2] * a[1], e[2] * a[0] - e[0] * a[2], e[0] * a[1] - e[1] * a[0])
+    rows = _rows(e, a, b)
+    best, largest = rows[0], rows[0][0]  # the row with the largest diagonal loses no digits
+    for i in range(1, 4):
+        if rows[i][i] > largest:
+            best, largest = rows[i], rows[i][i]
+    length = math.sqrt(best[0] * best[0] + best[1] * best[1] + best[2] * best[2] + best[3] * best[3])
+    qw, qx, qy, qz = best[0] / length, best[1] / length, best[2] / length, best[3] / length
+    c, s = math.cos(0.5 * par.twist * t), math.sin(0.5 * par.twist * t)
+    return qw * c - qz * s, qx * c + qy * s, qy * c - qx * s, qz * c + qw * s, y[3], y[4], y[5]
+
+
+frame_to_attitude = Shown(_frame_to_attitude, 7)
+
+
+@register_jitable
+def field_axis(par: Any, y: Any) -> Any:
+    """Time derivative of (e, L)."""
+    inverse = 1.0 / par.I1  # leaves the loop, as three divisions would not
+    wx, wy, wz = inverse * y[3], inverse * y[4], inverse * y[5]
+    turn = wy * y[2] - wz * y[1], wz * y[0] - wx * y[2], wx * y[1] - wy * y[0]
+    return (*turn, -par.mgl * y[1], par.mgl * y[0], 0.0)
+
+
+@register_jitable
+def field_frame(par: Any, y: Any) -> Any:
+    """Time derivative of (e, L, a)."""
+    inverse = 1.0 / par.I1
+    wx, wy, wz = inverse * y[3], inverse * y[4], inverse * y[5]
+    return (*field_axis(par, y), wy * y[8] - wz * y[7], wz * y[6] - wx * y[8], wx * y[7] - wy * y[6])
+
+
+@register_jitable
+def field_attitude(par: Any, y: Any) -> Any:
+    """Time derivative of (q, L); |q| stays one only as far as a method keeps it."""
+    half, turn = 0.5 / par.I1, 0.5 * par.twist
+    w, x, y1, z = y[0], y[1], y[2], y[3]
+    px, py, pz = half * y[4], half * y[5], half * y[6]
+    right, back = 2.0 * (x * z + w * y1), 2.0 * (y1 * z - w * x)  # the axis, e_x and e_y
+    return (
+        -(px * x + py * y1 + pz * z) - turn * z,
+        px * w + py * z - pz * y1 + turn * y1,
+        py * w + pz * x - px * z - turn * x,
+        pz * w + px * y1 - py * x + turn * w,
+        -par.mgl * back,
+        par.mgl * right,
+        0.0,
+    )
+
+
+@register_jitable
+def ended_space(y: Any) -> int:
+    """Is the state finite? There is no pole to leave the chart at."""
+    total = 0.0
+    for value in y:
+        total += value
+    outcome: int = finite_outcome(total)
+    return outcome
+
+
+@register_jitable
+def finite_outcome(value: float) -> int:
+    """Is a number that every component feeds into still finite?"""
+    return OK if np.isfinite(value) else NOT_FINITE
+
+
+def observe_axis(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+    """p_phi = L_z and p_psi = L.e after the step."""
+    p_psi = 0.0
+    for i in range(3):
+        p_psi += (before[i] + dstate[i]) * (before[3 + i] + dstate[3 + i])
+    return before[5] + dstate[5], p_psi
+
+
+@register_jitable
+def axis_of(w: float, x: float, y: float, z: float) -> Any:
+    """The axis of a quaternion."""
+    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z
+
+
+@register_jitable
+def with_spin(par: Any, state: Any, t: float) -> Any:
+    """An attitude state (q, L) that was stepped without the body's own spin, with the spin of a time t."""
+    w, x, y, z, Lx, Ly, Lz = state
+    half = 0.5 * par.twist * t
+    c, s = np.cos(half), np.sin(half)
+    return w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s, Lx, Ly, Lz
+
+
+def observe_attitude(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+    """p_phi = L_z and p_psi = L.e(q) after the step."""
+    axis = axis_of(before[0] + dstate[0], before[1] + dstate[1], before[2] + dstate[2], before[3] + dstate[3])
+    p_psi = 0.0
+    for i in range(3):
+        p_psi += axis[i] * (before[4 + i] + dstate[4 + i])
+    return before[6] + dstate[6], p_psi

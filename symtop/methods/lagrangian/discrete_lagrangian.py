@@ -1,0 +1,242 @@
+"""Variational integrators of the heavy top from any quadrature rule, reduced exactly to one equation.
+
+A rule with nodes a_i and weights w_i (sum w = 1) on the straight line from q0 to q1 gives
+
+    L_d(q0, q1) = h sum_i w_i L(q0 + a_i (q1 - q0), (q1 - q0)/h)
+
+and the step is p0 = -D1 L_d, p1 = D2 L_d. phi and psi are cyclic: their discrete momenta are conserved and
+their increments follow from p_phi, p_psi and theta alone, so what remains is one scalar equation for
+d = theta1 - theta0. With sums over the nodes theta_i = theta0 + a_i d (c = cos, s = sin),
+
+    C = sum w c,  S = sum w s^2,  Y = sum w c^2 - C^2,  D = I1 S + I3 Y
+    v = dphi/h = (p_phi - p_psi C)/D,                    dpsi = h (p_psi/I3 - v C)
+    W0 = sum w (1-a) s [v p_psi - mgl - v^2 ((I1-I3) c + I3 C)],   W1 the same with a for 1-a
+    p_theta0 = I1 d/h + h W0   (Newton, analytic slope),           p_theta1 = p_theta0 - h (W0 + W1)
+
+`midpoint` is a = (1/2), w = (1); `trapezoidal` is a = (0, 1), w = (1/2, 1/2); `simpson-linear` is a = (0, 1/2, 1),
+w = (1/6, 2/3, 1/6) and gains no order from its better quadrature, because the path is still a straight line (see
+`galerkin`). All are symmetric, symplectic, of order 2, and conserve p_phi and p_psi exactly. The midpoint rule
+equals the implicit midpoint rule on the reduced Hamiltonian (reduction and discretisation commute); the trapezoidal
+rule does *not* commute with the reduction and must not be confused with Stormer-Verlet, which is explicit.
+
+The start is p0 = dL/dq' (the discrete Legendre transform); starting from q1 = q0 + h q0' instead costs an order.
+p_phi - p_psi C is formed as north sum w cos^2(theta/2) + south sum w sin^2(theta/2), without cancellation at the
+poles. Source: Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357.
+"""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.core.jit import fused, register_jitable
+from symtop.methods.framework.angles import ReducedTop, chart_outcome, reduced
+from symtop.methods.framework.fixed_step import FixedStep, inside
+from symtop.methods.framework.lanes import Lanes
+from symtop.methods.framework.loop import driver
+from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton
+from symtop.methods.framework.newton_lanes import iterated
+from symtop.methods.framework.outcomes import NOT_CONVERGED
+from symtop.methods.framework.registry import Array, Integrator
+from symtop.methods.lagrangian.node_sums import NONE_OPENED, Forces, Sums, forces, node_sums, opening
+from symtop.methods.lagrangian.quadrature import RULES, Quadrature, quadrature
+from symtop.model.top import Momenta
+from symtop.model.view import View
+
+
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+    """The force sum W0 of a step of length zero, as a flat history for the predictor."""
+    W0 = forces(par, node_sums(rule, state[0], 0.0, opening(par, rule, state[0]))).W0
+    return (W0, W0, W0, W0)
+
+
+class _Step(NamedTuple):
+    """The scalar equation of one step, d = flight - scale W0(d)."""
+
+    par: Any
+    rule: Any
+    theta: float
+    opened: Any  # as `opening` makes it
+    h: float
+    lever: float  # h / I1
+    spin: float  # p_psi / I3
+    momentum: float
+    flight: float  # what d is without any force
+    scale: float  # h^2 / I1
+
+
+@register_jitable
+def _steady(par: Any, h: float) -> Any:
+    """What no step changes."""
+    return h, h / par.I1, par.p_psi / par.I3
+
+
+@register_jitable
+def _equation(par: Any, rule: Any, state: Any, steady: Any, opened: Any) -> Any:
+    # h^2/I1 rounded once and for all would do work of one sign: h and h/I1 are all that the increments know
+    h, lever, spin = steady
+    flight, scale = lever * state[1], lever * h
+    opened = opened if rule.nodes[0] == 0.0 else NONE_OPENED  # what is constant need not be loaded
+    return _Step(par, rule, state[0], opened, h, lever, spin, state[1], flight, scale)
+
+
+@register_jitable
+def _predict(step: Any, carry: Any) -> Any:
+    """W0 is smooth in time: the cubic through its last four values predicts the next one.
+
+    At 300 steps a nutation that leaves 1.1 to 1.6 iterations, where a parabola left 1.8 to 2.0.
+    """
+    return (step.flight - step.scale * (4.0 * (carry[0] + carry[2]) - 6.0 * carry[1] - carry[3]),)
+
+
+class _Trial(NamedTuple):
+    """What the equation is made of at one d."""
+
+    sums: Sums
+    force: Forces
+
+
+@register_jitable
+def _evaluate(step: Any, x: Any) -> Any:
+    sums = node_sums(step.rule, step.theta, x[0], step.opened)
+    return _Trial(sums, forces(step.par, sums))
+
+
+@register_jitable
+def _correct(step: Any, trial: Any, x: Any) -> Any:
+    """Newton's correction, judged against the step's own increment."""
+    (d,), force = x, trial.force
+    change = (step.lever * (step.momentum - step.h * force.W0) - d) / (1.0 + step.scale * force.W0_slope)
+    enough = step.rule.tolerance * (abs(step.flight) + abs(step.scale * force.W0)) + NEGLIGIBLE_ANGLE
+    return Correction(change, (d + change,), abs(change), enough, ANGLE_GRAIN)
+
+
+@register_jitable
+def _free_flight(step: Any) -> Any:
+    return (step.flight,)
+
+
+class _End(NamedTuple):
+    """What the increment is made of, once the iteration has ended."""
+
+    v: float
+    W0: float
+    W1: float
+    v_slope: float
+    W0_slope: float
+    W1_slope: float
+    cosine: float
+    sine_end: float
+    change: float  # the last correction of d, which is not applied
+    after: float  # d with it
+
+
+@register_jitable
+def _keep(trial: Any, correction: Any) -> Any:
+    (v, W0, W1, v_slope, W0_slope, W1_slope), sums = trial.force, trial.sums
+    return _End(
+        v, W0, W1, v_slope, W0_slope, W1_slope, sums.cosine, sums.sine_end, correction.change, correction.after[0]
+    )
+
+
+@register_jitable
+def _close(step: Any, end: Any) -> Any:
+    """The increment, the force sum to predict with and the outcome."""
+    h, change = step.h, end.change
+    # what was evaluated before the last correction follows it to first order; the remainder is its square. Added before
+    # the product with h, what follows would be rounded to one side for whole stretches of an orbit: some starts lost
+    # 3e-14 of their energy in 1e8 steps, and wander by 3e-15 now
+    kick0 = fused(h, end.W0, h * (end.W0_slope * change))
+    kick1 = fused(h, end.W1, h * (end.W1_slope * change))
+    turn = fused(h, end.v, h * (end.v_slope * change))
+    # theta moves by the very force that moves p. What Newton's last division leaves instead is off by a twentieth of a
+    # rounding, but always to the same side: the energy drifted by 4e-14 in 3e6 steps
+    d = step.lever * (step.momentum - kick0)
+    cosine = end.cosine - end.sine_end * change
+    dstate = (d, -(kick0 + kick1), turn, fused(h, step.spin, -(turn * cosine)))
+    return dstate, (end.W0 + end.W0_slope * change,), chart_outcome(step.theta + end.after)
+
+
+def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
+    """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
+    equation = _equation(par, rule, state, _steady(par, h), opening(par, rule, state[0]))
+    solution = newton(_evaluate, _correct, _free_flight, equation, _predict(equation, carry), rule.iterations)
+    step, newest, outcome = _close(equation, _keep(solution.trial, solution.correction))
+    return step, newest + carry[:-1], solution.evaluations, outcome if solution.converged else NOT_CONVERGED
+
+
+def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+    """p_phi and p_psi by the discrete Legendre transform of the increments that were added."""
+    theta, d = before[0], dstate[0]
+    sums = node_sums(rule, theta, d, opening(par, rule, theta))
+    v, u = dstate[2] / h, dstate[3] / h
+    square_cosine = sums.variance + sums.cosine * sums.cosine
+    p_phi = par.I1 * sums.square_sine * v + par.I3 * (square_cosine * v + sums.cosine * u)
+    return p_phi, par.I3 * (u + sums.cosine * v)
+
+
+@functools.cache
+def _in_lanes(rule: Quadrature) -> Lanes:
+    """A kernel for each rule: which node is the start of the step decides what is evaluated."""
+    return iterated(
+        rule, _steady, opening, _equation, _predict, _evaluate, _correct, _keep, _close,
+        top=ReducedTop, end=_End, dimension=4, steady=3, opened=6, unknowns=1, newest=1, carry=4,
+    )  # fmt: skip
+
+
+march = driver(begin, increment, observe, lanes=_in_lanes)
+
+
+def rule_of(method: Integrator) -> Quadrature | None:
+    """The rule of an integrator that `discrete_lagrangian` made; None for any other."""
+    solver = inside(method.solvers.get("angles"))
+    return solver.rule if solver is not None and solver.loop is march else None
+
+
+def is_midpoint(method: Integrator) -> bool:
+    """Is it the midpoint rule as `discrete_lagrangian` steps it, whatever its name?"""
+    rule = rule_of(method)
+    return rule is not None and (rule.nodes, rule.weights) == RULES["midpoint"][:2]
+
+
+def midpoint_energy(seen: View, momenta: Momenta, h: float) -> Array:
+    """What the midpoint rule conserves to O(h^4), less the energy: -h^2 (p^2 V''/I1^2 + V'^2/I1)/24.
+
+    Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
+    """
+    top, p = seen.top, seen.p_theta
+    slope = top.potential_slope(seen.theta, momenta)
+    return np.asarray(
+        -h * h / 24 * ((p / top.I1) ** 2 * top.potential_curvature(seen.theta, momenta) + slope**2 / top.I1)
+    )
+
+
+def discrete_lagrangian(
+    name: str, nodes: Sequence[float], weights: Sequence[float], *, order: int | None = None, summary: str = "",
+    reference: str = "marsden-west-2001",
+) -> Integrator:  # fmt: skip
+    """A variational integrator from a quadrature rule on [0, 1]: two tuples make a method.
+
+    The rule is symmetric if it reads the same from both ends; a rule that integrates t exactly has order 2.
+    """
+    rule, symmetric = quadrature(nodes, weights)
+    at_start = sum(node == 0.0 for node in rule.nodes)  # evaluated once a step, not once an iteration
+    fresh = len(rule.nodes) - at_start
+    method = Integrator(
+        name=name,
+        family="discrete-lagrangian",
+        summary=summary or f"discrete Lagrangian with nodes {rule.nodes} and weights {rule.weights}",
+        solvers={"angles": FixedStep(march, rule, reduced, fresh, implicit=True, each_step=at_start)},
+        order=order, explicit=False, symplectic=True, symmetric=symmetric, conserves=frozenset({"p_phi", "p_psi"}),
+        reference=reference,
+    )  # fmt: skip
+    return replace(method, modified_energy=midpoint_energy) if is_midpoint(method) else method
+
+
+def built_in() -> list[Integrator]:
+    """The rules that ship with symtop."""
+    return [
+        discrete_lagrangian(name, *rule[:2], order=rule.order, summary=rule.summary) for name, rule in RULES.items()
+    ]

@@ -1,0 +1,1 @@
+"""Integrators of other libraries, and the closed form as one."""

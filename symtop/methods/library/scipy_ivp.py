@@ -1,0 +1,181 @@
+"""SciPy's solvers on the top's equations in any chart, as a user of SciPy would call them.
+
+Nothing is reduced (see `formulations`), so that every conserved quantity is free to drift; the tolerance is used for
+both rtol and atol; no Jacobian is given. None of the four is symplectic or symmetric, and nothing is conserved but
+p_phi in the space frame, where it is a component of the state.
+
+    rk45     Dormand-Prince 5(4), explicit, order 5               Dormand and Prince, JCAM 6 (1980) 19
+    dop853   Dormand-Prince 8(5,3), explicit, order 8             Hairer, Norsett, Wanner, Solving ODEs I, II.5
+    radau    Radau IIA, 3 stages, implicit, order 5, L-stable     Hairer and Wanner, Solving ODEs II, IV.8
+    lsoda    Adams (order 1-12) or BDF (1-5), chosen on the way   Petzold, SIAM J. Sci. Stat. Comput. 4 (1983) 136
+
+Radau and LSODA are made for stiff equations, which the top's are not: they are here because people use them. Every
+call of the right-hand side is counted, also those of difference quotients for a Jacobian, which SciPy's own `nfev` of
+Radau leaves out.
+
+The language of the right-hand side is a factor of its own. In the registry it is plain Python on floats, three times
+faster than the same on NumPy scalars; `scipy_method(name, compiled=True)` is the same solver around a right-hand side
+that numba has compiled, from the same source. The loop around it is SciPy's and is Python in both (LSODA's is Fortran).
+"""
+
+import functools
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from symtop.core.errors import SymtopError, one_of
+from symtop.core.jit import compile_kernel
+from symtop.methods.framework.angles import BareTop
+from symtop.methods.framework.euler_lagrange import LEAST_TOLERANCE
+from symtop.methods.framework.formulations import FORMULATIONS, as_run
+from symtop.methods.framework.outcomes import NOT_FINITE, OK, OUT_OF_BUDGET, STEP_TOO_SMALL
+from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.registry import Integrator, Solver
+from symtop.methods.framework.space import SpaceTop
+from symtop.model.top import Angles, SymmetricTop
+
+# a run's limit: about 25 s at 4.2, 3.7, 2.8 and 13.5 us with SciPy's own work; other classes have the last
+EVALUATIONS = {"RK45": 6_000_000, "DOP853": 7_000_000, "LSODA": 9_000_000, "Radau": 1_800_000}
+
+
+class RightHandSide:
+    """y' = f(t, y) of a chart in plain Python on floats, and how often it was called."""
+
+    __slots__ = ("calls", "field", "par")
+
+    def __init__(self, field: Callable[[Any, Any], Any], par: Any) -> None:
+        self.field, self.par = field, par
+        self.calls = 0
+
+    def __call__(self, _: float, y: Any) -> Any:
+        """y' at any time."""
+        self.calls += 1
+        return self.field(self.par, y.tolist())
+
+
+class CompiledRightHandSide(RightHandSide):
+    """The same with the `compiled_field` of a chart, which returns an array."""
+
+    __slots__ = ("compiled",)
+
+    def __init__(self, chart: str, par: Any) -> None:
+        super().__init__(FORMULATIONS[chart].field, par)
+        self.compiled = compiled_field(chart)
+
+    def __call__(self, _: float, y: Any) -> Any:
+        """y' at any time."""
+        self.calls += 1
+        return self.compiled(*self.par, y)
+
+
+@functools.cache
+def compiled_field(chart: str) -> Any:
+    """f(a, b, c, y) -> y' of a chart, compiled; a, b, c are the three parameters of its equations."""
+    field, parameters = FORMULATIONS[chart].field, PARAMETERS[chart]
+
+    def compiled(a, b, c, y):  # type: ignore[no-untyped-def]
+        return np.array(field(parameters(a, b, c), y))
+
+    return compile_kernel(compiled)
+
+
+PARAMETERS: dict[str, type] = {"angles": BareTop, "axis": SpaceTop, "attitude": SpaceTop}
+
+
+def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solver:
+    """A solver of the registry around a method of ``scipy.integrate`` or a class like it; `compiled`: the field.
+
+    This is the loop of ``solve_ivp`` with ``t_eval``, to the same bits, kept open so that a run that fails
+    returns what it had and a run that would never end is stopped.
+    """
+    form = FORMULATIONS[chart]
+    most = EVALUATIONS.get(method if isinstance(method, str) else "", EVALUATIONS["Radau"])
+
+    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        from scipy import integrate  # 0.6 s to import
+
+        par, y0 = form.prepare(top, start)
+        rhs = CompiledRightHandSide(chart, par) if compiled else RightHandSide(form.field, par)
+        states = np.full((plan.times.size, len(y0)), np.nan)
+        steps = seen = 0
+        outcome = OK
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            # LSODA's failures, which are in its status as well. Nothing else is silenced: filters belong to all threads
+            warnings.filterwarnings("ignore", "lsoda: ", UserWarning)
+            make: Callable[..., Any] = getattr(integrate, method) if isinstance(method, str) else method
+            stepper = make(rhs, 0.0, y0, plan.horizon, rtol=plan.tolerance, atol=plan.tolerance)
+            while stepper.status == "running" and outcome == OK:
+                try:
+                    stepper.step()
+                    if stepper.status == "failed":
+                        outcome = STEP_TOO_SMALL if np.isfinite(stepper.y).all() else NOT_FINITE
+                        break
+                    steps += 1
+                    now = int(np.searchsorted(plan.times, stepper.t, side="right"))
+                    if now > seen:
+                        states[seen:now] = stepper.dense_output()(plan.times[seen:now]).T  # DOP853 evaluates f here too
+                        seen = now
+                except (OverflowError, ZeroDivisionError, ValueError):  # sin of infinity, or no finite Jacobian
+                    outcome = NOT_FINITE
+                    break
+                outcome = form.ended(stepper.y.tolist())
+                if outcome == OK and rhs.calls > plan.most(most) and stepper.status == "running":
+                    outcome = OUT_OF_BUDGET
+        reached = plan.horizon if outcome == OK else float(stepper.t)
+        return as_run(form, par, plan.times, states, steps, rhs.calls, outcome, reached)
+
+    return solve
+
+
+def integrated(rates: Callable[..., Any], start: Sequence[float], times: Array, method: str, tolerance: float) -> Array:
+    """Any equations by ``solve_ivp`` at the given times, the first 0: shape (variables, times).
+
+    `tolerance` is both the relative and the absolute one. Raises SymtopError if the solver does not reach the end.
+    """
+    from scipy.integrate import solve_ivp  # 0.6 s to import
+
+    span = (0.0, float(times[-1]))
+    done = solve_ivp(rates, span, start, method=method, rtol=tolerance, atol=tolerance, t_eval=times)
+    if not done.success:
+        raise SymtopError(f"{method} cannot integrate to t = {times[-1]:g}: {done.message}")
+    states: Array = done.y
+    return states
+
+
+_METHODS = {  # summary, order, reference, explicit
+    "RK45": ("Dormand-Prince 5(4)", 5, "dormand-prince-1980", True),
+    "DOP853": ("Dormand-Prince 8(5,3)", 8, "prince-dormand-1981 hairer-norsett-wanner-1993", True),
+    "LSODA": ("Adams or BDF of variable order", None, "petzold-1983 hindmarsh-1983", False),
+    "Radau": ("implicit Radau IIA", 5, "hairer-wanner-1996", False),
+}
+
+
+def scipy_method(name: str, *, compiled: bool = False) -> Integrator:
+    """One of SciPy's methods, "RK45", "DOP853", "LSODA" or "Radau", in every chart; `compiled` is the right-hand side.
+
+    With a compiled one the name ends in "-numba", and it is not in the registry. Raises SymtopError for another name.
+    """
+    summary, order, reference, explicit = _METHODS[one_of("name", name, _METHODS)]
+    return Integrator(
+        name=f"{name.lower()}-numba" if compiled else name.lower(),
+        family="library",
+        summary=f"SciPy's {name} ({summary}), the right-hand side in {'numba' if compiled else 'Python'}",
+        solvers={chart: solver(name, chart, compiled=compiled) for chart in FORMULATIONS},
+        control="tolerance",
+        implementation="python",
+        order=order,
+        explicit=explicit,
+        symplectic=False,
+        symmetric=False,
+        conserves=frozenset(),
+        least_tolerance=LEAST_TOLERANCE,
+        reference=reference,
+        same_steps_as="rk45-compiled" if name == "RK45" else None,
+    )
+
+
+def built_in() -> list[Integrator]:
+    """SciPy's methods under the names of this registry."""
+    return [scipy_method(name) for name in _METHODS]

@@ -1,0 +1,175 @@
+"""The loop around maps that make a step as a rotation in space: Lie-group methods, on the attitude (q, L).
+
+A map sees the axis and the momentum, since nothing of a symmetric top hangs on more, and returns a rotation as a
+quaternion less one, (m, v) = p - 1, and the change of L:
+
+    turn(par, rule, e, L, carry, h) -> (m, v, dL, work, outcome),      q <- p q,   e <- p e p*,   L <- L + dL
+
+`rule.shares` are the parts that a step is composed of, in units of h: (1,) for the map itself, and five of Suzuki's for
+order 4. The axis chart shows (e, L) of the same run: one kernel, and its attitude has the bits of its axis.
+
+A map in the frame that turns with L/I1 leaves the spin of the body out (`UNSPUN`): where L.e is kept exactly, that spin
+is a constant rate and is added at samples, as in `splitting_space`. A map of the body itself (`SPUN`) turns it in the
+step, with an error that grows with the spin.
+
+p - 1 in place of p keeps increments free of cancellation. What |q| lacks is added to m in every step.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from symtop.core.jit import register_jitable
+from symtop.methods.engines.engine_parts import cross, dot, plus, scaled
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.lanes import Lanes, showing
+from symtop.methods.framework.loop import Loop, driver
+from symtop.methods.framework.outcomes import OK
+from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it_steps
+from symtop.methods.framework.space import (
+    SpaceTop,
+    axis_of,
+    finite_outcome,
+    momentum_parts,
+    observe_attitude,
+    on_attitude,
+    quaternion_parts,
+    with_spin,
+)
+
+
+def _on_body(top: Any, at: Any) -> Any:
+    """The numbers of the top and the state (q, L) of a start."""
+    momentum = momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
+    return Body(top.I1, top.I3, top.mgl), (*quaternion_parts(math, at.theta, at.phi, at.psi), *momentum)
+
+
+def _axis_shown(par: Any, t: float, y: Any) -> Any:
+    """(e, L) of (q, L)."""
+    return (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6])
+
+
+def _spin_shown(par: Any, t: float, y: Any) -> Any:
+    """(q, L) with the spin of the time t."""
+    return with_spin(par, y, t)
+
+
+class Carried(NamedTuple):
+    """How the body's spin is stepped: what a kernel starts from, and how the attitude is shown."""
+
+    prepare: Preparation
+    present: Shown | None
+    top: Any  # the NamedTuple of the numbers of the top
+
+
+UNSPUN = Carried(on_attitude, Shown(_spin_shown, 7), SpaceTop)
+SPUN = Carried(Preparation(_on_body, 7), None, Body)
+_AXIS = Shown(_axis_shown, 6)
+STILL = (0.0,) * 7  # no increment
+
+
+@register_jitable
+def gravity(par: Any, e: Any) -> Any:
+    """The torque mgl k x e."""
+    return -par.mgl * e[1], par.mgl * e[0], 0.0
+
+
+@register_jitable
+def moved(m: float, v: Any, x: Any) -> Any:
+    """How far the rotation p = (1 + m, v) moves a vector: p x p* - x."""
+    c = cross(v, x)
+    return scaled(2.0, plus(cross(v, c), 1.0 + m, c))
+
+
+@register_jitable
+def cayley(u: Any) -> Any:
+    """The rotation of a Cayley vector, by 2 arctan |u| about u."""
+    square = dot(u, u)
+    root = math.sqrt(1.0 + square)
+    return -square / (root * (1.0 + root)), scaled(1.0 / root, u)
+
+
+@register_jitable
+def reached(state: Any, step: Any) -> Any:
+    """The quaternion and the momentum that an increment leads to."""
+    q = state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3]
+    return q, (state[4] + step[4], state[5] + step[5], state[6] + step[6])
+
+
+@register_jitable
+def composed(step: Any, q: Any, m: float, v: Any, dL: Any) -> Any:
+    """The increment with one more rotation, of the quaternion q that it has led to."""
+    a, b, c, d, X, Y, Z = step
+    w, x, y, z = q
+    m += 0.5 * (1.0 + m) * (1.0 - (w * w + x * x + y * y + z * z))
+    a += m * w - (v[0] * x + v[1] * y + v[2] * z)
+    b += m * x + (v[0] * w + v[1] * z - v[2] * y)
+    c += m * y + (v[1] * w + v[2] * x - v[0] * z)
+    d += m * z + (v[2] * w + v[0] * y - v[1] * x)
+    return a, b, c, d, X + dL[0], Y + dL[1], Z + dL[2]
+
+
+@register_jitable
+def ended(step: Any) -> int:
+    """The outcome of a step that was solved."""
+    a, b, c, d, X, Y, Z = step
+    outcome: int = finite_outcome(a + b + c + d + X + Y + Z)
+    return outcome
+
+
+def _nothing(par: Any, rule: Any, state: Any, h: float) -> Any:
+    """A step depends on its start alone."""
+    return 0.0
+
+
+def _alone(rule: Any) -> None:
+    return None
+
+
+def lie_loop(
+    turn: Callable[..., Any], begin: Callable[..., Any] = _nothing, lanes: Callable[[Any], Lanes | None] = _alone
+) -> Loop:  # fmt: skip
+    """The loop on (q, L) around a map; `lanes` is how it steps many, by its rule (`lie_lanes`)."""
+    register_jitable(turn)
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        step = STILL
+        effort = outcome = 0
+        for share in rule.shares:
+            q, L = reached(state, step)
+            m, v, dL, work, outcome = turn(par, rule, axis_of(*q), L, carry, h * share)
+            effort += work
+            if outcome != OK:
+                break
+            step = composed(step, q, m, v, dL)
+        if outcome == OK:
+            outcome = ended(step)
+        return step, carry, effort, outcome
+
+    return driver(begin, increment, observe_attitude, lanes=lanes)
+
+
+def shown_in(carried: Carried) -> Callable[..., None]:
+    """A sample of either chart, by how many numbers it has: ``(par, t, state, out)``, for a kernel of both."""
+    axis, attitude = _AXIS, carried.present
+    sample = as_it_steps if attitude is None else attitude.sample
+    small, large = showing(axis.sample), showing(sample)
+    size = axis.size
+
+    def show(par, t, state, out):  # type: ignore[no-untyped-def]
+        if len(out) == size:
+            small(par, t, state, out)
+        else:
+            large(par, t, state, out)
+
+    return show
+
+
+def in_both_charts(
+    loop: Loop, rule: Any, carried: Carried, evaluations: int, *, implicit: bool
+) -> dict[str, FixedStep]:  # fmt: skip
+    """Solvers on the axis and on the attitude; `evaluations` is the force evaluations of one unit of work."""
+    return {
+        "axis": FixedStep(loop, rule, carried.prepare, evaluations, implicit=implicit, present=_AXIS),
+        "attitude": FixedStep(loop, rule, carried.prepare, evaluations, implicit=implicit, present=carried.present),
+    }

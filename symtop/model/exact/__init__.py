@@ -1,0 +1,1 @@
+"""The exact motion: its constants, their evaluation, and the arithmetic beneath."""

@@ -1,0 +1,1 @@
+"""Many tops at once."""

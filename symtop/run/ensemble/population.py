@@ -1,0 +1,234 @@
+"""Random tops: a population from a distribution without units, in six strata.
+
+A top and its start are drawn in numbers that have no unit, and then scaled. In units where I1 = abs(mgl) = 1, time is
+counted in 1/g, g = sqrt(abs(mgl)/I1), x = theta/2, and the spin enters as the ratio to the sleeping threshold,
+
+    sigma = I3 w3 / (2 sqrt(I1 abs(mgl))),    a = p_psi = 2 sigma,    b = p_phi.
+
+    stratum           share   spin                          start
+    slow               25 %   sigma from 1/64 to 1          theta 0.1 to 3.04; theta', phi' sin theta in any direction,
+                                                            kinetic energy across the axis from 0 to 8
+    fast               25 %   sigma from 2 to 64            theta 0.2 to 2.9; phi' from -2 to 4 slow precessions 1/a,
+                                                            theta' from -2 to 2 of them
+    grazing            15 %   as large as the energy lets   passes the upper or the lower pole, one as often as the
+                                                            other, at 2^-14 to 2^-5 rad, with a speed from 1/2 to 2
+                                                            (more if it has to climb from the lower pole to its start)
+    near-separatrix    10 %   sigma from 0.01 to 0.9        climbs to 2^-16 to 2^-6 rad of the upper pole and hovers
+                                                            there: its energy at the pole has the size of gap^2
+    hanging            10 %   sigma from 1/64 to 2          mgl < 0, theta 0.05 to 1.2; the energy across the axis does
+                                                            not lift the axis to the horizontal
+    sleeping           15 %   sigma from 1 + 2^-5 to 5      let go 2^-12 to 2^-4 rad from upright, with rates that let
+                                                            the axis stray to sqrt(3) times that
+
+In all of them, I3/I1 is uniform in (0.02, 1.98), phi and psi in (-pi, pi), every sign is drawn; I1 lies between 2^-10
+and 2^10, g between 2^-6 and 2^6. Quantities that range over octaves are drawn by octave and uniformly within one.
+
+The first n members of a larger population are those of the smaller one, and their bits do not hang on the machine: the
+draws are the raw integers of a Philox generator, a stream that NumPy promises to keep, 16 a member, and everything
+else is made of sums, products, quotients and square roots, sine and cosine of theta included.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from symtop.core import netcdf
+from symtop.core.errors import one_of, whole
+
+MOST = 1e9  # members
+
+Array = NDArray[np.float64]
+
+DRAWS = 16  # uniform numbers a member: a new quantity must not move those that are there
+NUMBERS = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
+BLOCK = 1 << 16  # members drawn at a time
+
+
+class _Start(NamedTuple):
+    """Starts without units: tilt from the pole that gravity pulls from, rates in units of g; each (n,)."""
+
+    theta: Array
+    theta_dot: Array
+    phi_dot: Array
+    a: Array
+
+
+def between(low: float, high: float, uniform: Array) -> Array:
+    """Uniform draws moved to an interval."""
+    return low + (high - low) * uniform
+
+
+def octaves(low: float, high: float, uniform: Array) -> Array:
+    """Draws between two powers of two (exponents), spread evenly over octaves and evenly within each."""
+    place = between(low, high, uniform)
+    octave = np.floor(place)
+    return np.ldexp(1.0 + (place - octave), octave.astype(np.int64))
+
+
+def signs(uniform: Array) -> Array:
+    """-1 or 1."""
+    return np.where(uniform < 0.5, -1.0, 1.0)
+
+
+def sine_cosine(angle: Array) -> tuple[Array, Array]:
+    """sin and cos of angles in [0, pi] by their series at a quarter of them, to 1e-15: the same bits on any machine."""
+    x = 0.25 * angle
+    y = x * x
+    sine, cosine = np.zeros_like(y), np.zeros_like(y)
+    for k in range(10, -1, -1):
+        sine = 1.0 - y * sine / ((2 * k + 2) * (2 * k + 3))
+        cosine = 1.0 - y * cosine / ((2 * k + 1) * (2 * k + 2))
+    sine = x * sine
+    for _ in range(2):
+        sine, cosine = 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
+    return sine, cosine
+
+
+def direction(uniform: Array) -> tuple[Array, Array]:
+    """A unit vector of any direction, not quite evenly: a half circle by its slope, and a sign."""
+    t = 4.0 * np.mod(uniform, 0.5) - 1.0
+    square = 1.0 + t * t
+    return signs(uniform) * (1.0 - t * t) / square, signs(uniform) * 2.0 * t / square
+
+
+def _slow(draw: Array) -> _Start:
+    theta, a = between(0.1, 3.04, draw[0]), 2.0 * signs(draw[1]) * octaves(-6.0, 0.0, draw[2])
+    speed, (along, across) = 4.0 * draw[3], direction(draw[4])  # energy speed^2/2: from 0 to 8, more often little
+    return _Start(theta, speed * along, speed * across / sine_cosine(theta)[0], a)
+
+
+def _fast(draw: Array) -> _Start:
+    a = 2.0 * signs(draw[1]) * octaves(1.0, 6.0, draw[2])
+    return _Start(between(0.2, 2.9, draw[0]), between(-2.0, 2.0, draw[3]) / a, between(-2.0, 4.0, draw[4]) / a, a)
+
+
+def _grazing(draw: Array) -> _Start:
+    """Tilts `away` from the pole that is passed. With x = away/2, u the speed at the pole and delta = b -+ a = u gap,
+
+        away'^2 = u^2 +- 4 sin^2 x - a^2 tan^2 x    (upper, lower pole), up to terms of the size of delta,
+
+    so that any a up to w/tan x, w^2 = u^2 +- 4 sin^2 x, lets the axis get from there to the start.
+    """
+    away, upper = between(0.5, 2.2, draw[0]), draw[5] < 0.5
+    sine, cosine = sine_cosine(away)
+    tangent, fall = sine / (1.0 + cosine), 2.0 * (1.0 - cosine)
+    base = octaves(-1.0, 1.0, draw[3])
+    square = base * base + fall  # upper: of away' without spin; lower: of u
+    speed = np.where(upper, base, np.sqrt(square))
+    top = np.where(upper, np.sqrt(square), base) / tangent
+    a = signs(draw[1]) * between(0.05, 0.95, draw[2]) * top
+    delta = signs(draw[6]) * octaves(-14.0, -5.0, draw[4]) * speed
+    rest = top * tangent
+    rate = signs(draw[7]) * np.sqrt(rest * rest - a * a * tangent * tangent)
+    turn = (delta + a * (1.0 - cosine)) / (sine * sine)
+    return _Start(np.where(upper, away, math.pi - away), rate, turn, np.where(upper, a, -a))
+
+
+def _near_separatrix(draw: Array) -> _Start:
+    """Near the upper pole theta'^2 + (delta/theta)^2 - r^2 theta^2 = 2 eta, r^2 = 1 - sigma^2, delta = b - a.
+
+    The axis turns at the tilt `gap` if delta^2 = r^2 gap^4 + 2 eta gap^2; eta = kappa r^2 gap^2/2 is drawn by kappa.
+    """
+    theta, gap, kappa = between(0.3, 2.2, draw[0]), octaves(-16.0, -6.0, draw[3]), between(-0.9, 3.0, draw[4])
+    sine, cosine = sine_cosine(theta)
+    half = np.sqrt(0.5 * (1.0 + cosine))  # cos x: beyond this spin the axis does not reach the start
+    sigma = between(0.05, 0.9, draw[2]) * half
+    growth, a = 1.0 - sigma * sigma, 2.0 * signs(draw[1]) * sigma
+    delta = signs(draw[6]) * np.sqrt(growth * (1.0 + kappa)) * gap * gap
+    eta = 0.5 * kappa * growth * gap * gap
+    lever = (delta + a * (1.0 - cosine)) / sine
+    rate = signs(draw[7]) * np.sqrt(2.0 * (1.0 - cosine) + 2.0 * eta + a * delta - lever * lever)
+    return _Start(theta, rate, lever / sine, a)
+
+
+def _hanging(draw: Array) -> _Start:
+    """Here the tilt is from the pole that gravity pulls to; cos(tilt) is the energy that lifts the axis level."""
+    theta, a = between(0.05, 1.2, draw[0]), 2.0 * signs(draw[1]) * octaves(-6.0, 1.0, draw[2])
+    sine, cosine = sine_cosine(theta)
+    speed, (along, across) = np.sqrt(2.0 * between(0.0, 0.95, draw[3]) * cosine), direction(draw[4])
+    return _Start(theta, speed * along, speed * across / sine, a)
+
+
+def _sleeping(draw: Array) -> _Start:
+    """In the frame that turns at a/2 the axis swings as theta'' = -omega^2 theta, omega^2 = sigma^2 - 1."""
+    tilt, excess = octaves(-12.0, -4.0, draw[0]), octaves(-5.0, 2.0, draw[2])
+    sigma = 1.0 + excess
+    omega = np.sqrt(excess * (2.0 + excess))
+    rates = omega * between(-1.0, 1.0, draw[3]), sigma + omega * between(-1.0, 1.0, draw[4])
+    return _Start(tilt, tilt * rates[0], signs(draw[1]) * rates[1], 2.0 * signs(draw[1]) * sigma)
+
+
+STRATA: dict[str, tuple[float, Callable[[Array], _Start]]] = {
+    "slow": (0.25, _slow),
+    "fast": (0.25, _fast),
+    "grazing": (0.15, _grazing),
+    "near-separatrix": (0.10, _near_separatrix),
+    "hanging": (0.10, _hanging),
+    "sleeping": (0.15, _sleeping),
+}
+KINDS = (*STRATA, "all")
+
+
+def _uniform(generator: np.random.Philox, n: int) -> Array:
+    """The next n members' uniform draws (DRAWS, n) in [0, 1), of 53 bits."""
+    integers = generator.random_raw(n * DRAWS) >> np.uint64(11)
+    return np.ascontiguousarray((integers * 2.0**-53).reshape(n, DRAWS).T)
+
+
+def _scaled(start: _Start, draw: Array, mgl: float) -> dict[str, Array]:
+    """The variables of members, from starts without units; `mgl` is the sign of gravity."""
+    cosine = sine_cosine(start.theta)[1]
+    I1, g = octaves(-10.0, 10.0, draw[0]), octaves(-6.0, 6.0, draw[1])
+    ratio = between(0.02, 1.98, draw[2])
+    return {
+        "I1": I1,
+        "I3": ratio * I1,
+        "mgl": mgl * I1 * g * g,
+        "theta": start.theta,
+        "phi": between(-math.pi, math.pi, draw[3]),
+        "psi": between(-math.pi, math.pi, draw[4]),
+        "theta_dot": g * start.theta_dot,
+        "phi_dot": g * start.phi_dot,
+        "psi_dot": g * (start.a / ratio - start.phi_dot * cosine),
+    }
+
+
+def _fill(columns: dict[str, Any], draw: Array, kind: str) -> None:
+    """Fill in the members of these draws."""
+    names, ends = list(STRATA), np.cumsum([share for share, _ in STRATA.values()])[:-1]
+    strata = (
+        np.searchsorted(ends, draw[0], side="right") if kind == "all" else np.full(draw.shape[1], names.index(kind))
+    )
+    for place, name in enumerate(names):
+        members = strata == place
+        if members.any():
+            start = STRATA[name][1](draw[1:9, members])
+            for variable, values in _scaled(start, draw[9:14, members], -1.0 if name == "hanging" else 1.0).items():
+                columns[variable][members] = values
+    columns["stratum"][:] = np.array(names)[strata]
+
+
+def population(n: int, *, seed: int = 0, kind: str = "all") -> xr.Dataset:
+    """Draw n tops and starts: a dataset over ``member``, ready for `symtop.ensemble`.
+
+    Variables ``I1``, ``I3``, ``mgl``, ``theta``, ``phi``, ``psi``, ``theta_dot``, ``phi_dot``, ``psi_dot`` (rad and
+    any consistent units) and ``stratum``, its name. `kind` is a stratum (slow, fast, grazing, near-separatrix, hanging,
+    sleeping), or "all" for their mixture; `symtop.run.ensemble.population` has the distribution. The same seed gives
+    the same members on every machine, and member i does not depend on n.
+
+    Raises SymtopError for arguments that make no sense.
+    """
+    count = whole("n", n, 1, MOST)
+    chosen, start = one_of("kind", kind, KINDS), whole("seed", seed, 0)
+    generator = np.random.Philox(start)
+    columns: dict[str, Any] = {name: np.empty(count) for name in NUMBERS}
+    columns["stratum"] = np.empty(count, dtype=f"U{max(map(len, STRATA))}")
+    for begin in range(0, count, BLOCK):
+        part = {name: values[begin : begin + BLOCK] for name, values in columns.items()}
+        _fill(part, _uniform(generator, len(part["I1"])), chosen)
+    data = xr.Dataset({name: ("member", values) for name, values in columns.items()})
+    return netcdf.describe(data, f"{count} tops of the population {chosen!r}", seed=start, kind=chosen)

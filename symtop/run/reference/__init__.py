@@ -1,0 +1,1 @@
+"""The truth: the closed form with bounds on every error, and independent checks of it."""

@@ -1,0 +1,131 @@
+"""Python says once that it compiles, to a terminal or a notebook and to nobody else."""
+
+import gc
+import importlib
+import os
+import pkgutil
+import pty
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from numba.core.dispatcher import Dispatcher
+from numba.core.errors import TypingError
+
+import studies
+import symtop
+from symtop.core.jit import compile_kernel
+from symtop.methods.framework.loop import Loop
+
+ROOT = Path(__file__).resolve().parents[2]
+UNIQUE = time.time()  # a constant that no kernel on disk was compiled with
+SCRIPT = """
+import sys
+{before}
+sys.path.insert(0, {folder!r})
+import two_kernels
+from symtop.core.jit import compile_kernel
+for _ in range(2):
+    compile_kernel(two_kernels.first)(1.0), compile_kernel(two_kernels.second)(1.0)
+"""
+KERNELS = """
+def first(x):
+    return x + 1.0
+
+
+def second(x):
+    return x + 2.0
+"""
+
+
+def _heard(tmp_path, before="", terminal=False):
+    """What a script that runs two methods twice prints to its standard error."""
+    (tmp_path / "two_kernels.py").write_text(KERNELS, encoding="utf-8")
+    environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    ours, theirs = pty.openpty() if terminal else os.pipe()
+    command = [sys.executable, "-c", SCRIPT.format(before=before, folder=str(tmp_path))]
+    subprocess.run(command, env=environment, stderr=theirs, check=True)
+    os.close(theirs)
+    with os.fdopen(ours, "rb") as stream:
+        return (os.read(stream.fileno(), 4096) if terminal else stream.read()).decode()
+
+
+@pytest.mark.parametrize(
+    ("watched", "lines"),
+    [({"terminal": True}, 1), ({"before": "sys.modules['ipykernel'] = sys"}, 1), ({}, 0)],
+    ids=["terminal", "notebook", "pipe"],
+)
+def test_compiling_is_said_once_to_whoever_watches(tmp_path, watched, lines):
+    assert _heard(tmp_path, **watched).count("symtop: compiling") == lines
+
+
+def test_nothing_is_said_of_kernels_that_are_on_disk(tmp_path):
+    _heard(tmp_path)
+    assert _heard(tmp_path, before="sys.modules['ipykernel'] = sys") == ""
+
+
+def _kernels():
+    """Kernels of all modules of the package and of its studies, by name."""
+    for package in (symtop, studies):
+        for one in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            if one.name.endswith("__main__"):
+                continue
+            for name, value in vars(importlib.import_module(one.name)).items():
+                parts = [value.prepare, value.march] if isinstance(value, Loop) else [value]
+                yield from ((f"{one.name}.{name}", part) for part in parts if isinstance(part, Dispatcher))
+
+
+def test_every_kernel_is_kept_on_disk():
+    kernels = list(_kernels())
+    assert {"symtop.methods.runge_kutta.collective_gauss.march", "studies.oscillators.damped_top.march"} <= {
+        name for name, _ in kernels
+    }
+    assert {name for name, kernel in kernels if not hasattr(kernel._cache, "_cache_path")} == set()
+    unkept = {"__name__": "prompt"}
+    exec("def typed(x): return x", unkept)  # the control: a function without a file
+    assert not hasattr(compile_kernel(unkept["typed"])._cache, "_cache_path")
+
+
+def test_garbage_is_collected_after_a_kernel_is_compiled_and_not_before():
+    from symtop.core import jit
+
+    def kernel(x):
+        return x + UNIQUE
+
+    def refused(x):
+        return x.no_such_thing
+
+    began = []
+    heard = lambda phase, _: began.append(phase)
+    gc.callbacks.append(heard)
+    try:
+        assert jit.compile_kernel(kernel)(1.0) == 1.0 + UNIQUE
+        collected = began.count("start")
+    finally:
+        gc.callbacks.remove(heard)
+    assert collected <= 2  # one that begins when it is over; without the pause there are dozens
+    assert gc.isenabled()
+    with pytest.raises(TypingError):
+        jit.compile_kernel(refused)(1.0)
+    assert gc.isenabled()
+
+
+def test_garbage_is_collected_again_when_the_last_of_two_threads_has_compiled():
+    from symtop.core.jit import _not_collecting
+
+    first, second = _not_collecting(), _not_collecting()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    assert not gc.isenabled()
+    second.__exit__(None, None, None)
+    assert gc.isenabled()
+    gc.disable()
+    try:
+        with _not_collecting():
+            pass
+        assert not gc.isenabled()  # somebody else has turned it off
+    finally:
+        gc.enable()

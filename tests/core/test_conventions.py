@@ -1,0 +1,63 @@
+"""Every dataset that a user gets says what it holds: CF-1.11's names, units and global attributes.
+
+The rules of the convention that a dataset of a run can break, as the IOOS compliance checker asks for them. One it asks
+for is not kept, on purpose: ``time`` is elapsed time and no date, so that it has no ``standard_name`` "time".
+"""
+
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import symtop
+from symtop.core import netcdf
+
+
+def lacking(data: xr.Dataset) -> list[str]:
+    """What breaks the convention."""
+    left = [f"global {name}" for name in ("Conventions", "title", "source", "history") if not data.attrs.get(name)]
+    for name, variable in data.variables.items():
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", str(name)):
+            left.append(f"name {name}")
+        if name not in data.coords or name == "time":
+            left += [] if variable.attrs.get("long_name") else [f"long_name of {name}"]
+            numbers = variable.dtype.kind in "fiu"
+            left += [] if bool(variable.attrs.get("units")) == numbers else [f"units of {name}"]
+    return left
+
+
+@pytest.fixture(scope="module")
+def run():
+    return symtop.simulate("spheroid", "strang", step_size=0.01, horizon=2.0)
+
+
+MADE = {
+    "errors": symtop.errors,
+    "reference": lambda _: symtop.reference("spheroid", np.linspace(0.0, 2.0, 11)),
+    "population": lambda _: symtop.population(8, seed=1),
+    "ensemble": lambda _: symtop.ensemble(symtop.population(8, seed=1), "strang", per_nutation=50, nutations=1),
+    "long_run": lambda _: symtop.long_run("spheroid", "strang", steps=20_000, step_size=0.001, quiet=True),
+    "run": lambda run: run,
+}
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_every_number_has_a_name_and_a_unit(name, run, tmp_path):
+    data = MADE[name](run)
+    assert lacking(data) == []
+    assert lacking(netcdf.read(netcdf.write(data, tmp_path / "data.nc"))) == []
+
+
+def test_what_lacks_a_name_a_unit_or_a_title_is_found(run):
+    assert lacking(run.assign(gap=("time", run["theta"].values))) == ["long_name of gap", "units of gap"]
+    assert lacking(run.rename(theta="2theta")) == ["name 2theta"]
+    assert lacking(run.drop_attrs(deep=False))[0] == "global Conventions"
+
+
+def test_units_are_those_of_the_scene():
+    scenes = {name: symtop.scene(name).units for name in symtop.scenes()}
+    for name in ("SI", ""):
+        scene = next(key for key, units in scenes.items() if units == name)
+        data = symtop.simulate(scene, "strang", step_size=0.001, horizon=0.01)
+        assert data["time"].attrs["units"] == ("s" if name == "SI" else "1")

@@ -1,0 +1,341 @@
+"""What a number was made of: labels, reasons, text and whole files; kernels and checkpoints by their code."""
+
+import cProfile
+import dataclasses
+import importlib.metadata
+import importlib.util
+import inspect
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numba
+import pytest
+
+import symtop
+from symtop.core import code_hash, files, jit, signals
+from symtop.core.code_hash import Walk, changes, digest, file_reasons, merged
+from symtop.runner import depends
+
+
+def loaded(path: Path, name: str):
+    """The module of a file, as a script or a plug-in is loaded."""
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+SCRIPT = """
+import math
+from symtop.methods.runge_kutta import gauss
+from symtop.runner.check import differences
+
+STEPS = 5
+CAPTION = "unused"
+
+def measure():
+    from symtop.measure.errors import energy_scale
+    return part() + STEPS
+
+def part():
+    return math.sin(gauss.STILL)
+"""
+
+
+def test_a_script_counts_by_the_functions_and_globals_that_are_reached(tmp_path):
+    (tmp_path / "script.py").write_text(SCRIPT)
+    walk = Walk("measure")
+    walk.add(loaded(tmp_path / "script.py", "fingerprint_script").measure)
+    reasons = walk.values() | file_reasons(walk.closure())
+    assert set(walk.values()) == {
+        "measure", "function script.py:measure", "function script.py:part", "constant script.py:STEPS",
+        "constant script.py:gauss.STILL",
+    }  # fmt: skip
+    assert "file symtop/methods/runge_kutta/gauss.py" in reasons
+    assert "file symtop/measure/errors.py" in reasons  # imported when the function runs
+    assert "file symtop/runner/check.py" not in reasons  # imported, and not named by what is reached
+
+
+def test_changes_name_what_differs():
+    before, now = {"file a": "1", "file b": "2", "scene x": "3"}, {"file a": "1", "file b": "9", "package n": "4"}
+    assert changes(before, now) == ["file b", "scene x (no longer counts)", "package n (did not count before)"]
+    assert changes(now, now) == []
+    assert digest(before) == digest(dict(reversed(before.items())))
+    assert digest(before) != digest(now)
+    assert merged([{"a": "1"}, {"a": "1", "b": "2"}]) == {"a": "1", "b": "2"}
+    assert merged([{"a": "1"}, {"a": "2"}])["a"] not in ("1", "2")
+
+
+def test_relative_imports_of_a_study_are_followed():
+    file = code_hash.roots["symtop_studies"] / "drift" / "study.py"
+    assert code_hash.roots["symtop_studies"] / "drift" / "phase_loss.py" in code_hash.imports_of(file)
+    assert code_hash.PACKAGE / "run" / "long_run.py" in code_hash.imports_of(file)
+    assert not any(path.name == "__init__.py" for path in code_hash.closure(frozenset([file])))
+
+
+def test_the_import_statements_are_those_that_the_parser_finds():
+    """Of every file of the package and of the studies; prose is no statement."""
+    import ast
+
+    for folder in (code_hash.PACKAGE, code_hash.roots["symtop_studies"]):
+        for file in folder.rglob("*.py"):
+            nodes = ast.walk(ast.parse(file.read_bytes()))
+            parsed = sum(
+                len(node.names) if isinstance(node, ast.Import) else 1
+                for node in nodes
+                if isinstance(node, (ast.Import, ast.ImportFrom))
+            )
+            assert len(code_hash.imported(file)) == parsed, file
+
+
+def test_a_study_depends_on_its_tables_and_not_on_its_figures():
+    from symtop.runner.scripts import load
+
+    drift = load("drift")
+    files = {label for case in drift.cases(True) for label in depends.reasons(drift, case) if "drift/" in label}
+    assert "file symtop_studies/drift/phase_loss.py" in files
+    assert not any(name in label for label in files for name in ("figures.py", "words.py"))
+    assert "function symtop_studies/drift/study.py:measure" in files
+
+
+def test_words_do_not_count_and_numbers_do():
+    def made(thing):
+        walk = Walk("thing")
+        walk.add(thing)
+        return walk.values()
+
+    scene = symtop.scene("spheroid")
+    assert made(dataclasses.replace(scene, purpose="said otherwise", units="")) == made(scene)
+    assert made(dataclasses.replace(scene, horizon=9.0)) != made(scene)
+    method = symtop.integrator("strang")
+    assert made(dataclasses.replace(method, summary="said otherwise")) == made(method)
+    assert made(dataclasses.replace(method, order=4)) != made(method)
+
+
+def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again():
+    from symtop.runner.scripts import load
+    from tests.commands import PROBE
+
+    study, plain = load(str(PROBE)), symtop.integrator("midpoint")
+    case = next(case for case in study.cases(True) if case.integrator == "midpoint")
+    digests = []
+    try:
+        for order in range(2, 12):
+            symtop.register(dataclasses.replace(plain, order=order), replace=True)
+            digests.append(depends.digest(study, case))
+    finally:
+        symtop.register(plain, replace=True)
+    assert len(set(digests)) == 10
+    assert digests[0] == depends.digest(study, case)
+
+
+CLASSES = """
+class Base:
+    def count(self):
+        return BASE
+
+class Few(Base):
+    COUNT = {}
+
+BASE = {}
+
+def measure():
+    '''{}'''
+    from . import nothing  # {}
+    return Few().count() + Few.COUNT
+"""
+
+
+def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_comments():
+    def made(*numbers):
+        text = CLASSES.format(*numbers)
+        space = {"__name__": "few", "__package__": "unknown"}
+        exec(text, space)
+        walk = Walk("measure")
+        walk.add(space["measure"])
+        return walk.values()
+
+    plain = made(2, 1, "words", "comment")
+    assert made(2, 1, "other words", "another comment") == plain
+    assert changes(plain, made(2, 3, "words", "comment")) == ["constant <string>:BASE"]
+    assert made(4, 1, "words", "comment") != plain
+
+
+def test_an_import_inside_a_function_counts_by_its_file_at_every_level():
+    space = {"__name__": "symtop.measure.made", "__package__": "symtop.measure"}
+    exec(
+        "def measure():\n    from . import errors\n    from ..methods.runge_kutta.gauss import STILL\n"
+        "    import symtop.run.guard.guard",
+        space,
+    )
+    walk = Walk("measure")
+    walk.add(space["measure"])
+    names = {"measure/errors.py", "methods/runge_kutta/gauss.py", "run/guard/guard.py"}
+    assert walk.files == {code_hash.PACKAGE / name for name in names}
+
+
+# ---- kernels ---------------------------------------------------------------------------------------------------------
+
+
+def kernels_of(root: Path, store: Path) -> dict[str, int]:
+    """The index files of the cache and when they were written, after one run; and what it returned."""
+    code = (
+        "import symtop; from symtop.run import long_run as L; "
+        "w, m = symtop.scene('spheroid'), symtop.integrator('gauss-4'); "
+        "print(float(symtop.simulate(w, m, step_size=0.02, guard=False)['theta'][-1]).hex(), "
+        "L._identity(w, m, 0.01, 100, True))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=240, check=True, cwd=root,
+        env={**os.environ, "PYTHONPATH": str(root), "SYMTOP_CACHE": str(store)},
+    )  # fmt: skip
+    files = {str(path.relative_to(store)): path.stat().st_mtime_ns for path in (store / "kernels").rglob("*.nbi")}
+    return {"said": done.stdout.split(), "files": files}
+
+
+@pytest.mark.slow
+def test_an_edited_callee_makes_a_new_kernel_and_a_comment_makes_none(tmp_path):
+    """In a copy of the package, each time in a new process."""
+    skip = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(code_hash.PACKAGE, tmp_path / "symtop", ignore=skip)
+    before = kernels_of(tmp_path, tmp_path / "cache")
+    assert before["files"]
+    for name in ("measure/errors.py", "run/modified_energy.py", "explore/answers.py", "methods/runge_kutta/gauss.py",
+                 "methods/framework/loop.py", "core/jit.py", "core/code_hash.py"):  # fmt: skip
+        file = tmp_path / "symtop" / name
+        text = file.read_text()
+        assert "\nfrom " in text
+        file.write_text(text.replace("\nfrom ", "\n# a comment\nfrom ", 1))  # every line below moves down
+    assert kernels_of(tmp_path, tmp_path / "cache") == before  # nothing compiled, and the checkpoint is still valid
+    callee = tmp_path / "symtop" / "methods" / "space.py"
+    text = callee.read_text()
+    assert "par.mgl" in text
+    callee.write_text(text.replace("par.mgl", "(1.5 * par.mgl)"))  # called from gauss.py, compiled in loop.py
+    after = kernels_of(tmp_path, tmp_path / "cache")
+    assert len(after["files"]) > len(before["files"])
+    assert before["files"].items() <= after["files"].items()
+    assert after["said"][0] != before["said"][0]
+    assert after["said"][1] != before["said"][1]
+    callee.write_text(text)
+    assert kernels_of(tmp_path, tmp_path / "cache") == after | {"said": before["said"]}
+
+
+def test_a_kernel_is_told_by_what_it_calls():
+    def kernel_of(part):
+        def kernel(x):
+            """Words."""
+            return part(x)  # more words
+
+        return digest(jit.code_of(kernel).values())
+
+    def made(source):
+        space = {"__name__": "part"}
+        exec(source, space)
+        return jit.register_jitable(space["part"])
+
+    plain = kernel_of(made("def part(x):\n    return 2.0 * x\n"))
+    assert kernel_of(made("\n\n# moved\ndef part(x):\n    # said\n    return 2.0 * x\n")) == plain
+    assert kernel_of(made("def part(x):\n    'Documented.'\n    return 2.0 * x\n")) == plain
+    assert kernel_of(made("def part(x):\n    return 3.0 * x\n")) != plain
+    assert kernel_of(made("K = 2.0\ndef part(x):\n    return K * x\n")) != kernel_of(
+        made("K = 3.0\ndef part(x):\n    return K * x\n")
+    )
+    assert kernel_of(made("def deep(x):\n    return x\ndef part(x):\n    return deep(x)\n")) != kernel_of(
+        made("def deep(x):\n    return -x\ndef part(x):\n    return deep(x)\n")
+    )
+
+
+def test_what_numba_compiles_in_place_of_a_function_counts():
+    from symtop.core import jit
+
+    names = {part.__qualname__ for part in jit.code_of(lambda a: jit.fused(a, a, a)).functions}
+    assert names  # the control: the walk went somewhere
+    walk = Walk("kernel", whole=False, also=jit._overloads)
+    walk.add(jit.fused)
+    reached = {part.__name__ for part in walk.functions}
+    assert {"fused", "_fused", "_fma"} <= reached
+
+
+def test_a_kernel_is_the_same_to_a_profiler():
+    def made(constant):
+        def kernel(x):
+            return x + constant
+
+        return kernel
+
+    plain = digest(jit.code_of(made(1.0)).values())
+    watching = cProfile.Profile()
+    watching.enable()
+    try:
+        numba.njit(made(2.0))(1.0)
+    finally:
+        watching.disable()
+    cleared = not made(1.0).__code__.co_flags & inspect.CO_OPTIMIZED  # by numba, for all that share the code
+    assert cleared is (sys.version_info < (3, 12))
+    assert digest(jit.code_of(made(1.0)).values()) == plain
+
+
+def test_the_walk_of_a_kernel_takes_less_than_a_millisecond():
+    march = symtop.integrator("gauss-12").solvers["attitude"].loop.march
+    times = []
+    for _ in range(20):
+        begin = time.perf_counter()
+        digest(jit.code_of(march).values())
+        times.append(time.perf_counter() - begin)
+    assert min(times) < 1e-3
+
+
+def test_the_cache_keeps_what_was_used_last(tmp_path):
+    for age, name in enumerate(("a", "b", "c", "d")):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "kernel.nbc").write_bytes(b"\0" * 1000)
+        used = time.time() - age * 2 * files.DAY
+        os.utime(folder, (used, used))
+    old = time.time() - (files.UNUSED + 1) * files.DAY
+    os.utime(tmp_path / "a", (old, old))
+    files.touch(tmp_path / "d")  # it was used last, now
+    files.prune(tmp_path, 2500)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["b", "d"]
+    files.prune(tmp_path, 100)
+    assert not list(tmp_path.iterdir())
+    files.prune(tmp_path / "nothing", 100)
+
+
+# ---- the rest of the room --------------------------------------------------------------------------------------------
+
+
+def test_units_follow_the_scene():
+    plain = symtop.simulate("goldstein", "strang", step_size=0.01, samples=3, guard=False)
+    assert {name: plain[name].attrs["units"] for name in ("time", "energy", "p_phi")} == dict.fromkeys(
+        ("time", "energy", "p_phi"), "1"
+    )
+    assert plain["theta"].attrs["units"] == "rad"
+    metric = symtop.reference("spheroid", [0.0, 1.0], precision="closed-form")
+    assert [metric[name].attrs["units"] for name in ("time", "energy", "p_psi")] == ["s", "kg m2 s-2", "kg m2 s-1"]
+    with pytest.raises(symtop.SymtopError, match="units"):
+        dataclasses.replace(symtop.scene("spheroid"), units="imperial")
+
+
+def test_sigterm_is_heard_as_an_exception_and_ends_with_143():
+    code = (
+        "import os, signal, sys; from symtop.core.signals import *\n"
+        "with ending_on_sigterm():\n"
+        "    try: os.kill(os.getpid(), signal.SIGTERM)\n"
+        "    except TerminatedError: print('heard'); raise\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.stdout, done.returncode, done.stderr) == ("heard\n", signals.TERMINATED, "")
+
+
+def test_versions_of_packages_are_reasons():
+    assert code_hash.packages("numpy", "no-such-package") == {
+        "package numpy": importlib.metadata.version("numpy"),
+        "package no-such-package": "absent",
+    }
+    assert code_hash.packages()["package python"] == ".".join(map(str, sys.version_info[:2]))

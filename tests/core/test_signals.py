@@ -1,0 +1,105 @@
+"""Requests to end are heard, but not between a library's taking a lock and its giving it back."""
+
+import signal
+import sys
+import threading
+
+import numpy as np
+import pytest
+import xarray as xr
+from xarray.backends.locks import HDF5_LOCK
+
+from symtop.core import netcdf
+from symtop.core.signals import InterruptedByUser, TerminatedError, deferred, ending_on_sigterm, told_apart
+
+DATA = xr.Dataset({"value": ("x", np.arange(5.0))})
+
+
+def _at_line(wanted):
+    """A tracer that sends SIGTERM at one of the lines that xarray's locks and files are handled by, and the count."""
+    seen = [0]
+
+    def trace(frame, event, _):
+        if not frame.f_code.co_filename.endswith(("xarray/backends/locks.py", "xarray/backends/file_manager.py")):
+            return None
+        if event == "line":
+            seen[0] += 1
+            if seen[0] == wanted:
+                signal.raise_signal(signal.SIGTERM)
+        return trace
+
+    return trace, seen
+
+
+def _written(path, wanted):
+    trace, seen = _at_line(wanted)
+    before = sys.gettrace()
+    with ending_on_sigterm():
+        sys.settrace(trace)
+        try:
+            netcdf.write(DATA, path)
+        finally:
+            sys.settrace(before)
+    return seen[0]
+
+
+@pytest.fixture
+def _a_minute():
+    """A lock that nobody gives back ends the test, not the whole of them."""
+
+    def out(*_):
+        raise AssertionError("the write waits for a lock")
+
+    usual = signal.signal(signal.SIGALRM, out)
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, usual)
+
+
+@pytest.mark.usefixtures("_a_minute")
+def test_a_write_is_whole_and_gives_back_its_lock_wherever_it_is_interrupted(tmp_path):
+    lines = _written(tmp_path / "whole.nc", -1)
+    assert lines > 50
+    for wanted in range(1, lines + 1):
+        file = tmp_path / f"{wanted}.nc"
+        with pytest.raises(TerminatedError):
+            _written(file, wanted)
+        assert not HDF5_LOCK.locked(), wanted
+        assert file.read_bytes() == (tmp_path / "whole.nc").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("number", "hearing", "kind"),
+    [(signal.SIGTERM, ending_on_sigterm, TerminatedError), (signal.SIGINT, told_apart, InterruptedByUser)],
+)
+def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, hearing, kind):
+    done = []
+    with hearing(), pytest.raises(kind):  # noqa: PT012 (the moment at which it is raised is what is tested)
+        with deferred():
+            with deferred():
+                signal.raise_signal(number)
+                signal.raise_signal(number)
+                done.append("inner")
+            done.append("outer")
+        done.append("after")
+    assert done == ["inner", "outer"]
+
+
+def test_handlers_are_left_as_they_were_and_threads_are_left_alone():
+    def handlers():
+        return [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+
+    before, inside = handlers(), []
+
+    def other():
+        with deferred():
+            inside.append(handlers())
+
+    with deferred():
+        assert signal.getsignal(signal.SIGTERM) == before[1] == signal.SIG_DFL  # it ends the process, then as now
+        assert signal.getsignal(signal.SIGINT) != before[0]
+    thread = threading.Thread(target=other)
+    thread.start()
+    thread.join()
+    assert handlers() == before == inside[0]

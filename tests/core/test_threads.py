@@ -1,0 +1,81 @@
+"""Pieces on threads come back in order, an error ends the rest, and one thread is the caller's."""
+
+import threading
+import time
+
+import pytest
+
+from symtop.core.parallel import StoppedError, cores, heed, in_threads
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_results_come_in_the_order_of_the_pieces(threads):
+    def work(piece):
+        time.sleep(0.001 * (7 - piece % 7))
+        return piece * piece
+
+    assert list(in_threads(work, range(30), threads)) == [k * k for k in range(30)]
+    assert list(in_threads(work, [], threads)) == []
+
+
+def test_one_thread_is_the_callers_and_several_are_not():
+    def who(_):
+        return threading.current_thread() is threading.main_thread()
+
+    assert list(in_threads(who, range(3), 1)) == [True] * 3
+    assert list(in_threads(who, range(3), 2)) == [False] * 3
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_an_error_is_raised_and_what_has_not_begun_is_dropped(threads):
+    done = []
+
+    def work(piece):
+        if piece == 3:
+            raise ValueError("the third")
+        done.append(piece)
+
+    with pytest.raises(ValueError, match="the third"):
+        list(in_threads(work, range(1000), threads))
+    assert len(done) < 30
+
+
+def test_pieces_are_taken_as_they_are_needed():
+    """Results that nobody has asked for would take memory."""
+    taken = []
+
+    def pieces():
+        for k in range(100):
+            taken.append(k)
+            yield k
+
+    results = in_threads(lambda piece: piece, pieces(), 2)
+    assert next(results) == 0
+    assert len(taken) < 10
+    assert list(results) == list(range(1, 100))
+
+
+def test_there_is_a_core():
+    assert cores() >= 1
+
+
+def test_pieces_that_have_begun_heed_an_interrupt():
+    """The first piece fails while the second waits for ever: it is told, and its thread ends."""
+    ended = threading.Event()
+
+    def work(piece):
+        if piece == 0:
+            time.sleep(0.05)
+            raise KeyboardInterrupt
+        try:
+            while True:
+                heed()
+                time.sleep(0.001)
+        except StoppedError:
+            ended.set()
+            raise
+
+    with pytest.raises(KeyboardInterrupt):
+        list(in_threads(work, range(2), 2))
+    assert ended.wait(5.0)
+    heed()  # nothing asks the caller's thread to stop
