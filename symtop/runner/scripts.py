@@ -39,7 +39,6 @@ def _once(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
 
 def _package(name: str, place: Path, scripts: Iterable[Path]) -> ModuleType:
     code_hash.add_root(name, place)
-    code_hash.by_code.update(scripts)
     return _once(name, place / "__init__.py", [str(place)])
 
 
