@@ -72,8 +72,8 @@ FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
     **{loop: ("runge_kutta", chart.upper()) for chart, loop in runge_kutta.LOOPS.items()},
     exact_discrete.march_axis: ("exact_discrete", ""),
     exact_discrete.march_attitude: ("exact_discrete", ""),
-    axis_series.march(DEFAULT_ORDER): ("series", ""),
-    attitude_series.march(DEFAULT_ORDER): ("series", "ATTITUDE"),
+    axis_series.march_axis(DEFAULT_ORDER): ("series", ""),
+    attitude_series.march_attitude(DEFAULT_ORDER): ("series", "ATTITUDE"),
     gauss.march_axis: ("gauss", "AXIS"),
     gauss.march_frame: ("gauss", "FRAME"),
     kahan.march_axis: ("kahan", ""),
@@ -90,7 +90,7 @@ SHOWN: dict[Callable[..., Any], tuple[Callable[..., Any], Callable[..., Any]]] =
     splitting_space.march_attitude: (splitting_space.enter_attitude, splitting_space.present_attitude),
     exact_discrete.march_axis: (exact_discrete.enter, exact_discrete.present_axis),
     exact_discrete.march_attitude: (exact_discrete.enter, exact_discrete.present_attitude),
-    attitude_series.march(DEFAULT_ORDER): (lambda _par, _rule, state, _h: state, attitude_series.present),
+    attitude_series.march_attitude(DEFAULT_ORDER): (lambda _par, _rule, state, _h: state, attitude_series.present),
 }
 
 

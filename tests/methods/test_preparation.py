@@ -20,8 +20,9 @@ from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.space import on_attitude, on_axis, on_frame
 from symtop.methods.lagrangian.unreduced import with_momenta
 from symtop.methods.splitting import splitting_angles, splitting_space
-from symtop.methods.splitting.coefficients import METHODS, exact_sum
+from symtop.methods.splitting.coefficients import METHODS
 from symtop.methods.splitting.splitting import composition
+from symtop.methods.splitting.splitting_loop import exact_sum
 from symtop.model.top import Angles, SymmetricTop, flat
 
 PREPARATIONS = [reduced, with_rates, with_momenta, on_axis, on_attitude, on_frame]

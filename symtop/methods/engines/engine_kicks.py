@@ -17,31 +17,13 @@ second, relatively, until the body lies flat. Where N = 0, in a body at rest, it
 Sources: each engine's own file, `Integrator.reference`.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.engines.engine_parts import (
-    cross,
-    dot,
-    exponential,
-    linear,
-    momentum,
-    plus,
-    product,
-    rotated,
-    scaled,
-    torque,
-    velocity,
-)
-
-
-class Substeps(NamedTuple):
-    """How many equal parts an engine cuts a step into, and the share of each."""
-
-    parts: int = 1
-    share: float = 1.0
+from symtop.methods.engines.engine_parts import exponential, linear, momentum, rotated, torque, velocity
+from symtop.methods.vectors import cross, dot, plus, product, scaled
 
 
 @register_jitable

@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.engines.engine_kicks import Substeps
-from symtop.methods.engines.engine_parts import MOMENTUM, RATES, EngineTop, axis, momentum, normalised, product, turned
+from symtop.methods.engines.engine_parts import MOMENTUM, RATES, EngineTop, axis, momentum, normalised, turned
 from symtop.methods.framework.loop import Loop, driver
 from symtop.methods.framework.preparation import Preparation
 from symtop.methods.framework.space import finite_outcome, observe_attitude, observe_axis
+from symtop.methods.vectors import product
 
 
 @register_jitable
@@ -158,3 +158,10 @@ def attitude_loop(
         return dstate, carry, 1, finite_outcome(total)
 
     return driver(begin, increment, carried.observe["attitude"], _enter, carried.present["attitude"])
+
+
+class Substeps(NamedTuple):
+    """How many equal parts an engine cuts a step into, and the share of each."""
+
+    parts: int = 1
+    share: float = 1.0

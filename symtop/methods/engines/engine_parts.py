@@ -28,6 +28,7 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.preparation import Body, Preparation
 from symtop.methods.framework.space import axis_parts, momentum_parts, quaternion_parts
+from symtop.methods.vectors import cross, dot, plus, scaled
 
 
 class EngineTop(NamedTuple):
@@ -82,30 +83,6 @@ MOMENTUM = {"axis": Preparation(_momentum_on_axis, 6), "attitude": Preparation(_
 
 
 @register_jitable
-def dot(a: Any, b: Any) -> Any:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@register_jitable
-def cross(a: Any, b: Any) -> Any:
-    """Vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@register_jitable
-def scaled(s: Any, a: Any) -> Any:
-    """s a."""
-    return s * a[0], s * a[1], s * a[2]
-
-
-@register_jitable
-def plus(a: Any, s: Any, b: Any) -> Any:
-    """a + s b."""
-    return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
-
-
-@register_jitable
 def momentum(par: Any, e: Any, w: Any) -> Any:
     """I_s w."""
     return plus(scaled(par.I1, w), (par.I3 - par.I1) * dot(e, w), e)
@@ -144,17 +121,6 @@ def linear(par: Any, w: Any, h: Any) -> Any:
     u = scaled(par.half * h, w)
     s = par.one / np.sqrt(par.one + dot(u, u))
     return s, s * u[0], s * u[1], s * u[2]
-
-
-@register_jitable
-def product(a: Any, b: Any) -> Any:
-    """The quaternion a b: b first, then a, where both are rotations in space."""
-    return (
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-    )
 
 
 @register_jitable

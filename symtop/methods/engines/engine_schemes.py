@@ -24,19 +24,15 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.methods.engines.engine_parts import (
     acceleration,
-    cross,
-    dot,
     exponential,
     linear,
     momentum,
     normalised,
-    plus,
-    product,
     rotated,
-    scaled,
     torque,
     velocity,
 )
+from symtop.methods.vectors import cross, dot, plus, product, scaled
 
 SMALL = 1e-4  # angle below which 1/12 is the coefficient of dexp^-1 to rounding (the next term is a^2/720)
 

@@ -13,11 +13,11 @@ from collections.abc import Callable
 from typing import Any
 
 from symtop.methods.engines import engine_kicks as kicks, engine_schemes as schemes, no_squish
-from symtop.methods.engines.engine_kicks import Substeps
 from symtop.methods.engines.engine_loop import (
     ANGULAR_MOMENTUM,
     VELOCITY,
     Carried,
+    Substeps,
     attitude_loop,
     axis_loop,
     nothing,
@@ -93,7 +93,7 @@ def built_in() -> list[Integrator]:
                 "ode lacoursiere-2006"),
         _engine("lammps-rigid", schemes.richardson, 2, "LAMMPS fix rigid: half kicks around an extrapolated rotation",
                 "lammps", "p_phi", carried=ANGULAR_MOMENTUM),
-        _entry("no-squish", {"attitude": no_squish.march}, 2, "LAMMPS fix rigid/nve: turns about the body's axes",
+        _entry("no-squish", {"attitude": no_squish.march_no_squish}, 2, "LAMMPS fix rigid/nve: turns about the body's axes",
                "miller-2002 lammps", "p_phi", carried=ANGULAR_MOMENTUM, symplectic=True),
         _engine("yade", schemes.fincham_at_start, 1, "YADE: rotational leapfrog with the axes of the start of a step",
                 "yade", "p_phi", carried=ANGULAR_MOMENTUM),

@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.engines.engine_parts import axis, normalised, plus, scaled, torque, turned
+from symtop.methods.engines.engine_parts import axis, normalised, torque, turned
 from symtop.methods.framework.loop import driver
 from symtop.methods.framework.space import finite_outcome, observe_attitude
+from symtop.methods.vectors import plus, scaled
 
 
 @register_jitable
-def _first(par: Any, q: Any, L: Any, h: float) -> Any:
+def _first_turn(par: Any, q: Any, L: Any, h: float) -> Any:
     """The turn about the body's first axis, with L in body axes."""
     x = 0.5 * h * L[0] / par.I1
     c, s = np.cos(x), np.sin(x)
@@ -30,7 +31,7 @@ def _first(par: Any, q: Any, L: Any, h: float) -> Any:
 
 
 @register_jitable
-def _second(par: Any, q: Any, L: Any, h: float) -> Any:
+def _second_turn(par: Any, q: Any, L: Any, h: float) -> Any:
     """The turn about the body's second axis."""
     y = 0.5 * h * L[1] / par.I1
     c, s = np.cos(y), np.sin(y)
@@ -40,7 +41,7 @@ def _second(par: Any, q: Any, L: Any, h: float) -> Any:
 
 
 @register_jitable
-def _third(par: Any, q: Any, L: Any, h: float) -> Any:
+def _third_turn(par: Any, q: Any, L: Any, h: float) -> Any:
     """The turn about the axis of symmetry."""
     z = 0.5 * h * L[2] / par.I3
     c, s = np.cos(z), np.sin(z)
@@ -49,25 +50,25 @@ def _third(par: Any, q: Any, L: Any, h: float) -> Any:
     return q, (C * L[0] + S * L[1], C * L[1] - S * L[0], L[2])
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+def begin_no_squish(par: Any, rule: Any, state: Any, h: float) -> Any:
     """A step depends on its start alone."""
     return 0.0
 
 
-def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
+def increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (q, L); the free rotation leaves L in space as it is."""
     q, half = (state[0], state[1], state[2], state[3]), 0.5 * h
     kick = scaled(half, torque(par, axis(q)))
     kicked = state[4] + kick[0], state[5] + kick[1], state[6] + kick[2]
     L = plus(kicked, 1.0, turned((q[0], -q[1], -q[2], -q[3]), kicked))
     if par.I3 < par.I1:
-        q, L = _second(par, *_first(par, q, L, half), half)
-        q, L = _third(par, q, L, h)
-        q, L = _first(par, *_second(par, q, L, half), half)
+        q, L = _second_turn(par, *_first_turn(par, q, L, half), half)
+        q, L = _third_turn(par, q, L, h)
+        q, L = _first_turn(par, *_second_turn(par, q, L, half), half)
     else:
-        q, L = _second(par, *_third(par, q, L, half), half)
-        q, L = _first(par, q, L, h)
-        q, L = _third(par, *_second(par, q, L, half), half)
+        q, L = _second_turn(par, *_third_turn(par, q, L, half), half)
+        q, L = _first_turn(par, q, L, h)
+        q, L = _third_turn(par, *_second_turn(par, q, L, half), half)
     q = normalised(par, q)
     kick = plus(kick, half, torque(par, axis(q)))
     dstate = (
@@ -78,4 +79,4 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     return dstate, carry, 1, finite_outcome(total)
 
 
-march = driver(begin, increment, observe_attitude)
+march_no_squish = driver(begin_no_squish, increment_no_squish, observe_attitude)

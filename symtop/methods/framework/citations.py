@@ -9,7 +9,7 @@ from symtop.methods.framework.registry import Integrator, integrator
 
 
 @functools.cache
-def entries() -> dict[str, str]:
+def bibliography() -> dict[str, str]:
     """The text of every entry, by its key. An entry begins with @ in the first column and ends with } there."""
     text = resources.files("symtop.methods").joinpath("citations.bib").read_text(encoding="utf-8")
     return {
@@ -18,9 +18,9 @@ def entries() -> dict[str, str]:
     }
 
 
-def keys(method: Integrator) -> list[str]:
+def citation_keys(method: Integrator) -> list[str]:
     """The entries that an integrator's `reference` names; a reference may also be plain words."""
-    return [key for key in method.reference.replace(",", " ").split() if key in entries()]
+    return [key for key in method.reference.replace(",", " ").split() if key in bibliography()]
 
 
 def citation(name: "str | Integrator") -> str:
@@ -29,9 +29,9 @@ def citation(name: "str | Integrator") -> str:
     Raises SymtopError for an unknown name, or if the integrator names no source that is known here.
     """
     method = integrator(name)
-    named = keys(method)
+    named = citation_keys(method)
     if not named:
         raise SymtopError(
             f"integrator {method.name!r} names no source that is known here (its reference is {method.reference!r})"
         )
-    return "\n\n".join(entries()[key] for key in named)
+    return "\n\n".join(bibliography()[key] for key in named)

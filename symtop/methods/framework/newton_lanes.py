@@ -16,9 +16,9 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
-from symtop.methods.framework.loop import accumulate
 from symtop.methods.framework.newton import settled
 from symtop.methods.framework.outcomes import OK
+from symtop.methods.vectors import accumulate
 
 
 def iterated(  # noqa: C901  (the loops of one step, read in one piece)

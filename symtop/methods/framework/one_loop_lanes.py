@@ -9,8 +9,8 @@ from typing import Any
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, column, put
-from symtop.methods.framework.loop import accumulate
 from symtop.methods.framework.outcomes import OK
+from symtop.methods.vectors import accumulate
 
 AT_ONCE = 8  # numbers of a tuple that LLVM still reads without a loop, which would stand in the way
 

@@ -13,9 +13,9 @@ import math
 from typing import Any
 
 from symtop.core.jit import register_jitable
-from symtop.methods.engines.engine_parts import cross, dot, plus, scaled
 from symtop.methods.lie_group.lie_loop import moved
 from symtop.methods.splitting.rotor import COSINE, SINE, series
+from symtop.methods.vectors import cross, dot, plus, scaled
 
 CUBIC = tuple(1.0 / math.factorial(2 * k + 3) for k in range(9))  # C in powers of -a^2
 NOUGHT = (0.0, 0.0, 0.0)

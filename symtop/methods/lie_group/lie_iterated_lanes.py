@@ -14,7 +14,7 @@ from symtop.core.jit import register_jitable
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, none_left, put
 from symtop.methods.framework.one_loop_lanes import reading
-from symtop.methods.lie_group.lie_lanes import CARRY, FLAG, WORK, begin, entered, give_up, left, stepped
+from symtop.methods.lie_group.lie_lanes import CARRY, FLAG, WORK, _empty_carry, entered, give_up, left, stepped
 from symtop.methods.lie_group.lie_loop import SPUN
 
 
@@ -27,7 +27,7 @@ def no_numbers(rule: Any) -> Any:
 def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
     opened: int, unknowns: int, numbers: Callable[..., Any] = no_numbers, count: int = 1,
-    begin: Callable[..., Any] = begin, carry: int = 1,
+    begin: Callable[..., Any] = _empty_carry, carry: int = 1,
 ) -> Lanes:  # fmt: skip
     """An iterated map of a body in lanes, from the parts of which its `turn` is made.
 

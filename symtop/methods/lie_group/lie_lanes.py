@@ -14,17 +14,17 @@ from typing import Any
 from symtop.core.jit import register_jitable
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, column, put
-from symtop.methods.framework.loop import accumulate
 from symtop.methods.framework.outcomes import OK
 from symtop.methods.framework.space import axis_of
 from symtop.methods.lie_group.lie_loop import STILL, Carried, composed, ended, reached, shown_in
+from symtop.methods.vectors import accumulate
 
 SIZE = len(STILL)
 LOW, STEP, FLAG, WORK, CARRY = SIZE, 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE + 2
 
 
 @register_jitable
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+def _empty_carry(par: Any, rule: Any, state: Any, h: float) -> Any:
     """A step depends on its start alone, and an empty tuple has no type of entry."""
     return (0.0,)
 
@@ -55,7 +55,7 @@ def _read(numbers: Any) -> Any:
 
 def stepped(
     part: Callable[..., None], lay: Callable[..., None], fields: int, each: int, *,
-    carried: Carried, carry: int = 1, begin: Callable[..., Any] = begin, room: int = 0,
+    carried: Carried, carry: int = 1, begin: Callable[..., Any] = _empty_carry, room: int = 0,
     effort: Callable[[Any], int] = lambda _: 0,
 ) -> Lanes:  # fmt: skip
     """A map in lanes: ``part(block, table, row)`` is one share of all lanes, whose own numbers begin with `row`.

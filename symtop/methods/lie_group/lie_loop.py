@@ -20,7 +20,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.engines.engine_parts import cross, dot, plus, scaled
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, showing
 from symtop.methods.framework.loop import Loop, driver
@@ -36,6 +35,7 @@ from symtop.methods.framework.space import (
     quaternion_parts,
     with_spin,
 )
+from symtop.methods.vectors import cross, dot, plus, scaled
 
 
 def _on_body(top: Any, at: Any) -> Any:
@@ -173,3 +173,9 @@ def in_both_charts(
         "axis": FixedStep(loop, rule, carried.prepare, evaluations, implicit=implicit, present=_AXIS),
         "attitude": FixedStep(loop, rule, carried.prepare, evaluations, implicit=implicit, present=carried.present),
     }
+
+
+@register_jitable
+def inertia(par: Any, e: Any, x: Any) -> Any:
+    """J x = I1 x + (I3 - I1)(e.x) e."""
+    return plus(scaled(par.I1, x), (par.I3 - par.I1) * dot(e, x), e)

@@ -31,12 +31,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.engines.engine_parts import plus, scaled
 from symtop.methods.framework.outcomes import OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.lie_exponentials import NOUGHT, acted, any_angle, bent_back, half_square
 from symtop.methods.lie_group.lie_loop import UNSPUN, in_both_charts, lie_loop
 from symtop.methods.lie_group.lie_runge_kutta_lanes import in_lanes
+from symtop.methods.vectors import plus, scaled
 
 
 class LieTable(NamedTuple):

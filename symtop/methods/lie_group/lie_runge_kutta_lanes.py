@@ -11,11 +11,11 @@ from typing import Any
 
 from symtop.core.jit import register_jitable
 from symtop.core.simd import wide_vectors
-from symtop.methods.engines.engine_parts import plus, scaled
 from symtop.methods.framework.lanes import Lanes, W, column
 from symtop.methods.lie_group.lie_exponentials import NOUGHT, acted, bent_back, half_square, near
 from symtop.methods.lie_group.lie_lanes import entered, give_up, left, stepped
 from symtop.methods.lie_group.lie_loop import UNSPUN
+from symtop.methods.vectors import plus, scaled
 
 Part = Callable[..., Any]
 TOP: Any = UNSPUN.top

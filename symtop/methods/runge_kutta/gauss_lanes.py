@@ -14,7 +14,7 @@ import numpy as np
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
-from symtop.methods.framework.loop import accumulate
+from symtop.methods.vectors import accumulate
 
 Row = tuple[float, ...]
 

@@ -30,7 +30,7 @@ from symtop.methods.framework.formulations import FORMULATIONS, Formulation
 from symtop.methods.framework.loop import Loop, driver
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop
-from symtop.methods.runge_kutta.runge_kutta_lanes import explicit
+from symtop.methods.runge_kutta.runge_kutta_lanes import explicit_in_lanes
 
 Row = Sequence[float] | NDArray[Any]
 Rows = Sequence[Row] | NDArray[Any]
@@ -125,7 +125,7 @@ def _loop(form: Formulation, top: Any, dimension: int) -> Loop:
         step = explicit_step(field, par, rule, state, carry, h)
         return step, carry, len(rule.b), ended(state, step)
 
-    lanes = explicit(field, add, ended, top=top, dimension=dimension)
+    lanes = explicit_in_lanes(field, add, ended, top=top, dimension=dimension)
     return driver(begin, increment, form.observe, lanes=lanes)
 
 

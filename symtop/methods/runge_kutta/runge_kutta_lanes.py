@@ -15,12 +15,12 @@ from typing import Any
 from symtop.core.jit import register_jitable
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, column, put
-from symtop.methods.framework.loop import accumulate
 from symtop.methods.framework.outcomes import OK
+from symtop.methods.vectors import accumulate
 
 
 @register_jitable
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+def begin_in_lanes(par: Any, rule: Any, state: Any, h: float) -> Any:
     """Nothing is carried from step to step, and an empty tuple has no type of entry."""
     return (0.0,)
 
@@ -74,7 +74,7 @@ def _stages(field: Callable[..., Any], add: Callable[..., Any], count: int, tops
     return registered
 
 
-def explicit(
+def explicit_in_lanes(
     field: Callable[..., Any], add: Callable[..., Any], ended: Callable[..., Any], *, top: Any, dimension: int
 ) -> Callable[[Any], Lanes]:
     """Explicit tableaux in lanes: ``add(place, slope, weight)`` is a term, ``ended(state, step)`` a step's outcome."""
@@ -96,7 +96,7 @@ def explicit(
                 put(block, d, j, low)
                 put(block, step_at, j, step)
 
-        return Lanes(step, lay, read, _size, top, d, 1, effort=_evaluations, begin=begin)
+        return Lanes(step, lay, read, _size, top, d, 1, effort=_evaluations, begin=begin_in_lanes)
 
     return lambda rule: lanes(len(rule.b))
 

@@ -11,9 +11,9 @@ from typing import Any
 from symtop.core.jit import register_jitable
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, column, put
-from symtop.methods.framework.loop import accumulate
 from symtop.methods.framework.outcomes import OK
 from symtop.methods.splitting.splitting_loop import Composition, Stages, packed_for_lanes
+from symtop.methods.vectors import accumulate
 
 
 def lay(par: Any, rule: Any, h: float, numbers: Any) -> None:

@@ -13,6 +13,7 @@ stands for. A sum that is wrong by one rounding is a clock that runs fast by 1e-
 """
 
 import functools
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -21,7 +22,6 @@ from numpy.typing import NDArray
 
 from symtop.core.jit import register_jitable, set_item, times, to_fixed_tuple, with_item
 from symtop.methods.framework.preparation import as_fields
-from symtop.methods.splitting.coefficients import exact_sum
 
 SHORT = 2  # drifts
 
@@ -139,3 +139,15 @@ def compose(force: Any, kick: Any, drift: Any, par: Any, rule: Any, state: Any, 
     elif rule.kick[0] != 0.0:  # what the next step kicks with first
         now = force(par, state, step)
     return step, now
+
+
+def exact_sum(values: Sequence[float], total: float = 1.0) -> tuple[float, ...]:
+    """The same coefficients with what is missing from `total` given to the middle one, or to the middle two equally."""
+    closed, n = list(values), len(values)
+    surplus = math.fsum((*closed, -total))
+    if n % 2:
+        closed[n // 2] -= surplus
+    else:
+        closed[n // 2 - 1] -= 0.5 * surplus
+        closed[n // 2] -= 0.5 * surplus
+    return tuple(closed)

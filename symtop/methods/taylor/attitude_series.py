@@ -101,7 +101,7 @@ def present(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
 
 
 @functools.cache
-def march(order: int) -> Loop:
+def march_attitude(order: int) -> Loop:
     """The loop of one order."""
     series = attitude_sum(order)
 
@@ -109,11 +109,11 @@ def march(order: int) -> Loop:
         w, x, y, z, wx, wy, _, _ = series(state, rule.turn, rule.pull)
         return (w, x, y, z, wx, wy, 0.0), carry, 1, finite_outcome(w + x + y + z + wx + wy)
 
-    return driver(begin, increment, observe_attitude, present=present, lanes=functools.partial(_lanes, order))
+    return driver(begin, increment, observe_attitude, present=present, lanes=functools.partial(_attitude_lanes, order))
 
 
 @functools.cache
-def _in_lanes(order: int) -> Lanes:
+def _attitude_in_lanes(order: int) -> Lanes:
     series = attitude_sum(order, Components)
 
     def advance(par, rule, state, carry):  # type: ignore[no-untyped-def]
@@ -123,6 +123,6 @@ def _in_lanes(order: int) -> Lanes:
     return one_loop(advance, Scale, top=SpaceTop, dimension=7, carry=1)
 
 
-def _lanes(order: int, rule: Scale) -> Lanes:
+def _attitude_lanes(order: int, rule: Scale) -> Lanes:
     """What runs an order in lanes."""
-    return _in_lanes(order)
+    return _attitude_in_lanes(order)

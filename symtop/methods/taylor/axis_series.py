@@ -151,7 +151,7 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 
 @functools.cache
-def march(order: int) -> Loop:
+def march_axis(order: int) -> Loop:
     """The loop of one order."""
     series = axis_sum(order)
 
@@ -159,11 +159,11 @@ def march(order: int) -> Loop:
         x, y, u, wx, wy, _, _ = series(state, rule.turn, rule.pull)
         return (x, y, u, wx, wy, 0.0), carry, 1, finite_outcome(x + y + u + wx + wy)
 
-    return driver(begin, increment, observe_axis, lanes=functools.partial(_lanes, order))
+    return driver(begin, increment, observe_axis, lanes=functools.partial(_axis_lanes, order))
 
 
 @functools.cache
-def _in_lanes(order: int) -> Lanes:
+def _axis_in_lanes(order: int) -> Lanes:
     series = axis_sum(order, Components)
 
     def advance(par, rule, state, carry):  # type: ignore[no-untyped-def]
@@ -173,6 +173,6 @@ def _in_lanes(order: int) -> Lanes:
     return one_loop(advance, Scale, top=SpaceTop, dimension=6, carry=1)
 
 
-def _lanes(order: int, rule: Scale) -> Lanes:
+def _axis_lanes(order: int, rule: Scale) -> Lanes:
     """What runs an order in lanes."""
-    return _in_lanes(order)
+    return _axis_in_lanes(order)

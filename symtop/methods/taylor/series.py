@@ -32,8 +32,8 @@ def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
         family="taylor",
         summary=f"Taylor series on the space-frame equations, order {order}, by products of vectors",
         solvers={
-            "axis": FixedStep(axis_series.march(order), rule, on_axis, order, implicit=False),
-            "attitude": FixedStep(attitude_series.march(order), rule, on_attitude, order, implicit=False),
+            "axis": FixedStep(axis_series.march_axis(order), rule, on_axis, order, implicit=False),
+            "attitude": FixedStep(attitude_series.march_attitude(order), rule, on_attitude, order, implicit=False),
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi"}),
         reference="biscani-izzo-2021",

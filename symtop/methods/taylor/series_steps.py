@@ -20,12 +20,12 @@ import numpy as np
 
 from symtop.core.jit import compile_kernel, register_jitable, set_item
 from symtop.methods.framework.adaptive import Adaptive
-from symtop.methods.framework.loop import accumulate
 from symtop.methods.framework.outcomes import NOT_FINITE, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.space import axis_of, on_attitude, on_axis, with_spin
 from symtop.methods.taylor.attitude_series import attitude_sum
 from symtop.methods.taylor.axis_series import axis_sum
+from symtop.methods.vectors import accumulate
 
 ORDERS = (8, 12, 16, 20)
 BLOCK = 1_000_000  # series between returns to Python
@@ -70,7 +70,7 @@ def order_for(tolerance: float) -> int:
 
 
 @functools.cache
-def march(chart: str, order: int) -> Callable[..., tuple[int, int, int, int]]:  # noqa: C901
+def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int, int]]:  # noqa: C901
     """The loop of one order in one chart, compiled when it is first used.
 
     It is a loop as `adaptive` takes it, from the place (state, its low half, time, its low half, step), and counts
@@ -146,5 +146,5 @@ def solver(chart: str) -> Adaptive:
     """A solver of the registry in one chart."""
     size = CHARTS[chart].size
     return Adaptive(
-        lambda tolerance: march(chart, order_for(tolerance)), size, 2 * size + 3, 2 * size, SERIES, BLOCK, order_for
+        lambda tolerance: march_adaptive(chart, order_for(tolerance)), size, 2 * size + 3, 2 * size, SERIES, BLOCK, order_for
     )
