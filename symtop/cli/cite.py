@@ -32,7 +32,7 @@ def cite(files: tuple[Path, ...]) -> None:
     symtop cite results/work_precision.nc run.nc
     """
     from symtop.core import netcdf
-    from symtop.methods.framework.citations import bibliography
+    from symtop.methods.framework.registry import bibliography
 
     keys: dict[str, None] = {}
     unknown: dict[str, None] = {}
@@ -62,8 +62,7 @@ def _integrators(data: "xr.Dataset | xr.DataTree") -> Iterator[str]:
 def _keys(name: str) -> list[str]:
     """The entries of `citations.bib` that a method of the registry names; none for one that is not registered here."""
     from symtop.core.errors import SymtopError
-    from symtop.methods.framework.citations import citation_keys
-    from symtop.methods.framework.registry import integrator
+    from symtop.methods.framework.registry import citation_keys, integrator
 
     try:
         return citation_keys(integrator(name))

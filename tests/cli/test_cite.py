@@ -8,7 +8,7 @@ from click.testing import CliRunner
 import symtop
 from symtop.cli.main import main
 from symtop.core import netcdf
-from symtop.methods.framework.citations import bibliography, citation_keys
+from symtop.methods.framework.registry import bibliography, citation_keys
 
 
 def cited(*arguments):

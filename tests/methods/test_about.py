@@ -6,9 +6,8 @@ import pytest
 from scipy import integrate
 
 import symtop
-from symtop.methods.framework.about import paragraphs
-from symtop.methods.framework.citations import bibliography
 from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.registry import bibliography, paragraphs
 
 NAMES = tuple(symtop.integrators())
 COUNTED = """zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen

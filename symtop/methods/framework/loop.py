@@ -34,9 +34,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.core.jit import compile_kernel, register_jitable, set_item
-from symtop.methods.framework.blocks import Blocks
 from symtop.methods.framework.lanes import Lanes, marching as marching_lanes, preparing, showing
-from symtop.methods.framework.outcomes import OK
+from symtop.methods.framework.many import Blocks
+from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import Body, Start, as_it_steps, conserved
 from symtop.methods.vectors import accumulate, accumulate_plainly
 

@@ -25,10 +25,9 @@ Sources: Simo, Wong, Int. J. Numer. Methods Eng. 31 (1991) 19; Gonzalez, J. Nonl
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.outcomes import NOT_CONVERGED, OK
+from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.lie_iterated_lanes import iterated
-from symtop.methods.lie_group.lie_loop import SPUN, cayley, gravity, in_both_charts, inertia, lie_loop
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, inertia, iterated, lie_loop
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
 MOST = 30  # iterations of a step; 3 or 4 are the rule

@@ -22,11 +22,10 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, finite
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.outcomes import NOT_CONVERGED, OK
+from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import axis_of
-from symtop.methods.lie_group.lie_iterated_lanes import iterated
-from symtop.methods.lie_group.lie_loop import SPUN, gravity, in_both_charts, inertia, lie_loop, moved
+from symtop.methods.lie_group.loop import SPUN, gravity, in_both_charts, inertia, iterated, lie_loop, moved
 from symtop.methods.splitting.rotor import EXACT, near, rotor
 from symtop.methods.vectors import cross, plus, scaled, solve3
 

@@ -26,8 +26,7 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.loop import driver
-from symtop.methods.framework.outcomes import OUTCOMES
-from symtop.methods.framework.plan import Run
+from symtop.methods.framework.plan import OUTCOMES, Run
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome, frame_to_attitude, observe_axis, on_axis, on_frame

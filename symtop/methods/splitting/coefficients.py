@@ -18,7 +18,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from symtop.methods.splitting.splitting_loop import exact_sum
+from symtop.methods.splitting.loop import exact_sum
 
 
 class Table(NamedTuple):
@@ -56,7 +56,7 @@ def drift_first(order: int, drift: Sequence[float], kick: Sequence[float]) -> Ta
 
 
 class Splitting(NamedTuple):
-    """A built-in method: the arguments of `symtop.methods.splitting.splitting.composition` beside its name."""
+    """A built-in method: the arguments of `symtop.methods.splitting.composition.composition` beside its name."""
 
     table: Table
     reference: str  # a key of citations.bib
