@@ -215,9 +215,7 @@ def tables(data: xr.Dataset) -> list[Table]:
         if name != OURS:
             both.append([name, str(one["chart"].values), str(one["language"].values), public, inner])
     keys = ("package", "version", "chart", "language", "implementation", "shows", "formulation")
-    given = [
-        [str(row), *(str(data[key].sel(variant=row).values) for key in keys)] for row in data["variant"].values
-    ]
+    given = [[str(row), *(str(data[key].sel(variant=row).values) for key in keys)] for row in data["variant"].values]
     return [
         Table(
             f"Both ratios: the time over symtop's ({_fixed(data)})",

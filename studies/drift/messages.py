@@ -21,9 +21,7 @@ def holds(cell: xr.Dataset, constant: str) -> bool:
 
 def residuals(data: xr.Dataset) -> str:
     """Who keeps the energy best, and who loses most of it, of the rows that are drawn."""
-    largest = {
-        str(name): float(data["energy_largest"].sel(variant=name).max()) for name in data["variant"].values
-    }
+    largest = {str(name): float(data["energy_largest"].sel(variant=name).max()) for name in data["variant"].values}
     behaviour = {name: worst_behaviour(data.sel(variant=name), "energy") for name in largest}
     held = [name for name in largest if behaviour[name] in HELD]
     lost = sorted((name for name in largest if behaviour[name] == "drift"), key=lambda name: -largest[name])

@@ -8,7 +8,7 @@ import xarray as xr
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import Scene, scene
 from symtop.run.long_run import PER_NUTATION
-from symtop.runner.grid import grid_variants, grid_scenes
+from symtop.runner.grid import grid_scenes, grid_variants
 from symtop.runner.study import Case, Study
 
 from . import figures, words

@@ -30,7 +30,9 @@ def compiled_rows() -> list[Integrator]:
     """Every compiled row with a step or a tolerance, but those that are left out."""
     left = {name for names in words.LEFT_OUT.values() for name in names}
     return [
-        row for row in variants() if row.implementation == "compiled" and row.control is not None and row.method not in left
+        row
+        for row in variants()
+        if row.implementation == "compiled" and row.control is not None and row.method not in left
     ]
 
 

@@ -62,7 +62,7 @@ def names() -> dict[str, list[str]]:
 
 
 def completing(kind: str) -> Completion:
-    """Shell completion of the names of all scenes, integrators or studies; after a bracket, of variants like rk4[axis]."""
+    """Shell completion of the names of scenes, integrators or studies; after a bracket, of variants like rk4[axis]."""
 
     def complete(_: click.Context, __: click.Parameter, prefix: str) -> list[str]:
         wanted = "variants" if kind == "integrators" and "[" in prefix else kind

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 from symtop.core import code_hash, netcdf
 from symtop.core.code_hash import Reasons, Walk
 from symtop.methods.framework import registry
-from symtop.methods.framework.registry import Integrator, integrators, variants, split_name
+from symtop.methods.framework.registry import Integrator, integrators, split_name, variants
 from symtop.model.scenes import scenes
 from symtop.run import simulation
 from symtop.runner import plugins

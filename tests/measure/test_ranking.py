@@ -221,9 +221,7 @@ def test_the_margin_of_a_lead_grows_with_the_noise_of_the_times():
 
 def test_a_row_that_meets_an_error_on_more_scenes_comes_before_a_faster_one():
     table = np.array([[1.0, 1.0, math.inf, math.inf], [9.0, 9.0, 1.0, 1.0], [10.0, 12.0, 8.0, 9.0]])
-    ratios = xr.DataArray(
-        table[None], {"target": [1e-12], "variant": list("abc")}, ("target", "variant", "problem")
-    )
+    ratios = xr.DataArray(table[None], {"target": [1e-12], "variant": list("abc")}, ("target", "variant", "problem"))
     assert ranking.leaders(ratios, 3) == ["b", "c", "a"]
     assert ranking.leaders(ratios.isel(problem=[0, 1]), 3) == ["a", "b", "c"]
 

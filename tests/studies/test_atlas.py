@@ -452,9 +452,7 @@ def test_the_enlarged_map_is_that_of_a_familiar_row_and_names_its_regions():
 def test_the_message_of_a_mechanism_follows_from_its_numbers():
     def said(once, every):
         columns = {Column.ENERGY_ONCE: ("variant", once), Column.ENERGY_EVERY: ("variant", every)}
-        return messages.of_mechanism(
-            "sampling", xr.Dataset(columns, coords={"variant": ["rk4[axis]", "strang[axis]"]})
-        )
+        return messages.of_mechanism("sampling", xr.Dataset(columns, coords={"variant": ["rk4[axis]", "strang[axis]"]}))
 
     assert "up to 1000 times too small (rk4[axis])" in said([1e-7, 1e-6], [1e-4, 1e-6])
     assert "not seen" not in said([1e-7, 1e-6], [1e-4, 1e-6])

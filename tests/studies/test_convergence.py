@@ -12,7 +12,7 @@ import symtop
 from symtop.judging.claims_order import measured_order
 from symtop.judging.findings import CLAIMS
 from symtop.measure.order import BESIDE, order_verdict
-from symtop.methods.framework.registry import integrator, methods, variants, split_name
+from symtop.methods.framework.registry import integrator, methods, split_name, variants
 from symtop.report import style
 from symtop.runner import store
 from symtop.runner.study import Case

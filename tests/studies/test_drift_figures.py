@@ -55,9 +55,7 @@ def test_rows_are_grouped_by_the_constants_that_they_lose(histories):
         "2 of 5 methods hold the energy and both momenta, at rounding or with a bounded error; 3 lose at least one"
     )
     assert messages.sizes(histories.sel(variant=NAMES[:2])).endswith("with a bounded error")
-    ended = histories.assign(
-        outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart")
-    )
+    ended = histories.assign(outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart"))
     assert messages.lost(ended)[CONSTANTS] == ["strang[axis]"]
 
 

@@ -27,12 +27,8 @@ def measured():
         for name in names
     ]  # fmt: skip
     many = [study.measure(study.Case("population", name, {"members": 20, "seed": 1}, group="pop")) for name in names]
-    tops = xr.concat(by_row, "variant", join="outer").assign_coords(
-        scene=list(tables.SCENES), variant=list(names)
-    )
-    drawn = (
-        xr.concat(many, "variant").expand_dims("scene").assign_coords(scene=["population"], variant=list(names))
-    )
+    tops = xr.concat(by_row, "variant", join="outer").assign_coords(scene=list(tables.SCENES), variant=list(names))
+    drawn = xr.concat(many, "variant").expand_dims("scene").assign_coords(scene=["population"], variant=list(names))
     return xr.DataTree.from_dict({"tops": tops, "population": drawn})
 
 

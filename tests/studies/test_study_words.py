@@ -75,9 +75,7 @@ def test_every_tolerance_is_stated_and_a_default_says_that_it_is_one():
     said = rows.setting(histories())
     assert "100 nutations of spheroid, 118 steps a nutation or tolerance 1e-08 (rk45[angles])." in said
     assert said.endswith("taylor[axis] keeps its default tolerance, the rounding of the arithmetic.")
-    cells = [
-        histories().sel(scene="spheroid", variant=name) for name in ("rk4[axis]", "rk45[angles]", "taylor[axis]")
-    ]
+    cells = [histories().sel(scene="spheroid", variant=name) for name in ("rk4[axis]", "rk45[angles]", "taylor[axis]")]
     assert [rows.used(cell) for cell in cells] == [
         "118.00 steps a nutation", "tolerance 1.0e-08", "tolerance 2.2e-18 (its default: rounding)",
     ]  # fmt: skip

@@ -130,8 +130,7 @@ def test_a_chart_shows_timed_runs_against_seconds_and_every_run_against_work(tim
     )
     ran = (timed_study["outcome"] == "ok").sum(["variant", "setting"]).values.ravel()
     assert (
-        list(map(len, seconds))
-        == timed_study["seconds"].notnull().sum(["variant", "setting"]).values.ravel().tolist()
+        list(map(len, seconds)) == timed_study["seconds"].notnull().sum(["variant", "setting"]).values.ravel().tolist()
     )
     assert list(map(len, work)) == ran.tolist()
     assert all(any(f" {unit}," in words for unit in ("us", "ms")) for panel in seconds for *_, words in panel)

@@ -294,7 +294,7 @@ def is_built_in(name: str) -> bool:
 
 
 class _Integrators(dict[str, Integrator]):
-    """The registry as a dict; a notebook shows it as a table. A variant is found under its name, too, but not listed."""
+    """The registry as a dict; a notebook shows it as a table. A variant is found by its name, too, but not listed."""
 
     def __missing__(self, name: str) -> Integrator:
         method, chart = _method_and_chart(name, self)
@@ -339,7 +339,7 @@ def engines() -> dict[str, Integrator]:
 
 @by_name
 def integrator(name: "str | Integrator") -> Integrator:
-    """The integrator of that name, or the variant: ``rk4[axis]`` works in no other chart, nor does ``rk4-axis``, the same.
+    """The integrator or variant of that name: ``rk4[axis]``, or ``rk4-axis``, works in no other chart.
 
     An Integrator is returned as is. Raises SymtopError for an unknown name, with the nearest ones, and for a chart that
     the method does not have.
