@@ -16,8 +16,8 @@ step takes as long as with the loop written out in each kernel.
 
 In lanes the iteration runs over a block until no lane is live. A lane that has ended keeps its x and evaluates the same
 numbers again, so that all that follows from them may be written at every pass, and only x is chosen. A step takes as
-many passes as its slowest lane, two where the lanes by themselves take 1.1 to 1.8. A lane that is live after half of the
-evaluations is given up (`lanes`): there `newton` begins again with another guess.
+many passes as its slowest lane, two where the lanes by themselves take 1.1 to 1.8. A lane that is live after half of
+the evaluations is given up (`lanes`): there `newton` begins again with another guess.
 """
 
 from collections.abc import Callable

@@ -44,8 +44,8 @@ force evaluation of the run, whose work would otherwise depend on who looks at i
 compensation.
 
 The step must resolve the distance of the pole of wp from the real time, 0.44 nutations in `spheroid`, 0.7 in
-`goldstein`, 2.9 in `fast`; a variable step gains at most 1.5, and 4 to 6 near a separatrix. Explicit, no poles; L_z does
-not move; not symplectic, which shows where the truncation lies above rounding: the energy then drifts.
+`goldstein`, 2.9 in `fast`; a variable step gains at most 1.5, and 4 to 6 near a separatrix. Explicit, no poles; L_z
+does not move; not symplectic, which shows where the truncation lies above rounding: the energy then drifts.
 Source: Biscani, Izzo, Mon. Not. R. Astron. Soc. 504 (2021) 2614 (steps and orders); the recurrences are derived here.
 """
 
