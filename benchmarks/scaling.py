@@ -12,8 +12,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from symtop.runner import run as runner
 from symtop.runner.pools import Workers
+
+from symtop.runner import run as runner
 
 ENOUGH = 1.7  # times faster
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import xarray as xr
 
 from symtop.core import netcdf
+from symtop.runner import store
 
 PROBE = Path(__file__).parent / "probe.py"
 
@@ -48,10 +49,11 @@ def ended(process: subprocess.Popen, seconds: float = 240.0) -> tuple[int, str, 
 
 
 def contents(results: Path) -> dict[str, xr.Dataset]:
-    """Every dataset of a results folder by its place in it, without its attributes of provenance."""
+    """Every dataset of a results folder by its place in it, of cases as well, without its attributes of provenance."""
     found = {}
-    for path in sorted(results.rglob("*.nc")):
-        data = netcdf.read(path)
+    for path in sorted([*results.rglob("*.nc"), *results.rglob("cases/*/*.npz")]):
+        data = netcdf.read(path) if path.suffix == ".nc" else store.load_case(path)
+        assert data is not None, path
         found[str(path.relative_to(results))] = data.drop_attrs().assign_attrs(
             {key: value for key, value in data.attrs.items() if key not in netcdf.provenance()}
         )

@@ -101,10 +101,10 @@ def study(
 def _nothing_to_do(results: Path, quick: bool, full: bool, as_json: bool) -> bool:
     """Is every study up to date? Then its findings are told."""
     from symtop.cli import study_messages
-    from symtop.runner import settled
+    from symtop.runner import manifest
 
     began = time.monotonic()
-    known = settled.findings(results, settled.grid_of(quick=quick, full=full))
+    known = manifest.all_findings(results.resolve(), "quick" if quick else "full" if full else "ordinary")
     if known is None:
         return False
     took = {"computed": 0, "seconds": time.monotonic() - began}
@@ -124,14 +124,15 @@ def report(results: str, embed: bool) -> None:
     If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``. A page that
     is up to date is not written again.
     """
-    from symtop.report.unchanged import PAGE, is_current
+    from symtop.runner import manifest
 
     folder = Path(results)
     if not any(folder.glob("*.json")) and any((folder / "quick").glob("*.json")):
         warn(f"{folder} holds no findings; the report is made of those in {folder / 'quick'}")
         folder /= "quick"
-    if not click.get_current_context().meta.get(PLUGINS) and is_current(folder, embed=embed):
-        click.echo(f"report: {folder / PAGE} (up to date)")
+    made_of = manifest.report_hash(folder, embed=embed)
+    if not click.get_current_context().meta.get(PLUGINS) and manifest.is_current(folder, "report.html", made_of):
+        click.echo(f"report: {folder / 'report.html'} (up to date)")
         return
     from symtop.report import page
 

@@ -12,8 +12,8 @@ from symtop.cli.common import as_text, warn
 from symtop.core.errors import SymtopError
 from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
 from symtop.methods.framework.registry import integrator
-from symtop.runner import check, run, scripts, settled, status, store
-from symtop.runner.pools import Workers
+from symtop.runner import check, manifest, run, scripts, status, store
+from symtop.runner.pool import Pool
 from symtop.runner.study import Study, StudyError
 
 MOST_NAMED = 8  # integrators and scenes in a line of the status
@@ -58,11 +58,11 @@ def _agree(names: Sequence[str], *, every: bool) -> None:
             raise SymtopError(f"--status and --{other} must not be given together: --status computes nothing")
 
 
-def conduct(task: Callable[[Workers], int], jobs: int | None, scheduler: str | None) -> int:
-    """Do a task with workers; returns the exit code."""
+def conduct(task: Callable[[Pool], int], jobs: int | None, scheduler: str | None) -> int:
+    """Do a task with a pool; returns the exit code."""
     try:
-        with ending_on_sigterm(), Workers(jobs, scheduler) as workers:
-            return task(workers)
+        with ending_on_sigterm(), Pool(jobs, scheduler) as pool:
+            return task(pool)
     except StudyError as error:  # said here: the names in it are no options of the command
         warn(str(error))
         return 2
@@ -73,57 +73,57 @@ def conduct(task: Callable[[Workers], int], jobs: int | None, scheduler: str | N
 
 
 def run_all(
-    workers: Workers, studies: list[Study], results: Path, fresh: bool, limit: float | None, as_json: bool,
+    pool: Pool, studies: list[Study], results: Path, fresh: bool, limit: float | None, as_json: bool,
     whole: bool = False, **grid: bool,
 ) -> int:  # fmt: skip
     """Bring studies up to date, each concluded while the next one is computed; 1 if cases failed."""
     from symtop.report import style
 
-    made = settled.made_by(settled.grid_of(**grid)) if whole else ""  # before an edit of the code may change it
+    sources = manifest.sources_hash() if whole else ""  # before an edit of the code may change it
     save = style.sketch if grid.get("quick") else style.publish  # quick figures are to look at, not to print
     options = {"fresh": fresh, "limit": limit, "save": save, "beside": len(studies) > 1, **grid}
-    ended = _in_order(workers, studies, results, options)
+    ended = _in_order(pool, studies, results, options)
     summaries = [study_messages.study(findings, results, as_json=as_json) for findings in ended]
     failed = any(summary["failures"] for summary in summaries)
     if whole and not failed:
-        settled.note(results.resolve(), [study.name for study in studies], made)
+        manifest.note_all(results.resolve(), [study.name for study in studies], grid_name(**grid), sources)
     study_messages.end(summaries, results, as_json=as_json)
     return 1 if failed else 0
 
 
-def _in_order(
-    workers: Workers, studies: list[Study], results: Path, options: dict[str, Any]
-) -> Iterator[dict[str, Any]]:
+def grid_name(*, quick: bool, full: bool) -> str:
+    """The word for a grid."""
+    return "quick" if quick else "full" if full else "ordinary"
+
+
+def _in_order(pool: Pool, studies: list[Study], results: Path, options: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The findings of studies in their order, while later ones are computed; then what stopped one, if any."""
-    begun: deque[tuple[Study, run.Begun]] = deque()
+    started: deque[tuple[Study, run.Started]] = deque()
     refused: list[SymtopError] = []
     try:
         for study in studies:
             try:
-                begun.append((study, run.begin(study, results, workers, **options)))
+                started.append((study, run.start(study, results, pool, **options)))
             except SymtopError as error:
                 refused.append(error)
                 break
-            while len(begun) > 1 and begun[0][1].ready():
-                yield from _findings(begun[0][1], refused)
-                begun.popleft()
-        workers.finish()
-        while begun:
-            yield from _findings(begun[0][1], refused)
-            begun.popleft()
+            while len(started) > 1 and started[0][1].done():
+                yield from _findings(started.popleft()[1], refused)
+        while started:
+            yield from _findings(started.popleft()[1], refused)
     except BaseException:
-        workers.close()
-        for study, _ in begun:
+        pool.close()
+        for study, _ in started:
             store.tidy(results.resolve(), study)
         raise
     if refused:
         raise refused[0]
 
 
-def _findings(ended: run.Begun, refused: list[SymtopError]) -> Iterator[dict[str, Any]]:
+def _findings(study: run.Started, refused: list[SymtopError]) -> Iterator[dict[str, Any]]:
     """The findings of a study; if it has none, as one that compares methods and was given one, the next ones go on."""
     try:
-        findings = ended()
+        findings = study.result()
     except StudyError as error:
         refused.append(error)
     else:
@@ -178,11 +178,9 @@ def _names(rows: list[dict[str, Any]], key: str) -> str:
     return ", ".join(names[:MOST_NAMED]) + more
 
 
-def check_all(
-    workers: Workers, studies: list[Study], results: Path, everything: bool, as_json: bool, **grid: bool
-) -> int:
+def check_all(pool: Pool, studies: list[Study], results: Path, everything: bool, as_json: bool, **grid: bool) -> int:
     """Compute stored cases again and compare; 1 if anything is different."""
-    checks = [check.check(study, results, workers, everything=everything, **grid) for study in studies]
+    checks = [check.check(study, results, pool, everything=everything, **grid) for study in studies]
     if not any(entry.stored for entry in checks):
         names = ", ".join(study.name for study in studies)
         raise SymtopError(f"no case of {names} is up to date in {results}; run it first")

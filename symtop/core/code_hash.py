@@ -145,6 +145,7 @@ def _of_library(module: str | None) -> bool:
 Parts = Callable[[Any], Iterable[Any]]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+_PYTHON = Path(contextlib.__file__).resolve().parent  # where Python's own modules are
 STATE = (list, dict, set)  # under a module's lower-case name
 _IMPORT = dis.opmap["IMPORT_NAME"]
 _by_name: set[Callable[..., Any]] = set()
@@ -264,10 +265,10 @@ class Code:
             self._add_value(thing)
 
     def _add_function(self, function: FunctionType) -> None:
-        path = _path(function.__code__.co_filename)
-        if function in _by_name or _of_library(function.__module__) or path in PLUMBING:
+        path, library = _path(function.__code__.co_filename), _of_library(function.__module__)
+        if library or function in _by_name or path in PLUMBING or _PYTHON in path.parents:
             self._note(f"{function.__module__}.{function.__qualname__}")
-            if not _of_library(function.__module__) and function not in _by_name:
+            if not library and function not in _by_name:
                 self._add_all(held(function))  # a wrapper: what it calls
         else:
             self._lead_to("function", function.__qualname__, file_label(path), function)

@@ -86,9 +86,10 @@ def digests(study: Study, cases: Iterable[Case]) -> list[str]:
 
 def drawing_digest(study: Study, script: Path, *drawing: Any) -> str:
     """Hash of what makes a study's figures, tables and sentences, and of the files beside its script that they fill."""
-    functions = study.pictures, study.verdict, study.tables, study.charts, study.opening
-    words = study.title, study.question, study.how_to_read
+    shown = (
+        study.pictures, study.verdict, study.tables, study.charts, study.opening,
+        study.title, study.question, study.how_to_read,
+    )  # fmt: skip
     templates = {f"file {file.name}": code_hash.file_hash(file) for file in sorted(script.parent.glob("*.md"))}
-    return code_hash.digest(
-        code_hash.packages("matplotlib") | made_of("drawing", functions) | _code().reasons("words", words, drawing) | templates
-    )
+    code = _code().reasons("drawing", shown, drawing)
+    return code_hash.digest(code | templates | code_hash.packages("matplotlib"))

@@ -70,7 +70,7 @@ def cluster(log, processes_with_dask):
 
 def computed(results):
     """The finished cases, and the identity of the file of each."""
-    return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in results.rglob("cases/*/*.nc")}
+    return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in results.rglob("cases/*/*.npz")}
 
 
 def after(cluster, log, results, happens):

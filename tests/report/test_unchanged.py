@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from symtop.report.unchanged import MARK, is_current, made_of
 
 from symtop.cli.main import main
 from symtop.report import page
-from symtop.report.unchanged import MARK, is_current, made_of
 
 STORED = Path(__file__).resolve().parents[2] / "results"  # what is tracked: the benchmark and its picture
 

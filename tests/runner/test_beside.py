@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from symtop.runner.pools import Workers
 
 from symtop.cli.main import main
 from symtop.core import files
 from symtop.core.errors import SymtopError
 from symtop.runner import run as runner, store
-from symtop.runner.pools import Workers
 from tests.commands import contents, leftovers
 
 SCRIPT = """
@@ -119,7 +119,7 @@ def test_a_case_whose_file_is_gone_has_failed(script, tmp_path):
     study, results = runner.load(script("first")), tmp_path / "r"
     with Workers(2) as workers:
         answer = runner.begin(study, results, workers, quiet=True, beside=True)
-        gone, other = sorted((results / "cases" / "first").glob("*.nc"))
+        gone, other = sorted((results / "cases" / "first").glob("*.npz"))
         gone.unlink()
         (failure,) = answer()["failures"]
         assert gone.name in failure

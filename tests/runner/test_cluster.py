@@ -7,6 +7,7 @@ import time
 
 import pytest
 from click.testing import CliRunner
+from symtop.runner.pools import Workers
 
 from symtop.cli.main import main
 from symtop.core.errors import SymtopError
@@ -14,7 +15,6 @@ from symtop.run.ensemble import chunks
 from symtop.run.ensemble.ensemble import ensemble
 from symtop.run.ensemble.population import population
 from symtop.runner import run as runner
-from symtop.runner.pools import Workers
 from tests.commands import PROBE, contents, ended, leftovers, symtop
 
 distributed = pytest.importorskip("distributed")

@@ -108,7 +108,7 @@ def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path,
     assert output.startswith("symtop: study mine: ")
     assert output.count("\n") == 1
     assert says in output
-    assert len(list(tmp_path.rglob("cases/mine/*.nc"))) == 2
+    assert len(list(tmp_path.rglob("cases/mine/*.npz"))) == 2
     code, output = ran(tmp_path, "")
     assert code == 0, output
     assert "0 of 2 cases computed, 1 figure" in output

@@ -4,11 +4,11 @@ import itertools
 import math
 
 import pytest
+from symtop.runner.pools import InProcess, Workers
 
 from symtop.core import netcdf
 from symtop.core.parallel import cores
 from symtop.runner import run as runner, trial
-from symtop.runner.pools import InProcess, Workers
 
 SCRIPT = """
 import os, time
