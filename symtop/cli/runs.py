@@ -172,7 +172,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     from symtop.core.progress import ticking
 
     with ticking("loading"):
-        from symtop.judging.claims import judge
+        from symtop.judging.battery import judge
         from symtop.methods.framework import registry
         from symtop.model import scenes
 

@@ -7,7 +7,7 @@ import pytest
 
 import symtop
 from symtop.judging.findings import Finding
-from symtop.judging.judge_step import Judged
+from symtop.judging.judge_step import StepLedger
 from symtop.judging.sandbox import About
 from symtop.report.card import badge, card, figures, write_badge
 
@@ -22,7 +22,7 @@ def ledger():
 
 
 def handmade(*findings, name="mine"):
-    return Judged(name, "spheroid", findings, {}, About(name, "axis", "python", 0.0))
+    return StepLedger(name, "spheroid", findings, {}, About(name, "axis", "python", 0.0))
 
 
 def test_the_card_is_one_page_with_two_figures_and_every_verdict(ledger, tmp_path):
