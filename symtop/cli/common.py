@@ -59,7 +59,7 @@ def _names(kind: str, prefix: str) -> Iterable[str]:
         return scripts.names()
     from symtop.methods.framework import registry
 
-    return [variant.name for variant in registry.rows()] if "[" in prefix else registry.integrators()
+    return [variant.name for variant in registry.variants()] if "[" in prefix else registry.integrators()
 
 
 plugin_option = click.option(

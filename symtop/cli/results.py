@@ -71,21 +71,20 @@ def cite(files: tuple[Path, ...]) -> None:
     symtop cite results/work_precision.nc run.nc
     """
     from symtop.core import netcdf
-    from symtop.methods.framework.citations import entries, keys
-    from symtop.methods.framework.registry import integrator
+    from symtop.methods.framework.registry import bibliography, citation_keys, integrator
 
     sources: dict[str, None] = {}
     unknown: dict[str, None] = {}
     for file in files:
         for name in _integrators(netcdf.read_any(file)):
             try:
-                named = keys(integrator(name))
+                named = citation_keys(integrator(name))
             except SymtopError:  # not registered here
                 named = []
             sources.update(dict.fromkeys(named))
             if not named:
                 unknown[name] = None
-    for text in [PACKAGE, *(entries()[key] for key in sources)]:
+    for text in [PACKAGE, *(bibliography()[key] for key in sources)]:
         click.echo(text + "\n")
     if unknown:
         click.echo(f"symtop: no source is known of {', '.join(unknown)}", err=True)
@@ -96,7 +95,7 @@ def _integrators(data: "xr.Dataset | xr.DataTree") -> Iterator[str]:
     from symtop.core import netcdf
 
     for group in netcdf.groups(data).values():
-        if "integrator" in group.variables:
-            yield from dict.fromkeys(map(str, group["integrator"].values.ravel()))
+        for name in {"variant", "integrator"} & group.variables.keys():  # files of version 0.2 have the latter
+            yield from dict.fromkeys(map(str, group[name].values.ravel()))
         if "integrator" in group.attrs:
             yield str(group.attrs["integrator"])
