@@ -25,7 +25,7 @@ from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian import exact_discrete
 from symtop.methods.lagrangian.exact_map import exact_map
 from symtop.model import charts
-from symtop.model.exact.precise_form import PreciseForm
+from symtop.model.exact.digits import PreciseForm
 from symtop.model.top import Angles, SymmetricTop
 
 METHOD = "exact-discrete"

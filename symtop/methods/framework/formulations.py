@@ -21,8 +21,8 @@ from typing import Any, NamedTuple
 from symtop.methods.framework import euler_lagrange, space
 from symtop.methods.framework.outcomes import OUTCOMES
 from symtop.methods.framework.plan import Array, Run
+from symtop.model.charts import space_momenta
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import space_momenta
 
 
 class Formulation(NamedTuple):

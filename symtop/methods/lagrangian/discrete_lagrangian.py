@@ -42,8 +42,8 @@ from symtop.methods.framework.outcomes import NOT_CONVERGED
 from symtop.methods.framework.registry import Array, Integrator
 from symtop.methods.lagrangian.node_sums import NONE_OPENED, Forces, Sums, forces, node_sums, opening
 from symtop.methods.lagrangian.quadrature import RULES, Quadrature, quadrature
+from symtop.model.charts import View
 from symtop.model.top import Momenta
-from symtop.model.view import View
 
 
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:

@@ -15,7 +15,7 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.lagrangian.oscillators import oscillator_numbers
-from symtop.model.exact.weierstrass import differences, half_period, r_j, roots
+from symtop.model.exact.elliptic import differences, half_period, r_j, roots
 from symtop.model.top import Angles, SymmetricTop
 
 SHORTEST = 1e-100  # of a step, and of what is left of one that is a whole number of nutations

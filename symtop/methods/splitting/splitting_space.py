@@ -51,8 +51,8 @@ from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, ob
 from symtop.methods.splitting.rotor import EXACT, half_square, rotor, without_branch
 from symtop.methods.splitting.splitting_lanes import composed
 from symtop.methods.splitting.splitting_loop import Composition, compose, stages
+from symtop.model.charts import View, space_energy
 from symtop.model.top import Momenta, SymmetricTop, mean_nutation, nutation_cubic, turning_cosines
-from symtop.model.view import View, space_energy
 
 
 def scale(rule: Any, top: Any, at: Any, h: float) -> Any:
