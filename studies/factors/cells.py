@@ -85,16 +85,16 @@ def cells(schemes: Sequence[str] | None = None) -> list[Cell]:
     for scheme, methods in COMPILED_SCHEMES.items():
         for name in methods:
             if name in known:  # taylor needs heyoka
-                grid += [Cell(scheme, chart, COMPILED, known[name].row(chart)) for chart in known[name].charts()]
+                grid += [Cell(scheme, chart, COMPILED, known[name].variant(chart)) for chart in known[name].charts()]
     if "taylor" in known:
         grid.append(Cell("Taylor", "angles", COMPILED, taylor_in_angles()))
     for scheme, name in SCIPYS.items():
         for chart in FORMULATIONS:
             if scheme == DORMAND_PRINCE:
-                grid.append(Cell(scheme, chart, SCIPY_NUMBA, scipy_method(name, compiled=True).row(chart)))
-            grid.append(Cell(scheme, chart, SCIPY_PYTHON, known[name.lower()].row(chart)))
+                grid.append(Cell(scheme, chart, SCIPY_NUMBA, scipy_method(name, compiled=True).variant(chart)))
+            grid.append(Cell(scheme, chart, SCIPY_PYTHON, known[name.lower()].variant(chart)))
     for scheme, method in (("rk4", plain_numpy.RK4), ("Strang", plain_numpy.STRANG)):
-        grid += [Cell(scheme, chart, NUMPY, method.row(chart)) for chart in method.charts()]
+        grid += [Cell(scheme, chart, NUMPY, method.variant(chart)) for chart in method.charts()]
     return [cell for cell in grid if schemes is None or cell.scheme in schemes]
 
 

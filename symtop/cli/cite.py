@@ -53,8 +53,8 @@ def _integrators(data: "xr.Dataset | xr.DataTree") -> Iterator[str]:
     from symtop.core import netcdf
 
     for group in netcdf.groups(data).values():
-        if "integrator" in group.variables:
-            yield from (str(name) for name in group["integrator"].values.ravel())
+        for name in {"variant", "integrator"} & group.variables.keys():  # files of version 0.2 have the latter
+            yield from map(str, group[name].values.ravel())
         if "integrator" in group.attrs:
             yield str(group.attrs["integrator"])
 

@@ -14,14 +14,14 @@ from symtop.methods.framework.lanes import W
 from symtop.methods.framework.many import Many, in_turn, members_of
 from symtop.methods.framework.outcomes import OUTCOMES
 from symtop.methods.framework.plan import Plan
-from symtop.methods.framework.registry import rows
+from symtop.methods.framework.registry import variants
 from symtop.methods.framework.space import on_axis
 from symtop.methods.runge_kutta.runge_kutta import runge_kutta
 from symtop.methods.splitting.splitting import composition
 from symtop.methods.splitting.splitting_space import march_axis
 from symtop.model.top import flat
 
-SOLVERS = {row.name: solver for row in rows() for solver in filter(None, map(inside, row.solvers.values()))}
+SOLVERS = {row.name: solver for row in variants() for solver in filter(None, map(inside, row.solvers.values()))}
 IN_LANES = [name for name, solver in SOLVERS.items() if solver.in_lanes]
 A_FEW = ("strang[axis]", "takahashi-imada[attitude]", "cayley[axis]", "srkn-14-6[attitude]", "stormer-verlet[angles]",
          "rk4[attitude]", "exact-discrete[attitude]", "series[axis]", "series[attitude]")  # fmt: skip
@@ -93,7 +93,7 @@ def test_members_of_every_method_with_lanes_have_the_bits_of_runs_alone(name):
 
 
 def test_methods_that_have_lanes():
-    splitting = {row.name for row in rows() if row.family == "splitting"}
+    splitting = {row.name for row in variants() if row.family == "splitting"}
     assert splitting - set(IN_LANES) == {"stormer-verlet-reversible[angles]"}  # of steps that differ between members
     assert {"rk4[angles]", "rk4[axis]", "rk4[attitude]"} <= set(IN_LANES)
     assert {f"{name}[{chart}]" for name in ("exact-discrete", "series") for chart in ("axis", "attitude")} <= set(

@@ -13,13 +13,13 @@ from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.many import groups, members_of
 from symtop.methods.framework.outcomes import OUTCOMES
 from symtop.methods.framework.plan import Plan
-from symtop.methods.framework.registry import rows
+from symtop.methods.framework.registry import variants
 from symtop.methods.framework.space import on_axis
 from symtop.methods.splitting import splitting_space
 from symtop.model.top import flat
 
 SCENES = ("spheroid", "grazing", "fast", "simo-wong", "kinon-betsch", "steady")
-SOLVERS = {row.name: solver for row in rows() for solver in filter(None, map(inside, row.solvers.values()))}
+SOLVERS = {row.name: solver for row in variants() for solver in filter(None, map(inside, row.solvers.values()))}
 
 
 def members(count=12, samples=5):

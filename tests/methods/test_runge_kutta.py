@@ -161,7 +161,7 @@ def test_both_languages_of_the_right_hand_side_compute_the_same(chart):
     plain = RightHandSide(FORMULATIONS[chart].field, par)
     np.testing.assert_allclose(compiled_field(chart)(*par, y), plain(0.0, y), rtol=0.0, atol=4e-15 * np.max(np.abs(y)))
     runs = [
-        symtop.simulate(scene, scipy_method("RK45", compiled=compiled).row(chart), tolerance=1e-7, horizon=4.0)
+        symtop.simulate(scene, scipy_method("RK45", compiled=compiled).variant(chart), tolerance=1e-7, horizon=4.0)
         for compiled in (False, True)
     ]
     assert runs[0].attrs["steps"] == runs[1].attrs["steps"]

@@ -40,7 +40,7 @@ def measured(path: Path) -> list[xr.Dataset]:
 def test_every_study_leaves_a_dataset_figures_and_findings(quick_results):
     for name in runner.names():
         for data in measured(quick_results / f"{name}.nc"):
-            assert {"scene", "integrator"} <= set(data.dims)
+            assert {"scene", "variant"} <= set(data.dims)
             assert not {"method", "tolerance"} & set(data.dims)
         findings = json.loads((quick_results / f"{name}.json").read_text())
         assert findings["verdict"]
@@ -427,7 +427,7 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
     assert found["failures"] == [
         "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
     ]
-    assert list(netcdf.read(tmp_path / "stability.nc")["integrator"].values) == ["midpoint[angles]"]
+    assert list(netcdf.read(tmp_path / "stability.nc")["variant"].values) == ["midpoint[angles]"]
     assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten
 
 
