@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT, DRIFTING, FEWEST, GROWING, NO_GAP, WRONG_REGIME, barriers
 from symtop.methods.framework.plan import NOT_FINITE
+from symtop.model import top
+from symtop.model.exact import samples
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.scenes import Scene
 from symtop.model.top import flat
