@@ -34,8 +34,8 @@ from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.loop import Loop, Position
 from symtop.methods.framework.plan import OK, OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
+from symtop.model.charts import View
 from symtop.model.scenes import Scene, scene as find_scene
-from symtop.model.view import View
 from symtop.run import modified_energy as modified
 from symtop.run.guard.guard import MOST_STEPS
 

@@ -21,11 +21,9 @@ from symtop.core.over_time import over_time
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator, integrator
-from symtop.model.continuous import continuous
-from symtop.model.readings import readings
+from symtop.model.charts import View, continuous, readings
 from symtop.model.scenes import OBSERVABLES, Scene, closed_form, horizon_of, scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import View
 from symtop.run.guard.forecast import repeats
 from symtop.run.guard.guard import MOST_STEPS, warning
 

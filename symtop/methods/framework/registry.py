@@ -42,9 +42,8 @@ from symtop.core.errors import (
 )
 from symtop.core.signals import is_of_user
 from symtop.methods.framework.plan import Plan, Run
-from symtop.model.charts import DIMENSIONS
+from symtop.model.charts import DIMENSIONS, View
 from symtop.model.top import Angles, Momenta, SymmetricTop
-from symtop.model.view import View
 
 Array = NDArray[np.float64]
 Solver = Callable[[SymmetricTop, Angles, Plan], Run]

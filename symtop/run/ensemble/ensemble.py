@@ -21,7 +21,7 @@ from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import beating
 from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
-from symtop.model.exact.motion_samples import LONGEST_TIME
+from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.ensemble.chunked_output import streaming
 from symtop.run.ensemble.chunks import RAISED, SHOWN, Job
