@@ -49,7 +49,7 @@ def run(
     symtop run spheroid "rk4[axis]" --step-size 0.01
     symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
     """
-    check_outputs(figure=figure, output=output)
+    check_outputs(output=output, figure=figure)
     with ticking("running"):  # the packages are loaded under the clock, too
         from symtop.core import netcdf
         from symtop.measure.errors import QUANTITIES, errors_against
@@ -188,7 +188,7 @@ def ensemble(
     symtop ensemble --members 10000 --seed 1 strang --step-size 0.01 --horizon 20 -o runs.nc
     symtop ensemble --kind grazing "gauss-4[axis]" --per-nutation 50 --nutations 10 --figure spread.png
     """
-    check_outputs(figure=figure, output=output)
+    check_outputs(output=output, figure=figure)
     whole("members", members, 1)  # which is n in Python
     names = None if variables is None else [name.strip() for name in variables.split(",")]
     with ticking("drawing tops"):

@@ -96,8 +96,7 @@ def check_formula(method: Integrator, words: str, step: object, tolerance: objec
     if not method.fixed_step and not method.adaptive:
         for name, value in ((words, step), ("tolerance", tolerance)):
             if value is not None:
-                neither = "give neither a step nor a tolerance"
-                raise SymtopError(f"{method.name} has nothing to tune: {neither}, not {name} = {shown(value)}")
+                raise SymtopError(f"{method.name} has nothing to tune: leave out {name} = {shown(value)}", name)
 
 
 def make_plan(
