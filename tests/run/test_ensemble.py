@@ -9,7 +9,7 @@ import xarray as xr
 import symtop
 from symtop.methods.framework.lanes import W
 from symtop.methods.framework.many import members_of
-from symtop.model.exact.closed_forms import NUMBERS, ClosedForms
+from symtop.model.exact.closed_form import NUMBERS, ClosedForms
 from symtop.run.ensemble import chunks
 from symtop.run.sampling import nutation_periods, schedule
 from symtop.run.simulation import sample_times
@@ -78,7 +78,7 @@ def test_every_method_runs_and_every_member_is_the_run_of_simulate():
     few = SOME.isel(member=slice(0, 5))
     for method in symtop.integrators().values():
         for chart in method.charts():
-            row = method.row(chart)
+            row = method.variant(chart)
             setting = {"tolerance": max(1e-6, row.least_tolerance)} if row.adaptive else {}
             asked = {"per_nutation": 30} if row.fixed_step else setting
             data = symtop.ensemble(few, row, nutations=1.3, samples=11, quiet=True, **asked)
@@ -103,7 +103,7 @@ def test_threads_and_pieces_change_nothing(monkeypatch):
 def test_pieces_are_shares_of_the_work_and_whole_blocks(n, steps, most):
     """What is worth more than a millisecond is shared evenly; a few short runs stay in one piece."""
     counts = None if steps is None else np.broadcast_to(steps, n)
-    method = symtop.integrator("strang" if steps is not None else "rk45-compiled").row("axis")
+    method = symtop.integrator("strang" if steps is not None else "rk45-compiled").variant("axis")
     job = chunks.Job(method, "axis", np.zeros((n, 9)), np.ones(n), counts, None, 11, None, ("axis",))
     cut = list(job.pieces())
     assert [piece.start for piece in cut] == [0, *(piece.stop for piece in cut[:-1])]
@@ -434,7 +434,7 @@ def test_an_ensemble_for_a_cluster_is_refused_before_it_is_sent(tmp_path):
      ("strang[axis]", {"per_nutation": 0.3}, "per_nutation must be at least 0.5.* not 0.3 as of member 0"),
      ("strang[axis]", {"per_nutation": 20, "nutations": 1e308}, "nutations must be fewer"),
      ("exact", {"nutations": None, "horizon": 1e300}, r"horizon must be at most 1e\+100, not 1e\+300"),
-     ("exact", {"per_nutation": 5}, "nothing to tune: give neither a step nor a tolerance, not per_nutation = 5"),
+     ("exact", {"per_nutation": 5}, "nothing to tune: leave out per_nutation = 5"),
      ("exact", {"step_size": 0.1}, "not step_size = 0.1"),
      ("exact", {"tolerance": 0.1}, "not tolerance = 0.1")],
 )  # fmt: skip

@@ -20,7 +20,7 @@ from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, Marks, Stepper, function_name, label_of, repeat
 from symtop.judging.adapters.python_step import state_like
 from symtop.judging.heartbeat import heartbeat
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.model.top import SymmetricTop
 
@@ -95,7 +95,7 @@ def library(form: str, name: str) -> Any:
 def on_these_charts(form: str, chart: str) -> str:
     """The chart; SymtopError for one whose equations are not arithmetic alone."""
     if chart not in CHARTS:
-        raise SymtopError(f"chart must be axis or attitude for the form {form}, not {chart!r}")
+        raise SymtopError(f"chart must be axis or attitude for the form {form}, not {chart!r}", "chart")
     return chart
 
 

@@ -13,7 +13,7 @@ from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, Marks, Stepper, label_of
 from symtop.judging.adapters.batch_step import COMPILING, double_precision, field_of, library, on_these_charts
 from symtop.judging.heartbeat import heartbeat
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.model.top import SymmetricTop
 

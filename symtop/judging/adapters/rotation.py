@@ -15,11 +15,11 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, Marks
 from symtop.judging.adapters.python_step import FunctionStep, state_like
-from symtop.methods.framework.formulations import FORMULATIONS, Formulation
+from symtop.methods.framework.equations import FORMULATIONS, Formulation
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.space import ended_space, on_attitude
+from symtop.model.charts import space_momenta
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import space_momenta
 
 
 class Body(NamedTuple):

@@ -13,7 +13,7 @@ from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, Marks, Stepper, label_of
 from symtop.judging.adapters.python_step import Equations, Field, state_like
 from symtop.judging.heartbeat import heartbeat
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.methods.library.scipy_ivp import solver as solver_of
 from symtop.model.top import SymmetricTop

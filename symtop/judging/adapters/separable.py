@@ -19,10 +19,9 @@ from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, Marks
 from symtop.judging.adapters.python_step import FunctionStep
 from symtop.methods.framework.angles import chart_outcome, reduced
-from symtop.methods.framework.formulations import Formulation
+from symtop.methods.framework.equations import Formulation
 from symtop.methods.framework.plan import Array
-from symtop.model.effective import effective_force
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, SymmetricTop, effective_force
 
 
 def _no_field(*_: Any) -> Any:

@@ -15,7 +15,7 @@ import numpy as np
 from symtop.core.errors import SymtopError, at_home
 from symtop.judging.adapters.adapter import March, Marks, Stepper, label_of
 from symtop.judging.heartbeat import heartbeat
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.model.top import SymmetricTop
 

@@ -40,9 +40,9 @@ from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.runge_kutta.runge_kutta import Tableau
+from symtop.methods.runge_kutta.explicit import Tableau
+from symtop.methods.splitting.loop import Composition
 from symtop.methods.splitting.rotor import EXACT
-from symtop.methods.splitting.splitting_loop import Composition
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.simulation import simulate

@@ -23,7 +23,7 @@ from symtop.judging.claims.subject import Subject
 from symtop.judging.findings import Finding, Measured, inapplicable, yes_no
 from symtop.measure.step_map import generic_start, restart_gap, step_map
 from symtop.measure.step_series import AGREES, SURE, Series, compared, step_series
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
