@@ -21,7 +21,7 @@ LEFT_OUT = {
     ),
     "the scene of a mechanism": tuple(scene for scene in MECHANISMS if scene != "goldstein"),
 }  # fmt: skip
-NOT_SLEEPING = {  # rows that do not take part in the mechanism "sleeping"
+NOT_SLEEPING = {  # variants that do not take part in the mechanism "sleeping"
     "steps shrink towards the upright: millions in three samples, and the threshold of the motion": (
         "stormer-verlet-reversible[angles]",
     )
@@ -68,7 +68,7 @@ def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool)
 
 
 def cases(quick: bool) -> list[Case]:
-    """Maps of 200 steps by 120 spins and of 72 steps by 48 gaps for every row; then the scans of single mechanisms.
+    """Maps of 200 steps by 120 spins and of 72 steps by 48 gaps for every variant; then the scans of single mechanisms.
 
     Methods in lanes have ten times the cells, 632 by 379 and 228 by 152, and take about as long with them. An attitude
     chart beside an axis chart is left out: a map is judged by the axis, which both step alike.

@@ -95,7 +95,7 @@ def test_a_win_is_beyond_ties():
     assert won.tolist() == [[False, True, False], [False, False, True], [False, False, False]]
     assert level.tolist() == [[True, True, False], [True, False, True], [False, False, False]]
     first = winner(table)
-    assert (first.row, first.share, first.next_row, first.next_share) == (0, Share(1, 3), 1, Share(1, 3))
+    assert (first.row, first.share, first.next_variant, first.next_share) == (0, Share(1, 3), 1, Share(1, 3))
     assert not first.sure
     assert winner(np.full((3, 4), INF)) is None
 
@@ -537,7 +537,7 @@ def test_two_seeds_agree_on_every_sure_winner():
 
 @pytest.mark.slow
 def test_two_seeds_agree_on_every_sure_winner_of_all_rows():
-    rows = [row.name for row in study.compiled_rows() if not study.has_twin(row)]
+    rows = [row.name for row in study.compiled_variants() if not study.has_twin(row)]
     compare_seeds(1000, rows)
 
 
@@ -598,7 +598,7 @@ def test_the_silent_runs_at_small_steps_are_told_by_kind_of_top(quick_results):
     data = netcdf.read_any(quick_results / "population.nc")
     share, group = words.hidden(data), data["short"].to_dataset().isel(scene=0)
     counts = dict.fromkeys(verdicts.strata(data), 0.0)
-    for name in verdicts.judged_rows(data):
+    for name in verdicts.judged_variants(data):
         one = group.sel(variant=name)
         if str(one["control"].values) == "step_size":
             fine = one["silent"].isel(level=np.flatnonzero(one["setting"].values >= words.FINE))
