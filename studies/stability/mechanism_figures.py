@@ -12,7 +12,7 @@ import xarray as xr
 from matplotlib.ticker import NullLocator
 
 from symtop.methods.framework.registry import split_name
-from symtop.methods.splitting.splitting_space import cayley_sleeps_from, strang_sleeps_from
+from symtop.methods.splitting.space import cayley_sleeps_from, strang_sleeps_from
 from symtop.report.figures import name_ends
 from symtop.report.style import BLUE, GREEN, GREY, LEAST_TEXT, VERMILLION, headline, line, panels
 from symtop.runner.study import Picture

@@ -41,7 +41,7 @@ from symtop_studies.factors.tables import (
 
 import symtop
 from symtop.measure import settings
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.runner.store import combine
 from symtop.runner.study import Case
 
@@ -79,7 +79,7 @@ def test_the_loops_in_numpy_return_the_trajectory_of_the_compiled_ones(plain, na
 
 def test_taylor_in_angles_solves_the_same_equations():
     hy = pytest.importorskip("heyoka")
-    from symtop.methods.taylor.taylor import equations
+    from symtop.methods.taylor.heyoka import equations
 
     scene = symtop.scene("goldstein")
     par, state = FORMULATIONS["angles"].prepare(scene.top, scene.start)
