@@ -119,7 +119,7 @@ FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, b
 
 
 def look(name: str) -> Look:
-    """Colour and marker of an integrator, or of a variant: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
+    """Colour and marker of an integrator or a variant: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
 
     Those that ship with symtop have a fixed look. An added one gets a shade of its family and a marker that no shipped
     one of these shades has; which of them depends on its name alone, not on what else is registered.

@@ -47,7 +47,7 @@ def test_runs_over_a_part_of_the_horizon_are_named():
 
 
 def histories(**changes):
-    """Rows with the largest changes of p_phi that are given, at rounding in everything else; the last is adaptive."""
+    """Variants with the largest changes of p_phi that are given, at rounding in everything else; the last is adaptive."""
     names = ["rk4[angles]", "rk4[axis]", "strang[axis]", "strang[attitude]", "rk45[angles]", "taylor[axis]"]
     sizes = [changes.get(name.replace("[", "_").rstrip("]"), 1e-15) for name in names]
     per_row = {
@@ -154,7 +154,7 @@ def test_what_is_said_of_the_phase_follows_from_its_exponents():
 
 
 def fast_rows(**energy):
-    """Three rows whose phase error grows as t^2, the last over a fiftieth of the horizon; largest energy, exponent."""
+    """Three whose phase error grows as t^2, the last over a fiftieth of the horizon; largest energy, exponent."""
     given = {"rk4[axis]": (1e-3, 1.0), "taylor[axis]": (1e-15, 0.5), "radau[angles]": (1e-6, 0.0)} | energy
     sizes, powers = zip(*given.values(), strict=True)
     per_row = {
@@ -216,7 +216,7 @@ def test_a_walk_of_rounding_is_held_against_one_half(power, agreeing):
     }
     sentence = words.walks(cells)
     assert f"as n^{min(power, 0.5):.2f} to n^{max(power, 0.5):.2f} in n steps" in sentence
-    assert f"with {agreeing} of 2 rows that agrees with the 1/2 of a random walk" in sentence
+    assert f"with {agreeing} of 2 variants that agrees with the 1/2 of a random walk" in sentence
     assert "drift 40 to 100 times as far" in sentence
 
 
@@ -263,11 +263,11 @@ def test_a_loss_that_is_off_by_a_fifth_was_not_predicted():
 
     assert "right to 3% for 2 of 2" in sentence(1.01, 0.97)
     assert "Off by more" not in sentence(1.01, 0.97)
-    assert "for 1 of 2 rows. Off by more than 10%: method-1 (20% off)" in sentence(1.01, 1.2)
+    assert "for 1 of 2 variants. Off by more than 10%: method-1 (20% off)" in sentence(1.01, 1.2)
     assert "predicts when the phase error reaches 0.01 rad, 2.5 times as late" in sentence(1.01)
     assert "right to" not in sentence(1.3)
     unreached = sentence(1.01, math.nan)
-    assert unreached.endswith("for 1 of 2 rows. Not reached by the end of a run: method-1.")
+    assert unreached.endswith("for 1 of 2 variants. Not reached by the end of a run: method-1.")
     assert "Off by more" not in unreached
     known = {"method-0": xr.Dataset({"short": 100.0, "measured": 250.0, "ratio": 1.01})}
     assert words.predictions(known, left=["rk4[axis]"]).endswith("No prediction was possible for: rk4[axis].")
@@ -345,7 +345,7 @@ def test_the_truth_study_counts_the_bounds_that_an_error_exceeds(bound, holding)
 
 
 def test_the_fates_of_all_rows_are_counted_in_a_sentence_and_listed_in_tables():
-    """Two rows at rounding, one that bounds its error, one that loses the constant: a sentence of one line for many."""
+    """Two methods at rounding, one that bounds its error, one that loses the constant: a sentence of one line for many."""
     sizes = {"strang": (1e-15, 0.5), "cayley": (2e-15, 0.5), "verlet": (1e-4, 0.0), "rk4": (1e-2, 1.0)}
     columns = {}
     for constant in conservation.CONSTANTS:
@@ -359,8 +359,8 @@ def test_the_fates_of_all_rows_are_counted_in_a_sentence_and_listed_in_tables():
     data = xr.Dataset(columns, coords={"variant": list(sizes), "scene": ["spheroid"]})
     data = data.assign(outcome=(("variant", "scene"), [["ok"]] * 4))
     assert behaviours.constant_sentence(data, "p_phi") == (
-        "Of 4 rows, the relative change of p_phi is no more than rounding with 2 (up to 2.0e-15), stays bounded over "
-        "the run with 1 (up to 1.0e-04, verlet), and grows in time with 1 (up to 1.0e-02, rk4)."
+        "Of 4 variants, the relative change of p_phi is no more than rounding with 2 (up to 2.0e-15), stays bounded "
+        "over the run with 1 (up to 1.0e-04, verlet), and grows in time with 1 (up to 1.0e-02, rk4)."
     )
     counts, every = behaviours.tables(data)
     assert list(counts.rows[0]) == ["energy", "at rounding", "2", "1.0e-15", "strang", "2.0e-15", "cayley"]
