@@ -224,7 +224,7 @@ def test_targets_are_asked_where_they_mean_something(tops):
     assert asked["axis"][1:].mean() > 0.95
 
 
-# ---- a method on the tops -----------------------------------------------------------------------------------------------
+# ---- a method on the tops --------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -304,7 +304,7 @@ def test_the_grid_has_every_compiled_row_and_says_what_it_leaves_out():
 def tree(costs_by_row, price=None, met_at=None):
     """A dataset of the study with these costs (tops,) of the axis at 1e-3, all tops of one stratum.
 
-    A method has the prices (2,) of the halves, or those at the tolerances 1e-2 and 1e-6, (2, 2); `met_at` (tops,) by variant.
+    A method has the prices (2,) of the halves, or those at the tolerances 1e-2 and 1e-6, (2, 2).
     """
     names, table = list(costs_by_row), np.array(list(costs_by_row.values()))
     price = dict.fromkeys(names, (1.0, 1.0)) | (price or {})

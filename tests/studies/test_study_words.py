@@ -47,7 +47,7 @@ def test_runs_over_a_part_of_the_horizon_are_named():
 
 
 def histories(**changes):
-    """Variants with the largest changes of p_phi that are given, at rounding in everything else; the last is adaptive."""
+    """Largest changes of p_phi as given, at rounding in everything else; the last is adaptive."""
     names = ["rk4[angles]", "rk4[axis]", "strang[axis]", "strang[attitude]", "rk45[angles]", "taylor[axis]"]
     sizes = [changes.get(name.replace("[", "_").rstrip("]"), 1e-15) for name in names]
     per_row = {
@@ -345,7 +345,7 @@ def test_the_truth_study_counts_the_bounds_that_an_error_exceeds(bound, holding)
 
 
 def test_the_fates_of_all_rows_are_counted_in_a_sentence_and_listed_in_tables():
-    """Two methods at rounding, one that bounds its error, one that loses the constant: a sentence of one line for many."""
+    """Two methods at rounding, one that bounds its error, one that loses the constant."""
     sizes = {"strang": (1e-15, 0.5), "cayley": (2e-15, 0.5), "verlet": (1e-4, 0.0), "rk4": (1e-2, 1.0)}
     columns = {}
     for constant in conservation.CONSTANTS:
