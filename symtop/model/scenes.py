@@ -46,7 +46,7 @@ def horizon_of(value: object) -> float:
     """
     horizon = positive("horizon", value)
     if horizon < SHORTEST:
-        raise SymtopError(f"horizon must be at least {SHORTEST:g}, not {horizon!r}")
+        raise SymtopError(f"horizon must be at least {SHORTEST:g}, not {horizon!r}", "horizon")
     return horizon
 
 

@@ -170,7 +170,8 @@ class Integrator:
             raise SymtopError(f"{self.name} is adaptive and needs a tolerance, for example 1e-6")
         if value < self.least_tolerance or value >= 1.0:
             raise SymtopError(
-                f"tolerance of {self.name} must be at least {self.least_tolerance:.3g} and below 1, not {value!r}"
+                f"tolerance of {self.name} must be at least {self.least_tolerance:.3g} and below 1, not {value!r}",
+                "tolerance",
             )
         return finite("tolerance", value)
 
