@@ -7,21 +7,19 @@ import xarray as xr
 from symtop.measure.order_table import observable, order_table
 from symtop.measure.settings import step_ladder, tolerance_ladder
 from symtop.methods.framework.registry import integrator, variants
-from symtop.model.scenes import scene
+from symtop.model.scenes import TAGS, scene
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
 from . import figures, tables, words
 
-LEFT_OUT = {
-    "goldstein is the same top, let go at another speed": ("goldstein-falling", "goldstein-rising"),
-    "loop is the same top, let go at another speed": ("cusp", "wave"),
-    "a steady precession, whose angles have other orders": ("steady", "kinon-betsch", "steady-fast"),
-    "the coarsest steps are limited by the spin and not by the nutation": ("fast", "simo-wong"),
-    "close to a pole, where the angles chart fails": ("bruls-cardona-arnold", "grazing"),
-    "unstable or nearly so: errors grow with the motion": ("sleeping", "sleeping-unstable", "separatrix"),
+LEFT_OUT = {  # tags of scenes, with the reason
+    "repeats": "the same orders show",
+    "steady": "the angles of a steady precession have other orders",
+    "fast": "the coarsest steps are limited by the spin and not by the nutation",
+    "near_pole": "the angles chart fails",
+    "unstable": "errors grow with the motion",
 }
-NOT_QUICK = {"left to the ordinary grid": ("goldstein", "loop", "hairer-lubich-wanner")}
 WHOLE = "spheroid"  # runs to its horizon; the other scenes run for `NUTATIONS` at most
 NUTATIONS = 8.0
 MOST_STEPS = 1e6  # of a run
@@ -30,7 +28,7 @@ HISTORY = (1000.0, 100.0)  # nutations of the run that shows the energy over tim
 
 def cases(quick: bool) -> list[Case]:
     """Every method in every chart: steps from ten a nutation to so short that rounding rules, tolerances likewise."""
-    names = grid_scenes(LEFT_OUT | (NOT_QUICK if quick else {}))
+    names = grid_scenes(TAGS if quick else LEFT_OUT)
     return [case for name in names for case in on_scene(name, quick)]
 
 

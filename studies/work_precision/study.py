@@ -12,6 +12,7 @@ Two rounds. First every variant walks down to each target on every scene and ove
 import xarray as xr
 
 from symtop.measure.settings import compared
+from symtop.model.scenes import TAGS
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
@@ -21,17 +22,11 @@ from .opening import charts, opening
 from .tables import errors_and_work, run_times
 from .timing_rounds import timed_runs
 
-LEFT_OUT = {  # timing all methods on a scene takes ten seconds
-    "goldstein is the same top, let go at another speed": ("goldstein-falling", "goldstein-rising"),
-    "loop is the same top, let go at another speed": ("cusp", "wave"),
-    "fast is such a top": ("simo-wong", "kinon-betsch"),
-    "no nutation: every target is wider than it": ("steady", "steady-fast"),
-    "close to a pole, like bruls-cardona-arnold": ("grazing",),
-    "unstable or nearly so: errors grow with the motion": ("sleeping", "sleeping-unstable", "separatrix"),
+LEFT_OUT = {  # tags of scenes, with the reason; timing all methods on a scene takes ten seconds
+    "repeats": "the same ranking shows",
+    "steady": "no nutation: every target is wider than it",
+    "unstable": "errors grow with the motion",
 }
-NOT_QUICK = {"left to the ordinary grid": (
-    "goldstein", "loop", "fast", "hairer-lubich-wanner", "bruls-cardona-arnold",
-)}  # fmt: skip
 PERIODS = ([10.0, 1000.0], [10.0, 100.0])  # in full, and quick
 BUDGET = {"compiled": 1e6, "python": 2.5e4}  # force evaluations of one run
 SOFTWARE = 4e4  # the same for arithmetic in software: quadruple precision costs 2 us an evaluation
@@ -44,7 +39,7 @@ EFFORT = (  # rounds and seconds of a batch, of all timed runs and of the conten
 def cases(quick: bool) -> list[Case]:
     """Every variant on every scene; python methods and quadruple precision within a smaller budget."""
     grid = []
-    for name in grid_scenes(LEFT_OUT | (NOT_QUICK if quick else {})):
+    for name in grid_scenes(TAGS if quick else LEFT_OUT):
         for method in compared("axis"):
             budget = (BUDGET[method.implementation] if method.speed == 1.0 else SOFTWARE) / (20.0 if quick else 1.0)
             grid.append(Case(name, method.name, {"periods": PERIODS[quick], "budget": budget}))

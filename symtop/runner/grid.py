@@ -4,26 +4,21 @@ A study does not list its scenes or methods, so that one that is added, to the c
 whose question it suits. What a study leaves out, it names with the reason.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 
-from symtop.core.errors import SymtopError, one_of
+from symtop.core.errors import one_of
 from symtop.methods.framework.registry import Integrator, integrator, variants
-from symtop.model.scenes import Scene, scenes
+from symtop.model.scenes import TAGS, Scene, scenes
 
 
-def grid_scenes(left_out: Mapping[str, Iterable[str]], suits: Callable[[Scene], bool] = lambda _: True) -> list[str]:
+def grid_scenes(left_out: Iterable[str] = (), suits: Callable[[Scene], bool] = lambda _: True) -> list[str]:
     """Names of the scenes of a grid, in the order of the catalogue, a user's own at the end.
 
-    `left_out` maps a reason to the names of the scenes that it keeps out of the study; `suits` says of a scene whether
-    the question makes sense for it. Raises SymtopError for a name of no scene and for one that is left out twice.
+    Scenes with a tag that is `left_out` (a mapping of tags to reasons, say) are not in the study; `suits` says of a
+    scene whether the question makes sense for it. Raises SymtopError for an unknown tag.
     """
-    known, reasons = scenes(), dict[str, str]()
-    for reason, names in left_out.items():
-        for name in names:
-            if one_of("left_out", name, known) in reasons:
-                raise SymtopError(f"scene {name!r} is left out twice: {reasons[name]!r} and {reason!r}")
-            reasons[name] = reason
-    return [name for name, scene in known.items() if name not in reasons and suits(scene)]
+    tags = {one_of("left_out", tag, TAGS) for tag in left_out}
+    return [name for name, scene in scenes().items() if not tags.intersection(scene.tags) and suits(scene)]
 
 
 def grid_variants(observe: str, *, attitude: bool = False) -> list[Integrator]:
