@@ -21,7 +21,7 @@ import numpy as np
 from symtop.measure.order_conditions import Conditions
 from symtop.model.charts import Array
 
-MOST = 10  # the highest order that is tried
+LONGEST_WORD = 10  # the highest order that is tried
 RANK = 1e-9  # of a direction: shorter is none
 
 Words = list[Array]  # coefficients of the words of length 0, 1, 2 ..., shapes (1,), (2,), (4,) ...; T is 0 and V is 1
@@ -67,7 +67,7 @@ def logarithm(words: Words) -> Words:
 
 def step_of(
     drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] = (), processor: float = 0.0,
-    most: int = MOST,
+    most: int = LONGEST_WORD,
 ) -> Words:  # fmt: skip
     """The step with these coefficients, kick[0] first, as a series of words."""
     t, v = element(most, t=1.0), element(most, v=1.0)
@@ -134,9 +134,9 @@ def _nested(word: int, length: int) -> Array:
     return column
 
 
-def conditions(
+def splitting_conditions(
     drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] = (), processor: float = 0.0,
-    most: int = MOST,
+    most: int = LONGEST_WORD,
 ) -> Conditions:  # fmt: skip
     """What the conditions of a table are off by: the largest coefficient of each length that must vanish and does not.
 

@@ -34,9 +34,9 @@ CLOSE = 0.6  # an error between CLOSE times the target and the target is near en
 AIM = 0.85
 REFINEMENTS = 2
 NEARBY = 1.2  # a setting less coarser than that is not worth a run
-MOST = 24  # runs of one walk
+MOST_RUNS = 24  # runs of one walk
 ABOVE = 2.0  # times the budget: a run that costs more ends, whatever was foreseen (rk45 at 1e-2 may shrink its steps)
-FLAT = 1.5  # two steps in a row that gain less than this, below `ROUNDED`, have met rounding
+STALLED = 1.5  # two steps in a row that gain less than this, below `ROUNDED`, have met rounding
 STOPS = ("all targets met", "rounding", "budget", "least tolerance", "nothing to set", "too many runs")
 TOO_WIDE = "wider than the nutation"  # of a target
 CAPPED = "met at the longest step"  # or the loosest tolerance: a longer one might do
@@ -95,8 +95,8 @@ class Walk:
                 return
             error = self.error(setting)
             work = float(self.rows[setting]["force_evaluations"])
-            flat = flat + 1 if error < ROUNDED and error > last / FLAT else 0
-            if error <= min(targets) or flat == 2 or setting <= self.finest or len(self.rows) >= MOST:
+            flat = flat + 1 if error < ROUNDED and error > last / STALLED else 0
+            if error <= min(targets) or flat == 2 or setting <= self.finest or len(self.rows) >= MOST_RUNS:
                 met, stuck = error <= min(targets), flat == 2
                 least = setting <= self.finest
                 self.stopped = STOPS[0] if met else STOPS[1] if stuck else STOPS[3] if least else STOPS[5]
