@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
-from symtop.measure.work import TARGETS
+from symtop.measure.settings import TARGETS
 from symtop.methods.framework.registry import split_name
 from symtop.report.sentences import joined
 from symtop.report.style import GREY, LEAST_TEXT, headline, look, number, panels

@@ -8,8 +8,8 @@ import xarray as xr
 from symtop_studies.work_precision import against_taylor, closed_form as work_closed_form, words as work_words, worth
 
 from symtop.measure import ranking
+from symtop.measure.settings import TARGETS
 from symtop.measure.timing import forecasts, met_again, timings
-from symtop.measure.work import TARGETS
 
 
 def test_times_are_foretold_by_the_other_runs_of_a_method():
