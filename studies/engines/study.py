@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.methods.framework.registry import engines, integrator
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.scenes import scene
 from symtop.run.ensemble.ensemble import ensemble
 from symtop.run.ensemble.population import NUMBERS, population

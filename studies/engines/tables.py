@@ -17,10 +17,10 @@ import xarray as xr
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.charts import axis_of, space_energy, space_momenta
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop, flat
-from symtop.model.view import axis_of, space_energy, space_momenta
 
 SCENES = ("goldstein", "fast")
 HORIZON = 10.0  # s

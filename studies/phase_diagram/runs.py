@@ -24,11 +24,9 @@ from symtop.core.numbers import EPSILON, GOLDEN
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
-from symtop.model.charts import Array
-from symtop.model.effective import effective_potential
+from symtop.model.charts import Array, axis_of, space_energy
 from symtop.model.scenes import scene
-from symtop.model.top import flat
-from symtop.model.view import axis_of, space_energy
+from symtop.model.top import effective_potential, flat
 
 from ..population.ladder import in_turn, stepped, stored
 from ..population.tops import Body, Tops, numbers_of

@@ -30,7 +30,7 @@ from symtop.methods.framework.fixed_step import inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.charts import Array
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.ensemble.population import NUMBERS, population
 

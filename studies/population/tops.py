@@ -23,12 +23,10 @@ from numpy.typing import NDArray
 
 from symtop.core.numbers import EPSILON, GOLDEN, TINY
 from symtop.methods.framework.many import members_of
-from symtop.model import charts, scales
-from symtop.model.charts import Array
-from symtop.model.effective import effective_potential
-from symtop.model.exact.closed_forms import ClosedForms
-from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import axis_of, space_energy
+from symtop.model import charts, scenes
+from symtop.model.charts import Array, axis_of, space_energy
+from symtop.model.exact.closed_form import ClosedForms
+from symtop.model.top import Angles, SymmetricTop, effective_potential
 from symtop.run.ensemble.population import NUMBERS, STRATA, population
 from symtop.run.reference.bounds import ROUNDING
 
@@ -97,17 +95,17 @@ class Tops:
     @cached_property
     def momenta(self) -> tuple[Array, Array, Array, Array]:
         """p_phi, p_psi, p_phi - p_psi and p_phi + p_psi of the starts, each (n,)."""
-        return scales.momenta(self.numbers)
+        return scenes.start_momenta(self.numbers)
 
     @cached_property
     def energy(self) -> Array:
         """Total energy (n,)."""
-        return scales.energy(self.numbers)
+        return scenes.start_energies(self.numbers)
 
     @cached_property
     def energy_scale(self) -> Array:
         """What energy errors are divided by, (n,): `Scene.energy_scale`, the energy of the nutation."""
-        return scales.energy_scale(self.numbers, self.forms.theta_range)
+        return scenes.energy_scales(self.numbers, self.forms.theta_range)
 
     @cached_property
     def width(self) -> Array:

@@ -70,7 +70,7 @@ def judge(
     """
     one_of("chart", chart, CHARTS)
     if energy not in ENERGY_ERRORS:
-        raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {energy!r}")
+        raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {energy!r}", "energy")
     claims = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
     request = Request(
         target, form, chart, adaptive, find_scene(scene), quick,

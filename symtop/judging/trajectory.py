@@ -30,8 +30,8 @@ from symtop.judging.findings import Finding, undecided
 from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import errors
 from symtop.measure.trajectory import completed, refuse_other_scene, sampled
+from symtop.model.charts import space_energy
 from symtop.model.scenes import Scene
-from symtop.model.view import space_energy
 
 FILES = (".csv", ".txt", ".dat", ".nc")
 VECTORS = {"axis": ("ex", "ey", "ez"), "quaternion": ("qw", "qx", "qy", "qz"), "momentum": ("Lx", "Ly", "Lz")}

@@ -365,7 +365,7 @@ def test_a_row_is_named_once_and_a_file_written_once(tmp_path, monkeypatch):
     assert (done.exit_code, list(tmp_path.iterdir())) == (2, [])
     assert "--output and --figure must be two files" in done.output
     done = CliRunner().invoke(main, ["run", "spheroid", "exact", "--step-size", "0.1"])
-    assert "give neither a step nor a tolerance, not --step-size = 0.1" in done.output
+    assert "leave out --step-size = 0.1" in done.output
 
 
 def test_what_recommend_needs_is_one_of_two():

@@ -24,10 +24,9 @@ from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator, methods
 from symtop.methods.lagrangian.discrete_lagrangian import rule_of
 from symtop.model import charts, scenes
-from symtop.model.effective import effective_force
+from symtop.model.charts import View, axis_of
 from symtop.model.scenes import Scene, closed_form, grazing, sleeping
-from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import View, axis_of
+from symtop.model.top import Angles, SymmetricTop, effective_force
 from symtop.run.linear_stability import (
     few_steps,
     linear_limits,

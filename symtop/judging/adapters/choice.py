@@ -85,7 +85,7 @@ def _takes(thing: Any, arguments: int) -> bool:
 def _from_file(target: str | Path) -> tuple[Any, str]:
     """What FILE.py:NAME names, and its name; without a name the function ``step``."""
     path, _, name = str(target).partition(":")
-    file = python_file(path, "a step must be FILE.py:NAME with a file that is there")
+    file = python_file(path, "a step", "FILE.py:NAME with a file that is there")
     with door(f"the file {file.name}"):
         sys.path.insert(0, str(file.parent))  # what stands beside it, as Python has it for a script
         module = execute(f"symtop_judged_{Path(file).stem}", file)

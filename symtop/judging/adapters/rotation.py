@@ -22,8 +22,8 @@ from symtop.methods.framework.equations import FORMULATIONS, Formulation
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Solver
 from symtop.methods.framework.space import ended_space, on_attitude
+from symtop.model.charts import space_momenta
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import space_momenta
 
 
 class Body(NamedTuple):

@@ -22,8 +22,7 @@ from symtop.methods.framework.angles import chart_outcome, on_angles
 from symtop.methods.framework.equations import Formulation
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Solver
-from symtop.model.effective import effective_force
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, SymmetricTop, effective_force
 
 
 def _no_field(*_: Any) -> Any:

@@ -26,7 +26,7 @@ def library(form: str, name: str) -> Any:
 def on_these_charts(form: str, chart: str) -> str:
     """The chart; SymtopError for one whose equations are not arithmetic alone."""
     if chart not in CHARTS:
-        raise SymtopError(f"chart must be axis or attitude for the form {form}, not {chart!r}")
+        raise SymtopError(f"chart must be axis or attitude for the form {form}, not {chart!r}", "chart")
     return chart
 
 
