@@ -33,10 +33,10 @@ def begin(par, rule, state, h):  # noqa: D103
 
 
 def increment(par, rule, state, carry, h):
-    """p1 = p0 - h V'(theta0), theta1 = theta0 + h p1/I1; phi' = (p_phi - p_psi c)/(I1 s^2), psi' = p_psi/I3 - phi' c."""
+    """p1 = p0 - h V'(theta0), theta1 = theta0 + h p1/I1; phi and psi move at the rates of the start."""
     theta, p = state[0], state[1]
     sine, cosine = np.sin(theta), np.cos(theta)
-    p_phi = 0.5 * (par.north + par.south)  # par: I1, I3, mgl, p_psi, north = p_phi - p_psi, south = p_phi + p_psi
+    p_phi = 0.5 * (par.north + par.south)  # north = p_phi - p_psi, south = p_phi + p_psi
     precession = (p_phi - par.p_psi * cosine) / (par.I1 * sine * sine)
     dp = h * sine * (par.mgl - precession * (par.p_psi - par.I1 * precession * cosine))
     step = (h * (p + dp) / par.I1, dp, h * precession, h * (par.p_psi / par.I3 - precession * cosine))
