@@ -72,7 +72,7 @@ def test_runs_of_few_steps_are_drawn(tmp_path, words):
      (["strong", *STEPS], "did you mean strang"), (["strang", *STEPS, "--kind", "quick"], "kind"),
      (["strang", *STEPS, "--figure", "x.jpg"], "ends in .png"), (["strang", *STEPS, "--seed", -1], "seed"),
      (["strang", "--step-size", 0.1, *STEPS], "not both"), (["strang", *STEPS, "-o", "/proc/no/x.nc"], "in a folder"),
-     (["strang", "--step-size", 0.1], "of their own: give --horizon or --nutations"),
+     (["strang", "--step-size", 0.1], "give --horizon or --nutations: these members have no"),
      (["strang", *STEPS, "--threads", 0], "threads"),
      (["strang", *STEPS, "--figure", "a.png", "-o", "./a.png"], "--output and --figure must be two files"),
      (["strang", "--per-nutation", 0.2, "--nutations", 2], "--per-nutation must be at least 0.5"),
