@@ -36,19 +36,19 @@ def on_scene(name: str, quick: bool) -> list[Case]:
     """The cases of one scene."""
     on, grid = scene(name), []
     horizon = min(on.horizon, math.inf if name == WHOLE else NUTATIONS * on.nutation_period)
-    for row in variants():
-        if row.exact_steps:
+    for variant in variants():
+        if variant.exact_steps:
             continue  # no step is more accurate than another
-        if row.fixed_step:
-            settings = step_ladder(row, on, horizon, *((8, 1e5) if quick else (17, MOST_STEPS)))
-        elif row.adaptive:
-            settings = tolerance_ladder(row, 5 if quick else 13)
+        if variant.fixed_step:
+            settings = step_ladder(variant, on, horizon, *((8, 1e5) if quick else (17, MOST_STEPS)))
+        elif variant.adaptive:
+            settings = tolerance_ladder(variant, 5 if quick else 13)
         else:
             continue  # a formula has nothing to set
         chosen = {"horizon": horizon, "settings": settings, "dense": not quick}
-        if name == WHOLE and row.method in tables.NAMED:
+        if name == WHOLE and variant.method in tables.NAMED:
             chosen["history"] = HISTORY[quick]
-        grid.append(Case(name, row.name, chosen))
+        grid.append(Case(name, variant.name, chosen))
     return grid
 
 
@@ -73,7 +73,7 @@ STUDY = Study(
         "line bends at the top, the step is too large for the order to show; where it flattens at the bottom, the "
         "error has reached rounding or the grey band, below which the reference cannot judge. Lines of one order look "
         "alike; what tells their methods apart is the constant C in error = C h^p, shown as the work that it takes to "
-        "one accuracy. A row is a method in one "
+        "one accuracy. A variant is a method in one "
         "chart, rk4[axis]: angles are Euler's angles, axis is the direction of the axis with the angular momentum, "
         "attitude is the quaternion with the angular momentum. Steps of adaptive methods follow from their tolerance; "
         "they are drawn against it, and against work beside the methods of fixed step."

@@ -35,7 +35,7 @@ MEASURES = {HISTORIES: run_history, WINDOWS: windows, ROUNDINGS: rounding, HORIZ
 
 
 def cases(quick: bool) -> list[Case]:
-    """A million steps of every fixed-step row (adaptive ones: the same horizon); losses of phase; long runs.
+    """A million steps of every fixed-step variant (adaptive ones: the same horizon); losses of phase; long runs.
 
     Histories are run in every chart, on every scene: a million compiled steps take 0.03 to 1 s. Losses of phase, which
     take up to a minute, leave out an attitude chart beside an axis chart.
@@ -58,14 +58,14 @@ def grid(
     long_run = {"steps": longest, "per_nutation": PER_NUTATION}
     ensemble = {"steps": walk, "per_nutation": PER_NUTATION, "count": members}
     loss = {"short": share * SHORT, "target": share * TARGET, "most": share * MOST_STEPS}
-    rows = grid_variants("nutation")
+    variants = grid_variants("nutation")
     return [
         *(Case(name, row.name, history_settings(scene(name), row, steps), group=HISTORIES)
           for name in grid_scenes(left_out, lambda one: math.isfinite(one.nutation_period))
           for row in grid_variants("nutation", attitude=True)),
-        *(Case(LONG, row.name, settings, group=group) for row in rows if row.modified_energy
+        *(Case(LONG, row.name, settings, group=group) for row in variants if row.modified_energy
           for group, settings in ((WINDOWS, long_run), (ROUNDINGS, ensemble))),
-        *(Case(LONG, row.name, loss, group=HORIZONS) for row in rows if row.fixed_step),
+        *(Case(LONG, row.name, loss, group=HORIZONS) for row in variants if row.fixed_step),
     ]  # fmt: skip
 
 
@@ -93,12 +93,12 @@ STUDY = Study(
     title="Drift",
     question="What happens to energy, momenta and phase over a million steps, and over 10^8?",
     how_to_read=(
-        "A row is a method in one chart, method[chart]: rk4[angles] and rk4[axis] take the same step and differ in "
+        "A variant is a method in one chart, method[chart]: rk4[angles] and rk4[axis] take the same step and differ in "
         "their equations only. Energies are relative to E0 - min V, the energy of the nutation, momenta to the larger "
         "one. A flat line is a bounded error, slope one a steady drift, slope one half the random walk of rounding. "
         "Discrete Lagrangians and splittings have a larger but bounded energy error and conserve the momenta to "
         "rounding. An explicit or adaptive Runge-Kutta method begins with a smaller error and loses energy and momenta "
-        "in time. The tables hold every row; momenta are recomputed from the increments of the trajectory."
+        "in time. The tables hold every variant; momenta are recomputed from the increments of the trajectory."
     ),
     cases=cases, full=full, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
 )  # fmt: skip

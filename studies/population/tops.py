@@ -6,10 +6,10 @@ formulas are those of `symtop.measure.errors` and `symtop.model.scenes`, and the
     axis, attitude   angle between, rad                      energy   |E - E0| / (E0 - p_psi^2/2 I3 - min V)
     momenta          the larger of |p_phi - ref| and |p_psi - ref|, over max(|p_phi|, |p_psi|)
 
-A run of a row with fixed step makes FIRST 2^k steps a nutation. Its samples fall on the same times at every k, a dozen
-that are not commensurate with the nutation, so that the truth is computed once. Of the largest error of 2000 samples
-they see 93 to 100 % in the median run, and half in one of twenty; it is the same for all rows. The coarsest run is that
-coarse because a step of 14 stages meets 1e-6 at four a nutation.
+A run of a variant with fixed step makes FIRST 2^k steps a nutation. Its samples fall on the same times at every k, a
+dozen that are not commensurate with the nutation, so that the truth is computed once. Of the largest error of 2000
+samples they see 93 to 100 % in the median run, and half in one of twenty; it is the same for all variants. The
+coarsest run is that coarse because a step of 14 stages meets 1e-6 at four a nutation.
 """
 
 import functools
@@ -73,7 +73,7 @@ class Tops:
 
     @staticmethod
     def drawn(members: int, seed: int, nutations: float) -> "Tops":
-        """The first members of the population of that seed; made once and kept, for every row runs the same."""
+        """The first members of the population of that seed; made once and kept, for every variant runs the same."""
         return _drawn(members, seed, nutations)
 
     @property
@@ -127,8 +127,8 @@ class Tops:
         """The least error of each quantity that the truth can judge over the horizon, (n,).
 
         That of the axis and the attitude is the rounding of the closed form, which `symtop.run.reference.bounds`
-        states. Rows of the angles chart show phi and psi as doubles, whose rounding is an angle; it counts for all
-        rows.
+        states. Variants in the angles chart show phi and psi as doubles, whose rounding is an angle; it counts for all
+        variants.
         """
         turns = (np.abs(self.forms.phi_per_period) + np.abs(self.forms.psi_per_period)) * self.nutations
         grain = (np.abs(self.energy) + np.abs(self.numbers[:, 2])) / self.energy_scale

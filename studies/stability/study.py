@@ -15,7 +15,7 @@ from . import figures, words
 from .tables import MECHANISMS, PERIODS, map_table
 
 FAMILY = "cusp"  # let go at theta = 0.8 with any spin
-NOT_SLEEPING = {  # rows that do not take part in the mechanism "sleeping"
+NOT_SLEEPING = {  # variants that do not take part in the mechanism "sleeping"
     "steps shrink towards the upright: millions in three samples, and the threshold of the motion": (
         "stormer-verlet-reversible[angles]",
     )
@@ -62,7 +62,7 @@ def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool)
 
 
 def cases(quick: bool) -> list[Case]:
-    """Maps of 200 steps by 120 spins and of 72 steps by 48 gaps for every row; then the scans of single mechanisms.
+    """Maps of 200 steps by 120 spins and of 72 steps by 48 gaps for every variant; then the scans of single mechanisms.
 
     Methods in lanes have ten times the cells, 632 by 379 and 228 by 152, and take about as long with them. An attitude
     chart beside an axis chart is left out: a map is judged by the axis, which both step alike.

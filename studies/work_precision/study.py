@@ -1,11 +1,11 @@
 """Which method is the fastest at the accuracy I need?
 
-Its rows are methods in one chart, every method in each chart that shows the axis, but not in the chart of the attitude
-where it has one of the axis alone: that shows the same axis, for about the same time or more, as the `reduction` study
-measures.
+Its variants are methods in one chart, every method in each chart that shows the axis, but not in the chart of the
+attitude where it has one of the axis alone: that shows the same axis, for about the same time or more, as the
+`reduction` study measures.
 
-Two rounds. First every row walks down to each target on every scene and over both horizons, all runs kept
-(`measure/work.py`). Then the rows of each scene are timed against each other
+Two rounds. First every variant walks down to each target on every scene and over both horizons, all runs kept
+(`measure/work.py`). Then the variants of each scene are timed against each other
 (`timing_rounds.py`). `tables.py` lists the variables; `measure/ranking.py` answers questions from them.
 """
 
@@ -37,7 +37,7 @@ EFFORT = (  # rounds and seconds of a batch, of all timed runs and of the conten
 
 
 def cases(quick: bool) -> list[Case]:
-    """Every row on every scene; python methods and quadruple precision within a smaller budget."""
+    """Every variant on every scene; python methods and quadruple precision within a smaller budget."""
     grid = []
     for name in grid_scenes(TAGS if quick else LEFT_OUT):
         for method in compared("axis"):
@@ -47,7 +47,7 @@ def cases(quick: bool) -> list[Case]:
 
 
 def follow_up(data: xr.Dataset) -> list[Case]:
-    """One case a scene that times its rows against each other."""
+    """One case a scene that times its variants against each other."""
     grid = []
     energies = energy.timed(data)
     periods = [float(value) for value in data["horizon"].values]
@@ -61,7 +61,7 @@ def follow_up(data: xr.Dataset) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """Errors and work of one row on a scene, or seconds of all of them."""
+    """Errors and work of one variant on a scene, or seconds of all of them."""
     return run_times(case) if case.timed else errors_and_work(case)
 
 

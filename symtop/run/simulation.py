@@ -158,7 +158,7 @@ def simulate(
     where the chart does not show them), ``axis(time, component)``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, and
     ``quaternion`` where the chart has one. Samples after a failure are NaN; ``outcome``, ``outcome_message`` and
     ``reached_time`` say what happened, ``guard`` what was expected to. `observe` ("nutation", "axis", "attitude";
-    default: what the scene is watched for) picks the smallest chart of the integrator that shows it; a row, such as
+    default: what the scene is watched for) picks the smallest chart of the integrator that shows it; a variant, such as
     ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step. A whole number of
     steps fills the horizon, the one nearest to horizon/step_size: the attribute ``step_size`` is the step made.
 

@@ -1,4 +1,4 @@
-"""Which scenes and rows a study runs: all that suit its question, but for those that it leaves out for a reason.
+"""Which scenes and variants a study runs: all that suit its question, but for those that it leaves out for a reason.
 
 A study does not list its scenes or methods, so that one that is added, to the catalogue or by a user, is in every study
 whose question it suits. What a study leaves out, it names with the reason.
@@ -22,7 +22,7 @@ def grid_scenes(left_out: Iterable[str] = (), suits: Callable[[Scene], bool] = l
 
 
 def grid_variants(observe: str, *, attitude: bool = False) -> list[Integrator]:
-    """Every method in each of its charts that shows the "nutation" or the "axis": the rows ``method[chart]`` of a grid.
+    """The variants of a grid: every method in each of its charts that shows the "nutation" or the "axis".
 
     Where a method has the axis chart, its attitude chart is left out unless `attitude` is true: it steps the same axis
     and angular momentum, and the rotation about the axis besides, which neither quantity depends on.

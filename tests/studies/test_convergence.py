@@ -1,4 +1,4 @@
-"""The convergence study: rows are methods in charts, adaptive methods stand beside them, verdicts follow one rule."""
+"""The convergence study: variants, adaptive methods beside them, and one rule for verdicts."""
 
 import math
 import re
