@@ -2,7 +2,7 @@
 
 import xarray as xr
 
-from symtop.judging.claims import judge
+from symtop.judging.battery import judge
 from symtop.methods.framework.registry import integrator, integrators
 from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes

@@ -106,7 +106,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     symtop claims --plugin my_methods.py
     """
     with ticking("loading"):
-        from symtop.judging.claims import judge as measured
+        from symtop.judging.battery import judge as measured
         from symtop.methods.framework import registry
         from symtop.model import scenes
 

@@ -9,8 +9,8 @@ import xarray as xr
 from symtop_studies.convergence import figures, study, tables, words
 
 import symtop
-from symtop.judging.claims_order import measured_order
-from symtop.judging.findings import CLAIMS
+from symtop.judging.battery import CLAIMS
+from symtop.judging.claims.order import measured_order
 from symtop.measure.order import BESIDE, order_verdict
 from symtop.methods.framework.registry import integrator, methods, split_name, variants
 from symtop.report import style

@@ -1,4 +1,4 @@
-"""From what a user gives to the socket that it fits."""
+"""From what a user gives to the adapter that it fits."""
 
 import inspect
 import sys
@@ -41,7 +41,7 @@ def form_of(target: Any) -> str:
     return "shared" if path.endswith(LIBRARIES) else "program"
 
 
-def opened(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
+def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
     """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command.
 
     Raises SymtopError for anything that is none of these, or that cannot be loaded.
@@ -57,8 +57,6 @@ def opened(target: Any, form: str | None, chart: str, *, adaptive: bool = False)
     if kind == "diffrax" or is_solver(thing):
         return DiffraxSolver(thing, chart, name)
     if isinstance(thing, type):
-        if not callable(getattr(thing, "step", None)):
-            raise SymtopError(f"a class must be derived from scipy.integrate.OdeSolver, not {thing.__name__}")
         return ScipySolver(thing, chart, adaptive=adaptive)
     if kind == "scipy" or adaptive:
         raise SymtopError(f"form scipy, and a tolerance, need a class derived from OdeSolver, not {thing!r}")
