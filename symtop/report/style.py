@@ -15,7 +15,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from symtop.core import netcdf
-from symtop.report import embedded
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -259,8 +258,7 @@ def _written(figure: Any, path: Path, dpi: float) -> None:
         return
     figure.set_dpi(dpi)
     if path.suffix == ".pdf":
-        with embedded.letters_alone():
-            FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
+        FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
     elif dpi == DPI:
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
