@@ -23,7 +23,7 @@ from symtop.report.mathml import mathml
 from symtop.report.style import look
 from symtop.runner import manifest, plugins, run as runner, store
 
-PAGE, WORDS = "report.html", "report.md"
+WORDS = "report.md"
 TITLE = "Integrators on the heavy symmetric top"
 INTRODUCTION = (
     "Every method is run on rigid bodies whose exact motion is known, and measured against it: accuracy, conservation, "
@@ -169,10 +169,10 @@ def write(results: Path, *, embed: bool = False) -> Path:
         quick=any(study["quick"] for study in studies),
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
-    target = results / PAGE
+    target = results / manifest.PAGE
     store.write_text(target, text)
     opening = ["# " + TITLE, INTRODUCTION, *(markdown.opening(study, titles) for study in studies), ROWS]
     opening.append(markdown.measured(measured))
     store.write_text(results / WORDS, markdown.page(studies, opening, facts))
-    manifest.note(results, PAGE, "" if plugins.loaded() else made_of, [target, results / WORDS, *sources])
+    manifest.note(results, manifest.PAGE, "" if plugins.loaded() else made_of, [target, results / WORDS, *sources])
     return target

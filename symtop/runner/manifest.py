@@ -9,14 +9,14 @@ computed again.
 import importlib.metadata
 import importlib.util
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from symtop.core import files
 from symtop.core.code_hash import PACKAGE, digest, file_hash, hashed, packages, processor
 
-ALL = "all studies"
+ALL, PAGE = "all studies", "report.html"  # entries that are no study's
 ENTRY_POINTS = "symtop.integrators"  # as in `symtop.methods.framework.registry`, which takes longer to import
 STUDIES = ("symtop_studies", "studies")  # folders beside the package, as in `scripts`
 
@@ -67,17 +67,22 @@ def note(results: Path, name: str, made_of: str, paths: Iterable[Path], **facts:
         store.write_json(path_of(results), _entries(results) | {name: entry})
 
 
-def note_all(results: Path, names: list[str], grid: str, sources: str) -> None:
-    """Write that all studies are up to date on a grid."""
+def note_all(results: Path, names: list[str], made_of: str) -> None:
+    """Write that all studies are up to date."""
     entries = _entries(results)
     paths = [results / file for name in names for file in entries.get(name, {}).get("files", ())]
-    note(results, ALL, hashed(sources, grid), paths, names=names)
+    note(results, ALL, made_of, paths, names=names)
 
 
-def all_findings(results: Path, grid: str) -> list[dict[str, Any]] | None:
+def all_made_of(grid: Mapping[str, bool]) -> str:
+    """Hash of what all studies are made by on a grid: whether it is `quick` or `full`."""
+    return hashed(sources_hash(), *(name for name in sorted(grid) if grid[name]))
+
+
+def all_findings(results: Path, grid: Mapping[str, bool]) -> list[dict[str, Any]] | None:
     """The findings of all studies in their order, if they are up to date on a grid; no study is loaded."""
     names = _entries(results).get(ALL, {}).get("names")
-    if not names or not is_current(results, ALL, hashed(sources_hash(), grid)):
+    if not names or not is_current(results, ALL, all_made_of(grid)):
         return None
     return [json.loads((results / f"{name}.json").read_text(encoding="utf-8")) for name in names]
 

@@ -16,7 +16,7 @@ _loaded: dict[Path, list[str]] = {}  # files of plug-ins in use, and the names t
 
 def load(path: str | Path) -> list[str]:
     """Run a plug-in file once; what it registers, whose names are returned, is then known to studies and commands."""
-    file = python_file(path, "plugin must be a Python file")
+    file = python_file(path, "plugin", "a Python file")
     if file in _loaded:
         return _loaded[file]
     before = [*integrators().values(), *scenes().values()]

@@ -21,8 +21,7 @@ from symtop.methods.framework import registry
 from symtop.methods.framework.registry import Integrator
 from symtop.report import style
 from symtop.runner import check, run as runner, store
-from symtop.runner.study import Case
-from tests.commands import PROBE
+from tests.commands import PROBE, contents
 
 
 def measured(path: Path) -> list[xr.Dataset]:
@@ -96,7 +95,7 @@ def test_status_says_what_is_missing_done_and_stale(tmp_path):
     assert probe(tmp_path).exit_code == 0
     assert probe(tmp_path, "--status").output == "probe: 4 done\n"
     case = next((tmp_path / "quick" / "cases" / "probe").glob("loop--midpoint*.npz"))
-    older = case.with_name(f"{store.identity_of(case)}--{'0' * 20}.nc")
+    older = case.with_name(f"{store.identity_of(case)}--{'0' * 20}.npz")
     case.rename(older)
     rows = json.loads(probe(tmp_path, "--status", "--json").output)["probe"]
     assert [row["state"] for row in rows] == ["done", "done", "stale", "done"]
@@ -122,13 +121,12 @@ def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_pa
 
 def test_every_file_says_where_it_comes_from(tmp_path):
     assert probe(tmp_path).exit_code == 0
-    for path in (tmp_path / "quick").rglob("*.nc"):
-        data = netcdf.read(path)
-        asked = set(netcdf.provenance())
-        if path.parent.name == "probe":
-            asked |= {"study", "settings", "sources", "made_of", "seed", "content"}
-            assert data.attrs["sources"] in path.name
-        assert asked <= set(data.attrs), path.name
+    for name, data in contents(tmp_path / "quick", provenance=True).items():
+        expected = set(netcdf.provenance())
+        if name.endswith(".npz"):
+            expected |= {"study", "settings", "sources", "made_of", "seed"}
+            assert data.attrs["sources"] in name
+        assert expected <= set(data.attrs), name
         assert not any("time" in key or "date" in key for key in data.attrs)
 
 
@@ -139,9 +137,12 @@ def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
     assert done.exit_code == 0, done.output
     assert "4 of 4 cases computed again, the same to the last bit" in done.output
     victim = next((tmp_path / "quick" / "cases" / "probe").glob("*.npz"))
-    data = netcdf.read(victim)
+    study = runner.load(str(PROBE))
+    (case,) = [one for one in study.cases(True) if one.label == victim.name.split("--")[0] + "--" + one.integrator
+               and victim.name.startswith(f"{one.label}--")]  # fmt: skip
+    data = store.load_case(victim)
     data["energy"][3] = np.nextafter(data["energy"].values[3], np.inf)
-    netcdf.write(data.assign_attrs(content=netcdf.content_hash(data)), victim)  # well made, and wrong
+    store.save_case(data, victim, study, case)  # well made, and wrong
     done = probe(tmp_path, "--check", "--fresh")
     assert done.exit_code == 1
     assert "energy differs by up to" in done.output
@@ -242,8 +243,8 @@ STUDY = Study("clocked", "Clocked", "Alone?", "", cases, measure, lambda data: [
 
 @pytest.mark.parametrize("count", [8, 2])
 def test_timed_cases_run_one_at_a_time_in_workers_that_are_there_already(tmp_path, monkeypatch, count):
-    """Few of them, too: workers have the kernels, this process has not. (Side by side: `test_trial`.)"""
-    monkeypatch.setattr("symtop.runner.trial.slowdown", lambda *_: math.inf)
+    """Few of them, too: workers have the kernels, this process has not. (Side by side: `test_pool`.)"""
+    monkeypatch.setattr("symtop.runner.pool.slowdown", lambda *_: math.inf)
     (tmp_path / "crew").mkdir()
     monkeypatch.setenv("CREW", str(tmp_path / "crew"))
     (tmp_path / "clocked.py").write_text(CLOCKED.replace("range(16)", f"range({8 + count})"))
@@ -258,24 +259,3 @@ def test_timed_cases_run_one_at_a_time_in_workers_that_are_there_already(tmp_pat
     assert any(begin < end for (_, end), (begin, _) in pairwise(spans[0.0]))  # the control: two at once
     assert crew[1.0] <= crew[0.0]
     assert os.getpid() not in crew[0.0]
-
-
-def test_a_timed_case_with_a_method_of_this_process_runs_here_though_workers_are_open(tmp_path):
-    """Its name stands in the settings; that of shipped methods (the control) goes to the workers."""
-    from symtop.runner.execute import HERE, size_for
-    from symtop.runner.pools import Workers
-    from symtop.runner.work import Task
-
-    def sizes(name):
-        case = Case("spheroid", "together", {"integrators": ["strang", name]}, timed=True)
-        return size_for([Task("", case, "", (), 1.0)], workers, timed=True)
-
-    symtop.register(dataclasses.replace(symtop.integrator("strang"), name="mine"))
-    try:
-        with Workers(2) as workers:
-            assert sizes("midpoint") == HERE  # nobody is there
-            workers.pool(2)
-            assert sizes("midpoint") == 2
-            assert sizes("mine") == HERE
-    finally:
-        registry._registry.pop("mine")
