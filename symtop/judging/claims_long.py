@@ -22,7 +22,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.measure.conservation import Changed, constant_of, residuals
@@ -35,7 +34,8 @@ from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
 from symtop.model.view import space_momenta
-from symtop.run.simulation import as_dataset, make_plan
+from symtop.run.simulation import make_plan
+from symtop.run.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -103,9 +103,9 @@ class LongRun(NamedTuple):
 
 
 class _Done(NamedTuple):
-    """One run: its dataset, with the momenta of its states, and the run as the solver returned it."""
+    """One run: its trajectory, with the momenta of its states, and the run as the solver returned it."""
 
-    data: xr.Dataset
+    shown: Trajectory
     run: Run
     plan: Plan
 
@@ -123,8 +123,7 @@ def _run(method: Integrator, scene: Scene, chart: str, steps: float, step: float
         with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up
             p_phi, p_psi = space_momenta(chart, run.states)
         own = run._replace(p_phi=p_phi, p_psi=p_psi)
-    data = as_dataset(scene, chart, plan, own)
-    return _Done(data.assign_attrs(chart=chart, step_size=plan.step_size), run, plan)
+    return _Done(Trajectory.of_run(scene, chart, plan, own), run, plan)
 
 
 def long_run(
@@ -145,7 +144,7 @@ def long_run(
             break
     other = _run(method, scene, chart, PILOT, 0.21 * step, PILOT + 1)
     run, made, time = done.run, max(done.run.steps, 1), done.plan.times
-    changes, small = constants(scene, done.data), constants(scene, pilot.data)
+    changes, small = constants(scene, done.shown), constants(scene, pilot.shown)
     grains = {name: scene.energy_grain if name == "energy" else 1.0 for name in changes}
     return LongRun(
         {name: judged(time, values, small[name], made, grains[name]) for name, values in changes.items()},
@@ -176,28 +175,28 @@ def _reported(method: Integrator, scene: Scene, chart: str, done: _Done) -> Diff
         return from_increments(method, scene, done.plan) if method.fixed_step else None
     apart = {}
     for name in ("p_phi", "p_psi"):
-        gap = np.abs(getattr(done.run, name) - done.data[name].values) / scene.momentum_scale
+        gap = np.abs(getattr(done.run, name) - getattr(done.shown, name)) / scene.momentum_scale
         apart[name] = float(np.max(gap[np.isfinite(gap)], initial=0.0))
     name = max(apart, key=lambda one: apart[one])
     return Difference(name, apart[name], REPORTED, f"of the larger momentum in {done.run.steps} steps")
 
 
-def constants(scene: Scene, run: xr.Dataset) -> dict[str, Array]:
+def constants(scene: Scene, run: Trajectory) -> dict[str, Array]:
     """Relative change of every constant that the run's chart has, at its samples."""
     changes = residuals(scene, run)
-    if run.attrs["chart"] != "angles":
-        changes["axis_length"] = np.linalg.norm(run["axis"].values, axis=1) - 1.0
-    if run.attrs["chart"] != "angles" and math.isfinite(run.attrs["step_size"]):
+    if run.chart != "angles":
+        changes["axis_length"] = np.linalg.norm(run.axis, axis=1) - 1.0
+    if run.chart != "angles" and math.isfinite(run.step_size):
         changes["cayley_energy"] = _cayley_residual(scene.top, run)
     return changes
 
 
-def _cayley_residual(top: SymmetricTop, run: xr.Dataset) -> Array:
+def _cayley_residual(top: SymmetricTop, run: Trajectory) -> Array:
     """|L|^2/2 + c u - k^2 (1-u^2)/8 with the best c, relative to its size; |L|^2 is in the energy."""
-    u = run["axis"].values[:, 2]
-    spin: Array = 0.5 * run["p_psi"].values ** 2 * (1.0 / top.I3 - 1.0 / top.I1)
-    square: Array = top.I1 * (run["energy"].values - top.mgl * u - spin)  # |L|^2 / 2
-    kick = float(run.attrs["step_size"]) * top.mgl
+    u = run.axis[:, 2]
+    spin: Array = 0.5 * run.p_psi**2 * (1.0 / top.I3 - 1.0 / top.I1)
+    square: Array = top.I1 * (run.energy - top.mgl * u - spin)  # |L|^2 / 2
+    kick = run.step_size * top.mgl
     rest = square - kick * kick * (1.0 - u) * (1.0 + u) / 8.0
     good = np.isfinite(rest) & np.isfinite(u)
     if good.sum() < 8 or np.ptp(u[good]) == 0.0:

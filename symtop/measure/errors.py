@@ -19,7 +19,6 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.core.errors import SymtopWarning, one_of
 from symtop.core.numbers import EPSILON
-from symtop.core.over_time import over_time
 from symtop.measure.trajectory import (
     CONSTANTS,
     checked,
@@ -33,6 +32,7 @@ from symtop.measure.trajectory import (
 from symtop.model import charts
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.reference.truth import PRECISIONS, reference
+from symtop.run.trajectory import dataset
 
 QUANTITIES: dict[str, str] = {
     "axis": "angle between axes (rad)",
@@ -121,7 +121,7 @@ def errors_against(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Datas
 def _beside(run: xr.Dataset, columns: dict[str, charts.Array]) -> xr.Dataset:
     """Columns over the times of a run."""
     time = run.variables["time"]
-    shown = over_time(np.asarray(time.values, dtype=float), columns)
+    shown = dataset(time.values, columns)
     shown.variables["time"].attrs.update(time.attrs)
     return shown
 

@@ -24,6 +24,7 @@ from symtop.report.style import (
     panels,
     save,
 )  # fmt: skip
+from symtop.run.trajectory import Trajectory
 
 COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
 LEAST = 1e-17  # what is smaller is drawn here
@@ -41,7 +42,7 @@ def draw(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Dataset, p
     for name in ("axis", "attitude", "theta"):
         if name in errors:
             _line(angles, times, errors[name].values, COLORS[name], QUANTITIES[name])
-    for name, values in residuals(scene, run).items():
+    for name, values in residuals(scene, Trajectory.of_data(run)).items():
         _line(constants, times, np.abs(values), COLORS[name], f"residual of {name}, relative")
     angles.set(yscale="log", ylabel="error (rad)")
     constants.set(yscale="log", ylabel="|change| since the start", xlabel="time")
