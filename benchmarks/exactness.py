@@ -20,12 +20,13 @@ import numpy as np
 
 import symtop
 from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.loop import Loop, accumulate_plainly, driver
+from symtop.methods.framework.loop import Loop, kernel_loop
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian import exact_discrete
-from symtop.methods.lagrangian.exact_map import exact_map
+from symtop.methods.lagrangian.oscillators import exact_map
+from symtop.methods.vectors import accumulate_plainly
 from symtop.model import charts
-from symtop.model.exact.precise_form import PreciseForm
+from symtop.model.exact.digits import PreciseForm
 from symtop.model.top import Angles, SymmetricTop
 
 METHOD = "exact-discrete"
@@ -118,7 +119,7 @@ def of_edges() -> Iterator[str]:
 
 def forgetful() -> Loop:
     """The loop of the map, with sums in one double."""
-    return driver(exact_discrete.begin, _forgetting, exact_discrete.observe, exact_discrete.enter,
+    return kernel_loop(exact_discrete.begin, _forgetting, exact_discrete.observe, exact_discrete.enter,
                   exact_discrete.present_axis, accumulate_plainly)  # fmt: skip
 
 

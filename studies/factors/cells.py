@@ -2,7 +2,7 @@
 
     method        a scheme: the same coefficients in every chart and language
     chart         angles, axis, attitude                                        see
-    `symtop.methods.framework.formulations` language      compiled        the whole loop, by numba or heyoka
+    `symtop.methods.framework.equations` language      compiled        the whole loop, by numba or heyoka
                   scipy-numba     SciPy's loop in Python, the right-hand side compiled
                   scipy-python    SciPy's loop, the right-hand side in Python on floats
                   numpy           a loop in Python over NumPy arrays            see `plain_numpy`
@@ -18,13 +18,12 @@ top and gravity), with the same coefficients. The implicit midpoint rule is `mid
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from symtop.methods.framework.angles import BareTop
-from symtop.methods.framework.euler_lagrange import sampled_momenta, to_angles
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.angles import BareTop, sampled_momenta, to_angles
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Integrator, integrators
 from symtop.methods.library.scipy_ivp import RightHandSide, scipy_method
-from symtop.methods.taylor import taylor
+from symtop.methods.taylor import heyoka
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
 from symtop.run.simulation import make_plan, simulate
@@ -66,11 +65,11 @@ class Cell:
     scheme: str
     chart: str
     language: str
-    method: Integrator = field(compare=False)  # a row: it has this chart alone
+    method: Integrator = field(compare=False)  # a variant: it has this chart alone
 
     @property
     def name(self) -> str:
-        """The name of the row."""
+        """The name of the variant."""
         return self.method.name
 
     @property
@@ -99,13 +98,13 @@ def cells(schemes: Sequence[str] | None = None) -> list[Cell]:
 
 
 def taylor_in_angles() -> Integrator:
-    """The row ``taylor[angles]``: heyoka on the Euler-Lagrange equations, from the same formulas as the others."""
+    """The variant ``taylor[angles]``: heyoka on the Euler-Lagrange equations, from the same formulas as the others."""
 
     def read(top: SymmetricTop, times: Array, states: Array) -> tuple[Array, Array, Array]:
         par = BareTop(top.I1, top.I3, top.mgl)
         return to_angles(par, times, states), *sampled_momenta(par, states)
 
-    method, solvers = integrators()["taylor"], {"angles": taylor.solver("angles", "double", read)}
+    method, solvers = integrators()["taylor"], {"angles": heyoka.solver("angles", "double", read)}
     return replace(method, name="taylor[angles]", solvers=solvers)
 
 

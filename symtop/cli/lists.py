@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from symtop.cli.common import as_text, facts, json_option, plugin_option, table, terminal_width
-from symtop.cli.completion import completing
+from symtop.cli.common import as_text, completing, facts, json_option, plugin_option, table, terminal_width
 from symtop.core.errors import SymtopError
 from symtop.report import tables
 
@@ -89,7 +88,7 @@ def _described(method: "Integrator") -> Record:
 
 
 def _integrator_page(described: Record, width: int) -> str:
-    from symtop.methods.framework.citations import citation
+    from symtop.methods.framework.registry import citation
 
     lines = {key: value for key, value in described.items() if key not in ("name", "summary", "about")}
     paragraphs = [f"{described['name']}: {described['summary']}", *described.get("about", "").split("\n\n")]

@@ -15,7 +15,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from symtop.core import netcdf
-from symtop.report import embedded
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -36,7 +35,7 @@ class Look(NamedTuple):
     color: str
     marker: str
     size: float = 4.0
-    fill: str = "full"  # of the marker, matplotlib's fillstyle: the chart of a row
+    fill: str = "full"  # of the marker, matplotlib's fillstyle: the chart of a variant
     dash: Any = "-"  # of the line: the family
 
 
@@ -68,7 +67,7 @@ RAISED, FIRM = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"), "
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
-# The looks of the integrators that ship with symtop. A new one gets a line here; the others keep theirs.
+# Looks set by hand; `look` finds one for every other integrator.
 _LOOKS = {
     "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "simpson-linear": Look(PURPLE, "v"),
     "midpoint-unreduced": Look(BLUE, "^"), "trapezoidal-unreduced": Look(BLUES[1], "<"),
@@ -119,10 +118,10 @@ FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, b
 
 
 def look(name: str) -> Look:
-    """Colour and marker of an integrator, or of a row: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
+    """Colour and marker of an integrator or a variant: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
 
-    Those that ship with symtop have a fixed look. An added one gets a shade of its family and a marker that no shipped
-    one of these shades has; which of them depends on its name alone, not on what else is registered.
+    One that `_LOOKS` does not name gets a shade of its family and a marker that none of these has; which of them
+    depends on its name alone, not on what else is registered.
     """
     from symtop.methods.framework.registry import integrators, split_name
 
@@ -141,7 +140,7 @@ def look(name: str) -> Look:
 
 
 def line(name: str, scale: float = 1.0) -> dict[str, Any]:
-    """What ``plot`` needs to draw an integrator or a row: colour, line, and marker of `scale` times its size."""
+    """What ``plot`` needs to draw an integrator or a variant: colour, line, and marker of `scale` times its size."""
     one = look(name)
     return {"color": one.color, "ls": one.dash, "marker": one.marker, "fillstyle": one.fill, "ms": scale * one.size}
 
@@ -259,8 +258,7 @@ def _written(figure: Any, path: Path, dpi: float) -> None:
         return
     figure.set_dpi(dpi)
     if path.suffix == ".pdf":
-        with embedded.letters_alone():
-            FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
+        FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
     elif dpi == DPI:
         canvas = FigureCanvasAgg(figure)
         canvas.draw()

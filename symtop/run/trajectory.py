@@ -13,11 +13,8 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.methods.framework.plan import Plan, Run
-from symtop.model.charts import Array
-from symtop.model.continuous import continuous
-from symtop.model.readings import readings
+from symtop.model.charts import Array, View, continuous, readings
 from symtop.model.scenes import Scene, closed_form
-from symtop.model.view import View
 
 LABELS = {"component": ("x", "y", "z"), "part": ("w", "x", "y", "z")}  # of the second dimension of vectors
 _DIMS = {(): ("time",)} | {(len(labels),): ("time", name) for name, labels in LABELS.items()}

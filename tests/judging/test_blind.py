@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import symtop
-from symtop.judging.text_report import described
+from symtop.judging.text_report import description
 
 BLIND = Path(__file__).parent / "blind"
 
@@ -177,8 +177,8 @@ def test_time_that_is_summed_in_single_precision_is_caught(tmp_path):
 def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope():
     ledger = symtop.judge(WRONG.rounded_triple, quick=True)
     assert ledger.refuted == []
-    assert ledger["order"].measured == "2 by its h^3 term"
-    assert described(ledger.findings).startswith("order 2, not symplectic, reversible, keeps ")
+    assert str(ledger["order"].measured) == "2 by its h^3 term"
+    assert description(ledger.findings).startswith("order 2, not symplectic, reversible, keeps ")
 
 
 def test_the_set_is_as_large_as_it_is_said_to_be():

@@ -8,8 +8,7 @@ import pytest
 import symtop
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.many import members_of
-from symtop.methods.framework.outcomes import OUTCOMES
-from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
 from symtop.run.ensemble.inputs import read_members
 from symtop.run.sampling import nutation_periods

@@ -124,7 +124,7 @@ def test_the_dataset_is_the_one_of_xarray_itself(scene, row, monkeypatch, tmp_pa
             raise AttributeError(refused.append("_construct_direct"))
         return private(*given, **named)
 
-    monkeypatch.setattr(xr.Dataset, "_construct_direct", missing_once)
+    monkeypatch.setattr(xr.Dataset, "_construct_direct", staticmethod(missing_once))
     public = symtop.simulate(scene, row, guard=False, **settings)
     assert refused
     xr.testing.assert_identical(quick, public)

@@ -137,12 +137,12 @@ STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "
         ("methods/framework/newton.py", STRAIGHT | {"galerkin-simpson"}),
         ("methods/library/scipy_ivp.py", SCIPY),
         ("methods/runge_kutta/dormand_prince.py", {"rk45-compiled"}),
-        ("methods/runge_kutta/runge_kutta.py", {"rk4", "rk45-compiled"}),
-        ("methods/framework/formulations.py", {"rk4", "rk45-compiled"} | SCIPY),
-        ("methods/framework/euler_lagrange.py", {"rk4", "rk45-compiled"} | SCIPY),
+        ("methods/runge_kutta/explicit.py", {"rk4", "rk45-compiled"}),
+        ("methods/framework/equations.py", {"rk4", "rk45-compiled"} | SCIPY),
+        ("methods/framework/angles.py", {"rk4", "rk45-compiled"} | SCIPY),
         ("methods/library/exact.py", {"exact"}),
-        ("methods/splitting/splitting_loop.py", SPLITTING),
-        ("methods/taylor/taylor.py", {"taylor", "taylor-longdouble", "taylor-quad"}),
+        ("methods/splitting/loop.py", SPLITTING),
+        ("methods/taylor/heyoka.py", {"taylor", "taylor-longdouble", "taylor-quad"}),
         ("cli/main.py", set()),
         ("report/figures.py", set()),
         ("measure/accuracy.py", set()),
@@ -172,7 +172,7 @@ def test_what_all_cases_depend_on_makes_all_stale():
     convergence = runner.load("convergence")
     for edited in ("model/top.py", "model/scenes.py", "run/simulation.py", "methods/framework/registry.py"):
         assert stale_after(edited, of_everyone()) == set(symtop.integrators()), edited
-    for edited in ("run/reference/truth.py", "methods/taylor/taylor.py", "measure/accuracy.py"):
+    for edited in ("run/reference/truth.py", "methods/taylor/heyoka.py", "measure/accuracy.py"):
         assert stale_after(edited, convergence) == {case.integrator for case in convergence.cases(True)}, edited
 
 

@@ -18,26 +18,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError, at_home
-from symtop.judging.adapters.adapter import March, label_of
-from symtop.judging.heartbeat import pulse
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.judging.adapters.adapter import March, Marks, Stepper, label_of
+from symtop.judging.heartbeat import heartbeat
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
-from symtop.methods.framework.registry import Solver
 from symtop.model.top import SymmetricTop
 
 WORDS = 100  # characters of what a program says when it fails
+TEXT = b"0123456789+-.eEinfaINFA, \t\r\n"  # the letters of numbers
 SHORT = 1e-3  # relative: digits that a program may leave out
 SLACK = 5.0  # times the seconds that earlier runs make one expect
 
 
-class Program:
+class Program(Stepper):
     """A stepper around a command."""
 
-    implementation = "python"
-    adaptive: Solver | None = None
     own_loop = True
 
     def __init__(self, command: str, chart: str) -> None:
@@ -48,7 +45,7 @@ class Program:
         self.name = label_of(Path(self.words[0]).name)
         self.seconds_a_step = 0.0  # of the slowest run so far
 
-    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: NDArray[np.int64]) -> March:
+    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks; SymtopError if the program fails or writes anything else."""
         stride = max(int(np.gcd.reduce(marks)), 1)
         last = int(marks[-1])
@@ -65,35 +62,34 @@ class Program:
 
     def _answer(self, line: str, h: float, steps: int) -> bytes:
         expected = SLACK * self.seconds_a_step * steps
-        seconds = pulse.patience + expected
-        pulse.begin(h, expected + seconds)
-        began = time.monotonic()
+        seconds = heartbeat.patience + expected
+        with heartbeat.call(h, expected + seconds):
+            began = time.monotonic()
+            out = self._output(line, seconds, f"{steps} steps of {h:.3g}")
+        if steps > 0:
+            self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps) if steps > 50 else 0.0
+        return out
+
+    def _output(self, line: str, seconds: float, what: str) -> bytes:
         with subprocess.Popen(  # noqa: S603  (the command is the user's)
             self.words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
         ) as process:
             try:
-                out, said = process.communicate(line.encode(), timeout=seconds)
+                out, errors = process.communicate(line.encode(), timeout=seconds)
             except subprocess.TimeoutExpired:
                 with contextlib.suppress(OSError):
                     os.killpg(process.pid, signal.SIGKILL)
-                raise SymtopError(
-                    f"{self.name} had not ended {seconds:.0f} s after it was asked for {steps} steps of {h:.3g}"
-                ) from None
-        pulse.end()
+                raise SymtopError(f"{self.name} had not ended {seconds:.0f} s after it was asked for {what}") from None
         if process.returncode != 0:
-            words = " ".join(said.decode(errors="replace").split())[-WORDS:]
+            words = " ".join(errors.decode(errors="replace").split())[-WORDS:]
             raise SymtopError(f"{self.name} ended with code {process.returncode}: {words or 'it said nothing'}")
-        if steps > 0:
-            self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps) if steps > 50 else 0.0
         return out
 
 
 def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
     """The states that a program wrote, shape (rows, size)."""
-    if len(answer) == 8 * rows * size:
-        raw = np.frombuffer(answer)
-        if not _is_text(answer):
-            return raw.reshape(rows, size).copy()
+    if len(answer) == 8 * rows * size and answer.translate(None, TEXT):
+        return np.frombuffer(answer).reshape(rows, size).copy()
     try:
         values = np.array(answer.decode("ascii").replace(",", " ").split(), dtype=float)
     except ValueError:
@@ -111,7 +107,3 @@ def _begins(state: Array, start: Array) -> bool:
     """Is a state the start, but for rounding, the sign of a quaternion and whole turns?"""
     turns = np.stack([state - start, state + start, np.sin(0.5 * (state - start))])  # any of them shows that it is
     return bool((np.abs(turns).min(axis=0) <= SHORT * np.abs(start).max()).all()) or not np.isfinite(state).all()
-
-
-def _is_text(answer: bytes) -> bool:
-    return all(byte in b"0123456789+-.eEinfaINFA, \t\r\n" for byte in answer)

@@ -34,10 +34,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.core.jit import compile_kernel, register_jitable, set_item
-from symtop.methods.framework.blocks import Blocks
 from symtop.methods.framework.lanes import Lanes, marching as marching_lanes, preparing, showing
-from symtop.methods.framework.outcomes import OK
+from symtop.methods.framework.many import Blocks
+from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import Body, Start, as_it_steps, conserved
+from symtop.methods.vectors import accumulate, accumulate_plainly
 
 Array = NDArray[np.float64]
 Marks = NDArray[np.int64]
@@ -62,31 +63,6 @@ class March(NamedTuple):
     steps: int  # completed since the start of the run
     work: int  # force evaluations or solver iterations, as the family counts them
     outcome: int  # index into OUTCOMES
-
-
-@register_jitable
-def accumulate(state: Any, low: Any, dstate: Any) -> Any:
-    """(state + low) + dstate as a new pair of high and low parts; exact (Knuth's two-sum).
-
-    One loop for both tuples is too long for LLVM to unroll over the nine components of a frame; left as it is, it moves
-    both through memory at each of them, 34 ns a step.
-    """
-    total = state
-    for i in range(len(state)):
-        total = set_item(total, i, state[i] + (dstate[i] + low[i]))
-    for i in range(len(state)):
-        addend = dstate[i] + low[i]
-        virtual = total[i] - state[i]
-        low = set_item(low, i, (state[i] - (total[i] - virtual)) + (addend - virtual))
-    return total, low
-
-
-@register_jitable
-def accumulate_plainly(state: Any, low: Any, dstate: Any) -> Any:
-    """What everybody else's loop does: what a step rounds off is lost, if the kernel does not keep it. To compare."""
-    for i in range(len(state)):
-        state = set_item(state, i, state[i] + dstate[i])
-    return state, low
 
 
 @register_jitable
@@ -150,7 +126,7 @@ class Loop:
         return March(states, momenta.T, k, work, outcome), Position(state, low, carry, k)
 
 
-def driver(  # noqa: C901  (one loop, read in one piece)
+def kernel_loop(  # noqa: C901  (one loop, read in one piece)
     begin: Callable[..., Any], increment: Callable[..., Any], observe: Callable[..., Any],
     enter: Callable[..., Any] = _as_given, present: Callable[..., Any] = _as_stepped,
     add: Callable[..., Any] = accumulate, lanes: Callable[[Any], Lanes | None] = _no_lanes,
@@ -226,7 +202,7 @@ def driver(  # noqa: C901  (one loop, read in one piece)
 
     @functools.cache
     def plain() -> Loop:
-        return driver(begin, increment, observe, enter, present, accumulate_plainly)
+        return kernel_loop(begin, increment, observe, enter, present, accumulate_plainly)
 
     alone = compile_kernel(prepare), compile_kernel(marching(as_it_steps))
     return Loop(begin, *alone, whole, lanes, blocks, plain)

@@ -12,6 +12,7 @@ The maps of physics engines, family ``engine``, are registered, judged and run b
 what people are given, not what one would choose: `methods`, and so `variants` and every comparison, leaves them out.
 """
 
+import functools
 import importlib
 import importlib.metadata
 import re
@@ -19,6 +20,7 @@ import threading
 import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
+from importlib import resources
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -39,11 +41,9 @@ from symtop.core.errors import (
     words_of,
 )
 from symtop.core.signals import is_of_user
-from symtop.methods.framework.about import paragraphs
 from symtop.methods.framework.plan import Plan, Run
-from symtop.model.charts import DIMENSIONS
+from symtop.model.charts import DIMENSIONS, View
 from symtop.model.top import Angles, Momenta, SymmetricTop
-from symtop.model.view import View
 
 Array = NDArray[np.float64]
 Solver = Callable[[SymmetricTop, Angles, Plan], Run]
@@ -170,7 +170,8 @@ class Integrator:
             raise SymtopError(f"{self.name} is adaptive and needs a tolerance, for example 1e-6")
         if value < self.least_tolerance or value >= 1.0:
             raise SymtopError(
-                f"tolerance of {self.name} must be at least {self.least_tolerance:.3g} and below 1, not {value!r}"
+                f"tolerance of {self.name} must be at least {self.least_tolerance:.3g} and below 1, not {value!r}",
+                "tolerance",
             )
         return finite("tolerance", value)
 
@@ -229,10 +230,10 @@ class Integrator:
 
 _BUILT_IN = (
     "lagrangian.discrete_lagrangian", "lagrangian.unreduced", "lagrangian.galerkin", "lagrangian.exact_discrete",
-    "lie_group.lie_variational", "splitting.splitting", "splitting.reversible_steps", "runge_kutta.runge_kutta",
-    "runge_kutta.dormand_prince", "runge_kutta.gauss", "runge_kutta.kahan", "lie_group.lie_runge_kutta",
+    "lie_group.variational", "splitting.composition", "splitting.reversible", "runge_kutta.explicit",
+    "runge_kutta.dormand_prince", "runge_kutta.gauss", "runge_kutta.kahan", "lie_group.runge_kutta",
     "lie_group.energy_momentum", "lie_group.generalised_alpha", "runge_kutta.collective_gauss", "library.scipy_ivp",
-    "taylor.taylor", "taylor.series", "library.exact", "engines.engines",
+    "taylor.heyoka", "taylor.series", "library.exact", "engines.engines",
 )  # fmt: skip
 ENTRY_POINTS = "symtop.integrators"  # an Integrator, or a function that returns several
 
@@ -360,3 +361,40 @@ def variants(observe: str | None = None) -> list[Integrator]:
     showing = None if observe is None else SMALLEST_FIRST[one_of("observe", observe, SMALLEST_FIRST)]
     pairs = ((entry, chart) for entry in methods().values() for chart in entry.charts())
     return [entry.variant(chart) for entry, chart in pairs if showing is None or chart in showing]
+
+
+@functools.cache
+def bibliography() -> dict[str, str]:
+    """The text of every entry, by its key. An entry begins with @ in the first column and ends with } there."""
+    text = resources.files("symtop.methods").joinpath("citations.bib").read_text(encoding="utf-8")
+    return {
+        match["key"]: match[0]
+        for match in re.finditer(r"^@\w+\{(?P<key>[^,\s]+),$.*?^\}", text, re.MULTILINE | re.DOTALL)
+    }
+
+
+def citation_keys(method: Integrator) -> list[str]:
+    """The entries that an integrator's `reference` names; a reference may also be plain words."""
+    return [key for key in method.reference.replace(",", " ").split() if key in bibliography()]
+
+
+def citation(name: "str | Integrator") -> str:
+    """BibTeX of the source of an integrator, by its name.
+
+    Raises SymtopError for an unknown name, or if the integrator names no source that is known here.
+    """
+    method = integrator(name)
+    named = citation_keys(method)
+    if not named:
+        raise SymtopError(
+            f"integrator {method.name!r} names no source that is known here (its reference is {method.reference!r})"
+        )
+    return "\n\n".join(bibliography()[key] for key in named)
+
+
+@functools.cache
+def paragraphs() -> dict[str, str]:
+    """The text under each heading ``## NAME``, on one line."""
+    text = resources.files("symtop.methods").joinpath("about.md").read_text(encoding="utf-8")
+    _, *sections = re.split(r"^## (.+)$", text, flags=re.MULTILINE)
+    return {name: " ".join(body.split()) for name, body in zip(sections[::2], sections[1::2], strict=True)}

@@ -3,7 +3,7 @@
 In the chart of `oscillators`, with Z_n = exp(-i n delta) chi(n h) and s = |Z|^2,
 
     Z_{n+1} + Z_{n-1} = 2 A Z_n/(1 + B s_n)        A = sqrt((P - e1)(P - e2)(P - e3)/D^3),  B = -sigma/D,  D = P - b
-    P = wp(h) (`symtop.model.exact.weierstrass`)         delta = sigma J int_0^h dt/(wp(t) - b) = sigma J R_J(P - e_i,
+    P = wp(h) (`symtop.model.exact.elliptic`)         delta = sigma J int_0^h dt/(wp(t) - b) = sigma J R_J(P - e_i,
     D)/3
 
 for each of the two oscillators: McMillan's map in a plane. Why: chi(t+h) (wp(t) - wp(h)) has poles of order 2 at most
@@ -66,14 +66,20 @@ import numpy as np
 from symtop.core.jit import fused, register_jitable, set_item
 from symtop.core.jit_functions import two_product
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import accumulate_plainly, driver
-from symtop.methods.framework.one_loop_lanes import one_loop
+from symtop.methods.framework.lanes import Lanes, one_loop
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome
-from symtop.methods.lagrangian.exact_map import Map, numbers
-from symtop.methods.lagrangian.oscillators import OscillatorTop, attitude_state, axis_state, on_oscillators
+from symtop.methods.lagrangian.oscillators import (
+    Map,
+    OscillatorTop,
+    attitude_state,
+    axis_state,
+    numbers,
+    on_oscillators,
+)
+from symtop.methods.vectors import accumulate_plainly
 
 SHARE = 0.5  # of what breaks |chi| = 1 that a step takes off: all of it would feed on the rounding that the loop sums
 IDLE = 2e-15  # |chi|^2 may be off by as much: below that, what is seen of it is the rounding of |Z|^2
@@ -278,8 +284,8 @@ def _in_lanes(rule: Map) -> Lanes:
     return _lanes
 
 
-march_axis = driver(begin, increment, observe, enter, present_axis, accumulate_plainly, lanes=_in_lanes)
-march_attitude = driver(begin, increment, observe, enter, present_attitude, accumulate_plainly, lanes=_in_lanes)
+march_axis = kernel_loop(begin, increment, observe, enter, present_axis, accumulate_plainly, lanes=_in_lanes)
+march_attitude = kernel_loop(begin, increment, observe, enter, present_attitude, accumulate_plainly, lanes=_in_lanes)
 
 
 def built_in() -> list[Integrator]:

@@ -19,14 +19,13 @@ from symtop.methods.framework.calling import solve
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import W
 from symtop.methods.framework.many import Many, members_of
-from symtop.methods.framework.outcomes import LEFT_CHART, NOT_FINITE, OK, OUTCOMES
-from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUTCOMES, Plan
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
 from symtop.model import charts
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.charts import View
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import SymmetricTop
-from symtop.model.view import View
 from symtop.run.sampling import Schedule, nutation_periods, schedule
 
 Array = NDArray[np.float64]

@@ -1,0 +1,140 @@
+"""What a step from elsewhere is like to call: the same twice, from any start, in double precision, backwards.
+
+A one-step method is a function of its arguments. A call is repeated, then repeated after a step somewhere else: numbers
+that depend on what was called before are those of a step that keeps something, such as the last force, and its runs
+depend on the runs before. Where the loop over steps is somebody else's, a run of n + m steps is compared with a run of
+n and one of m: a loop that sums its time and stops too late or too soon is a step away, a method of several steps less.
+"""
+
+import contextlib
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from symtop.core.errors import SymtopError
+from symtop.judging.adapters.adapter import Stepper
+from symtop.judging.claims.subject import Subject
+from symtop.judging.findings import Finding, Measured, inapplicable
+from symtop.measure.step_map import generic_start
+from symtop.model.scenes import Scene
+from symtop.model.top import Angles
+
+SHARE = 0.0137  # of a nutation: the step that is called
+SAME = 1e-13  # relative: what threads may leave between two calls
+REPEATS, SECONDS = 250, 0.3  # calls with the same arguments, or as many as there is time for
+NOTHING, STANDS = 1e-8, 1e-6  # a step of so little moves a state by less than this, relative
+FAR = 200.0  # times the step: one that most methods do not survive
+PARTS = ((20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000))  # runs that are cut in two
+REMEMBERED = 1e-9  # of a step: a last slope that is kept, and not computed anew, makes 1e-10 in 2000 steps
+MISSED = 0.2  # of a step: a method of several steps starts anew with less
+ELSEWHERE = 0.3  # rad and units of the rates, from the start that is called
+
+
+def measure(subject: Subject) -> list[Finding]:
+    """The finding on the calls; refuted if a step is not a function of its arguments."""
+    if not subject.method.fixed_step:
+        return [inapplicable("calls", "it has no step of a given length")]
+    return [_calls(subject.stepper, subject.scene)]
+
+
+def _refuted(kind: str, why: str, value: float = math.nan, resolution: float = SAME) -> Finding:
+    return Finding("calls", "a function", Measured(kind), "refuted", why, value, resolution)
+
+
+def _calls(stepper: Stepper, scene: Scene) -> Finding:
+    h, start = SHARE * scene.time_scale(), generic_start(scene)
+
+    def once(at: Angles, step: float) -> Any:
+        par, state = stepper.form.prepare(scene.top, at)
+        return stepper.march(scene.top, par, np.array(state), step, np.array([1])).states[0]
+
+    other = Angles(*(getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__))
+    first = once(start, h)
+    if not np.isfinite(first).all():
+        kind = f"returns {'NaN' if np.isnan(first).any() else 'infinity'}"
+        return _refuted(kind, f"a step of h = {h:.3g} {kind}", resolution=math.nan)
+    again, third = once(start, h), once(start, h)
+    count, differs = (0, 0.0) if stepper.own_loop else _repeated(lambda: once(start, h), third)
+    once(other, h)
+    with contextlib.suppress(SymtopError):
+        once(other, FAR * h)  # which may fail, and must not be remembered either
+    after = once(start, h)
+    twice, later = _apart(again, third), max(_apart(first, again), _apart(first, after), _apart(again, after))
+    if twice > SAME:
+        why = f"two calls with the same arguments differ by {twice:.1e}"
+        why = why if np.isfinite(twice) else "of calls with the same arguments one returns NaN and another does not"
+        return _refuted("not repeatable", why, twice)
+    keeps = "it keeps something between calls"
+    if later > SAME:
+        return _refuted("keeps state", f"{keeps}: after a step elsewhere the same call differs by {later:.1e}", later)
+    if differs > SAME:
+        why = f"{keeps}: call {count} with the same arguments differs by {differs:.1e}"
+        return _refuted("keeps state", why, differs)
+    still = np.array(stepper.form.prepare(scene.top, other)[1])
+    moved = _apart(still, _alike(stepper.chart, still, once(other, NOTHING * h)))
+    if moved > STANDS:
+        why = f"it keeps something of its first start: from another one, a step of {NOTHING * h:.0e} moves by "
+        return _refuted("keeps state", f"{why}{moved:.1e}", moved, STANDS)
+    traits = _traits(stepper, first)
+    if stepper.own_loop:
+        missed, why = _steps_missed(stepper, scene, h / 10.0)
+        if missed > MISSED:
+            return _refuted("miscounts steps", why, missed, MISSED)
+        traits |= {"remembers": why} if missed > REMEMBERED else {}
+    try:
+        once(start, -h)
+    except SymtopError as error:
+        traits["forward only"] = str(error)
+    why = "; ".join(["a call gives the same numbers again, and after a step elsewhere", *traits.values()])
+    return Finding("calls", "", Measured(", ".join(traits) or "a function"), "measured", why, later, SAME)
+
+
+def _repeated(call: Callable[[], Any], state: Any) -> tuple[int, float]:
+    """The first of many calls that differs, counted from the one that gave `state`, and by how much; else the last."""
+    began, count, gap = time.monotonic(), 0, 0.0
+    while count < REPEATS and gap <= SAME and time.monotonic() - began < SECONDS:
+        count, gap = count + 1, _apart(state, call())
+    return count, gap
+
+
+def _steps_missed(stepper: Stepper, scene: Scene, h: float) -> tuple[float, str]:
+    """How far a run is from two runs of as many steps, in steps, and a clause; the largest of `PARTS`."""
+    par, state = stepper.form.prepare(scene.top, generic_start(scene))
+    start = np.array(state)
+
+    def run(y: Any, steps: int) -> Any:
+        return stepper.march(scene.top, par, y.copy(), h, np.array([steps])).states[0]
+
+    a_step = float(np.max(np.abs(run(start, 1) - start)))
+    if a_step == 0.0:  # it stands still, which is not to count wrongly
+        return 0.0, ""
+    gaps = {(n, m): float(np.max(np.abs(run(start, n + m) - run(run(start, n), m)))) / a_step for n, m in PARTS}
+    n, m = max(PARTS, key=lambda parts: gaps[parts])
+    return gaps[n, m], f"a run of {n + m} steps is {gaps[n, m]:.2g} steps from one of {n} and one of {m}"
+
+
+def _alike(chart: str, guide: Any, state: Any) -> Any:
+    """The state, its q or angles as near to those of `guide` as they can be: -q is q, and angles have whole turns."""
+    if chart == "attitude":
+        return np.concatenate([np.copysign(1.0, guide[:4] @ state[:4]) * state[:4], state[4:]])
+    if chart == "angles":
+        return np.concatenate([state[:3] - 2.0 * math.pi * np.rint((state[:3] - guide[:3]) / 2.0 / math.pi), state[3:]])
+    return state
+
+
+def _apart(first: Any, second: Any) -> float:
+    """Largest difference, relative to the largest number."""
+    size = float(np.max(np.abs(first)))
+    apart = float(np.max(np.abs(first - second))) / max(size, 1e-300)
+    return apart if np.isfinite(apart) else math.inf
+
+
+def _traits(stepper: Stepper, state: Any) -> dict[str, str]:
+    """What else a call is like: in two words, and in a clause."""
+    traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}
+    if (state == state.astype(np.float32)).all():
+        traits["single precision"] = "its numbers are those of single precision"
+    return traits

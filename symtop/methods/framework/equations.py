@@ -1,0 +1,155 @@
+"""The top's equations as a library for differential equations wants them: one right-hand side y' = f(y) a chart.
+
+    chart      y                                       multiplications, divisions   sines, cosines   ends
+    angles     (theta, phi, psi, theta', phi', psi')                           16                2   theta = 0 and pi
+    axis       (e, L)                                                          12                0   nowhere
+    attitude   (q, L)                                                          29                0   nowhere
+
+(see `angles` and `space`). In each of the three, energy and momenta are functions of the state, so that whatever a
+method does to them shows. Every Runge-Kutta method, compiled or a library's, takes f from here, so that method and
+chart can be varied one at a time; `field` gives it to anybody's solver. A Runge-Kutta method keeps what is linear in
+its state, and no explicit one keeps more: p_phi = L_z in the space frame, nothing in angles.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.core.errors import SymtopError, one_of
+from symtop.core.jit import compile_kernel, register_jitable
+from symtop.core.numbers import real_numbers
+from symtop.methods.framework import angles, space
+from symtop.methods.framework.angles import BareTop, field_angles
+from symtop.methods.framework.plan import OUTCOMES, Array, Run
+from symtop.methods.framework.space import SpaceTop, field_attitude, field_axis
+from symtop.model.charts import CHARTS, space_momenta
+from symtop.model.top import Angles, SymmetricTop
+
+
+class Formulation(NamedTuple):
+    """The equations in one chart. `field`, `ended` and `observe` are plain Python on tuples and compile as they are."""
+
+    field: Callable[[Any, Any], Any]  # (par, state) -> time derivative
+    ended: Callable[[Any], int]  # outcome of a state: OK, or how the chart was left
+    observe: Callable[..., Any]  # (par, rule, before, dstate, h) -> p_phi and p_psi after a step
+    prepare: Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]  # parameters and state of a start
+    present: (
+        Callable[[Any, Array, Array], Array] | None
+    )  # (par, times, states) -> states of the chart that `simulate` shows, where they differ
+    momenta: Callable[[Any, Array], tuple[Array, Array]]  # (par, states) -> p_phi and p_psi of samples
+
+
+def _axis_momenta(par: Any, states: Array) -> tuple[Array, Array]:
+    return space_momenta("axis", states)
+
+
+def _attitude_momenta(par: Any, states: Array) -> tuple[Array, Array]:
+    return space_momenta("attitude", states)
+
+
+FORMULATIONS = {
+    "angles": Formulation(
+        angles.field_angles,
+        angles.ended_angles,
+        angles.observe_angles,
+        angles.with_rates,
+        angles.to_angles,
+        angles.sampled_momenta,
+    ),
+    "axis": Formulation(space.field_axis, space.ended_space, space.observe_axis, space.on_axis, None, _axis_momenta),
+    "attitude": Formulation(
+        space.field_attitude, space.ended_space, space.observe_attitude, space.on_attitude, None, _attitude_momenta
+    ),
+}
+
+
+def as_run(
+    form: Formulation, par: Any, times: Array, states: Array, steps: int, evaluations: int, outcome: int, reached: float
+) -> Run:
+    """Samples of the state that was integrated, shape (samples, dimension), with both momenta recomputed from it."""
+    p_phi, p_psi = form.momenta(par, states)
+    shown = states if form.present is None else form.present(par, times, states)
+    return Run(shown, p_phi, p_psi, steps, evaluations, 0, OUTCOMES[outcome], reached)
+
+
+@register_jitable
+def _angles(I1: Any, I3: Any, mgl: Any, y: Any) -> Any:
+    return field_angles(BareTop(I1, I3, mgl), y)
+
+
+@register_jitable
+def _axis(I1: Any, I3: Any, mgl: Any, y: Any) -> Any:
+    return field_axis(SpaceTop(I1, mgl, 0.0), y)
+
+
+@register_jitable
+def _attitude(I1: Any, I3: Any, mgl: Any, y: Any) -> Any:
+    """The kernels hold L . e as a parameter of the run; here it is taken from the state."""
+    w, x, v, z = y[0], y[1], y[2], y[3]
+    along = 2.0 * (x * z + w * v) * y[4] + 2.0 * (v * z - w * x) * y[5] + (w * w - x * x - v * v + z * z) * y[6]
+    return field_attitude(SpaceTop(I1, mgl, along * (1.0 / I3 - 1.0 / I1)), y)
+
+
+_RIGHT = {"angles": _angles, "axis": _axis, "attitude": _attitude}
+_SHAPES = {"angles": (6,), "axis": (6,), "attitude": (7,)}
+
+
+@functools.cache
+def _kernel(chart: str) -> Any:
+    """f(I1, I3, mgl, y) -> y' of a chart, compiled."""
+    right = _RIGHT[chart]
+
+    def kernel(I1, I3, mgl, y):  # type: ignore[no-untyped-def]
+        return np.array(right(I1, I3, mgl, y))
+
+    return compile_kernel(kernel)
+
+
+class Field:
+    """y' = f(t, y) of a chart of one top; `kernel` with `parameters` is the same for code that is compiled itself."""
+
+    def __init__(self, chart: str, top: SymmetricTop, *, compiled: bool) -> None:
+        self.chart, self.top, self.compiled = chart, top, compiled
+        self.parameters = top.I1, top.I3, top.mgl
+        self._shape = _SHAPES[chart]
+
+    def __call__(self, _: float, y: Any) -> Array:
+        """y' at any time: an array like y. Raises SymtopError for a y that is no state of the chart."""
+        if not isinstance(y, np.ndarray):
+            y = real_numbers("y", y)
+        if y.shape != self._shape:  # compiled code would read what lies behind the array
+            raise SymtopError(f"y must have the shape {self._shape} in the chart {self.chart}, not {y.shape}")
+        if self.compiled:
+            return np.asarray(self.kernel(*self.parameters, y))
+        return np.array(_RIGHT[self.chart](*self.parameters, np.asarray(y, dtype=float).tolist()))
+
+    @property
+    def kernel(self) -> Any:
+        """The compiled function (I1, I3, mgl, y) -> y', which other compiled code may call with `parameters`."""
+        return _kernel(self.chart)
+
+    def state(self, start: Angles) -> Array:
+        """A start as y."""
+        return np.array(FORMULATIONS[self.chart].prepare(self.top, start)[1], dtype=float)
+
+
+def field(chart: str, top: SymmetricTop, *, compiled: bool = False) -> Field:
+    """The equations of a top as a function f(t, y) -> y', for ``solve_ivp`` or a solver of one's own.
+
+    `chart` says what y is, an array of floats:
+
+        angles     (6,)  theta, phi, psi, theta', phi', psi'     rad and rad per unit time; NaN at theta = 0 and pi
+        axis       (6,)  e (unit vector along the axis) and L    both in the space frame, z up; L in units of I1 x rate
+        attitude   (7,)  q (w, x, y, z; body to space) and L     as for the axis
+
+    ``f.state(start)`` is an `Angles` as y. With `compiled` each call runs compiled code (y must be an array of floats);
+    ``f.kernel(*f.parameters, y)`` can be called from functions that numba compiles; it does not look at the shape of y.
+
+    Raises SymtopError for a chart that is none of the three, and for a top that is none; so does a call for a y that
+    has not the shape of the chart.
+    """
+    if not isinstance(top, SymmetricTop):
+        raise SymtopError(f"top must be a SymmetricTop, not {type(top).__name__}")
+    return Field(one_of("chart", chart, CHARTS), top, compiled=compiled)

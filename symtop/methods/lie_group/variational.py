@@ -1,0 +1,224 @@
+"""Variational integrators on the rotation group: Lee, Leok and McClamroch's, and discrete Euler-Poincare's.
+
+A step of length h is a kick by half of gravity's impulse, a rotation that a discrete Lagrangian of the free body gives,
+and the other half of the kick:
+
+    L += h tau(e)/2;     a = (h/2) L,   solve a = A(u) for the Cayley vector u,   q <- (1, u) q/sqrt(1 + u^2);
+    L += h tau(e)/2.
+
+With J the inertia in space at the start of the step, J x = I1 x + (I3 - I1)(e.x) e,
+
+    Moser-Veselov     a = (J u + u x J u)/(1 + u^2)           action tr((1 - F) J_d)/h, F = R_0^T R_1: J_d is not J
+    Euler-Poincare    a = J u + u x J u + (u.J u) u           action h W.J W/2 with h W = 2 u: Cayley's retraction
+
+The first is the discrete rigid body of Moser and Veselov, in the form h Pi = F J_d - J_d F^T of Lee, Leok and
+McClamroch; with the kicks it is their Lie-group variational integrator. RATTLE on the body's three directors, with the
+mass matrix J_d and the constraint that they are orthonormal, is the same map (McLachlan, Zanna 2005; a test steps it).
+
+Symmetry makes three equations one. With d = I3 - I1, x = u.e, u = x e + u' and a = A e + a', both are j x = n A and
+i u' + d x u' x e = n a', and what is left is an equation for one number,
+
+    Moser-Veselov     n = 1 + u^2,     i = I1,       j = I3          Newton's from n = 1, monotone
+    Euler-Poincare    k = u.J u,       i = I1 + k,   j = I3 + k,     n = 1         from k = 0, in an interval
+
+The first has no solution where a body with I1 = I3 would have to turn by more than a right angle, h|L| > I1, and a run
+ends there as `not_converged`; the second has one at any step. Both are symplectic, symmetric and of order 2; p_phi and
+p_psi are kept by Noether's theorem. Five steps with Suzuki's shares are of order 4. The body's spin is turned in the
+step, by arcsin(h psi') with the first and too little by (h psi')^3/3 with the second.
+Sources: Moser, Veselov, Commun. Math. Phys. 139 (1991) 217; Lee, Leok, McClamroch, Comput. Methods Appl. Mech. Eng. 196
+(2007) 2907; Bou-Rabee, Marsden, Found. Comput. Math. 9 (2009) 197; McLachlan, Zanna, Found. Comput. Math. 5 (2005) 87.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from symtop.core.jit import register_jitable
+from symtop.methods.framework.lanes import Lanes
+from symtop.methods.framework.plan import NOT_CONVERGED, OK
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, iterated, lie_loop, moved
+from symtop.methods.splitting.coefficients import SUZUKI_4
+from symtop.methods.vectors import cross, dot, plus, scaled
+
+MOST = 60  # iterations of a step; 2 to 5 are the rule
+ENOUGH = 1e-10  # a relative correction whose square is below rounding
+MOSER_VESELOV, EULER_POINCARE = 0.0, 1.0
+
+
+class Variational(NamedTuple):
+    """Which discrete Lagrangian, and the parts that a step is composed of."""
+
+    kind: float
+    shares: tuple[float, ...] = (1.0,)
+
+
+@register_jitable
+def _one(par: Any, A: float, square: float) -> Any:
+    """The first n of the discrete rigid body."""
+    return (1.0,)
+
+
+@register_jitable
+def _next_n(par: Any, A: float, square: float, x: Any) -> Any:
+    """Newton's next n, whether it is the last, and whether there is none."""
+    d, rate, n = par.I3 - par.I1, A / par.I3, x[0]
+    along = rate * rate * n * n
+    D = par.I1 * par.I1 + d * d * along
+    gap = 1.0 + along + square * n * n / D - n
+    slope = 1.0 - 2.0 * along / n - 2.0 * square * n * par.I1 * par.I1 / (D * D)
+    n += gap / slope
+    return (n,), gap <= ENOUGH * slope * n, not slope > 0.0
+
+
+@register_jitable
+def _of_n(par: Any, A: float, x: Any) -> Any:
+    """n, i and x of the discrete rigid body."""
+    return x[0], par.I1, A / par.I3 * x[0]
+
+
+@register_jitable
+def _interval(par: Any, A: float, square: float) -> Any:
+    """The first k of Cayley's retraction, and the interval that it lies in."""
+    return 0.0, 0.0, square / par.I1 + A * A / par.I3
+
+
+@register_jitable
+def _next_k(par: Any, A: float, square: float, x: Any) -> Any:
+    """Newton's next k, the middle of the interval where that leaves it, and whether it is the last."""
+    k, low, high = x
+    d, i, j = par.I3 - par.I1, par.I1 + k, par.I3 + k
+    x = A / j
+    bent = d * d * x * x
+    D = i * i + bent
+    gap = par.I1 * square / D + par.I3 * x * x - k
+    slope = 1.0 + 2.0 * par.I1 * square * (i - bent / j) / (D * D) + 2.0 * par.I3 * x * x / j
+    low, high = (k, high) if gap > 0.0 else (low, k)
+    after = k + gap / slope
+    after = after if low <= after <= high else 0.5 * (low + high)
+    return (after, low, high), abs(after - k) <= ENOUGH * j, False
+
+
+@register_jitable
+def _of_k(par: Any, A: float, x: Any) -> Any:
+    """n, i and x of Cayley's retraction."""
+    return 1.0, par.I1 + x[0], A / (par.I3 + x[0])
+
+
+class Equation(NamedTuple):
+    """The equation for one number, in functions of what a holds along the axis and of the square of what lies across.
+
+    first(par, A, square) -> x
+    after(par, A, square, x) -> (x, ended, lost)      one iteration
+    rates(par, A, x) -> (n, i, x)
+    """
+
+    first: Callable[..., Any]
+    after: Callable[..., Any]
+    rates: Callable[..., Any]
+
+
+RIGID_BODY, RETRACTION = Equation(_one, _next_n, _of_n), Equation(_interval, _next_k, _of_k)
+
+
+def _solving(equation: Equation) -> Callable[..., Any]:
+    """``(par, A, square)`` to n, i and x, iterations, and did they converge."""
+    first, after, rates = equation
+
+    def solve(par, A, square):  # type: ignore[no-untyped-def]
+        x = first(par, A, square)
+        for k in range(MOST):
+            x, ended, lost = after(par, A, square, x)
+            if ended or lost:
+                return (*rates(par, A, x), k + 1, not lost)
+        return (*rates(par, A, x), MOST, False)
+
+    registered: Callable[..., Any] = register_jitable(solve)
+    return registered
+
+
+_moser_veselov, _euler_poincare = _solving(RIGID_BODY), _solving(RETRACTION)
+
+
+@register_jitable
+def _kicked(par: Any, e: Any, L: Any, half: float) -> Any:
+    """Half a step's momentum after half of the kick, a: what is across the axis and what is along it."""
+    a = scaled(half, plus(L, 1.0, scaled(half, gravity(par, e))))
+    A = dot(a, e)
+    return plus(a, -A, e), A
+
+
+@register_jitable
+def _rotated(par: Any, e: Any, across: Any, half: float, n: float, i: float, x: float) -> Any:
+    """The rotation of n, i and x, and the change of L with both halves of the kick."""
+    bent = (par.I3 - par.I1) * x
+    side = plus(scaled(i, across), -bent, cross(across, e))
+    u = plus(scaled(x, e), n / (i * i + bent * bent), side)
+    m, v = cayley(u)
+    kick = scaled(half, gravity(par, e))
+    return m, v, plus(kick, half, gravity(par, plus(e, 1.0, moved(m, v, e))))
+
+
+def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
+    """One step; the work counted is the number of Newton iterations."""
+    half = 0.5 * h
+    across, A = _kicked(par, e, L, half)
+    square = dot(across, across)
+    if rule.kind == MOSER_VESELOV:
+        n, i, x, work, converged = _moser_veselov(par, A, square)
+    else:
+        n, i, x, work, converged = _euler_poincare(par, A, square)
+    m, v, dL = _rotated(par, e, across, half, n, i, x)
+    return m, v, dL, work, OK if converged else NOT_CONVERGED
+
+
+def _side_by_side(equation: Equation, unknowns: int) -> Lanes:
+    """The same step in lanes, with so many numbers in x."""
+    first, after, rates = equation
+
+    def start(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
+        across, A = _kicked(par, e, L, 0.5 * h)
+        square = dot(across, across)
+        return (*e, *across, A, square), first(par, A, square)
+
+    def again(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
+        return after(par, opened[6], opened[7], x)
+
+    def close(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
+        n, i, along = rates(par, opened[6], x)
+        return (*_rotated(par, opened[:3], opened[3:6], 0.5 * h, n, i, along), carry)
+
+    return iterated(start, again, close, MOST, opened=8, unknowns=unknowns)
+
+
+_LANES = {MOSER_VESELOV: _side_by_side(RIGID_BODY, 1), EULER_POINCARE: _side_by_side(RETRACTION, 3)}
+
+
+march = lie_loop(turn, lanes=lambda rule: _LANES[rule.kind])
+
+
+def lie_variational(name: str, rule: Variational, order: int, summary: str, reference: str) -> Integrator:
+    """The variational integrator of a discrete Lagrangian and a composition."""
+    return Integrator(
+        name=name, family="discrete-lagrangian", summary=summary, reference=reference, order=order, explicit=False,
+        symplectic=True, symmetric=True, conserves=frozenset({"p_phi", "p_psi", "axis_length"}),
+        solvers=in_both_charts(march, rule, SPUN, 1, implicit=True),
+    )  # fmt: skip
+
+
+def built_in() -> list[Integrator]:
+    """Lee, Leok and McClamroch's integrator, its composition, and that of Cayley's retraction."""
+    lee, cayley_map = "lee-leok-mcclamroch-2007 moser-veselov-1991 mclachlan-zanna-2005", "bou-rabee-marsden-2009"
+    return [
+        lie_variational(
+            "lie-variational", Variational(MOSER_VESELOV), 2,
+            "Lie-group variational integrator: kicks around a discrete rigid body of Moser and Veselov", lee,
+        ),
+        lie_variational(
+            "lie-variational-suzuki-4", Variational(MOSER_VESELOV, SUZUKI_4.drift), 4,
+            "five steps of the Lie-group variational integrator", f"{lee} suzuki-1990",
+        ),
+        lie_variational(
+            "euler-poincare", Variational(EULER_POINCARE), 2,
+            "discrete Euler-Poincare equations with Cayley's retraction, between kicks", cayley_map,
+        ),
+    ]  # fmt: skip

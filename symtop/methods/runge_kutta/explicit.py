@@ -1,0 +1,302 @@
+"""Explicit Runge-Kutta methods of fixed step, from any Butcher tableau.
+
+    k_i = f(y + h sum_{j<i} a_ij k_j),    i = 1 .. s,        y+ = y + h sum_i b_i k_i
+
+One kernel, three charts (`equations`): the unreduced angles (theta, phi, psi, theta', phi', psi'), and the space
+frame, (e, L), where f is quadratic, or (q, L), which shows the spin angle as well; it has no pole. The top's equations
+are autonomous, so that c = sum_j a_ij serves only to check what a user gives.
+
+`rk4` is Kutta's classical method: order 4, four evaluations of f a step. No explicit Runge-Kutta method is symplectic
+or symmetric: the errors of energy and of every constant that is not linear in the state grow linearly with time. L_z =
+p_phi is linear in (e, L) and in (q, L) and stays; in angles nothing does. Not to be confused with `rk45`, which chooses
+its steps, nor with Gauss methods, which are implicit and keep what rk4 loses.
+
+In lanes a step is one loop over the lanes. Its stages and the sums of slopes are written out, term by term in the order
+of the kernel for one: slopes stay in registers as far as these reach (with a loop for each stage, rk4 takes 1.2 times
+as long in the space frame). The table holds h a, row by row, and h b. A kernel compiles for each number of stages.
+Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.1.
+"""
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from reprlib import repr as short
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop.core.errors import SymtopError, row
+from symtop.core.jit import register_jitable, set_item
+from symtop.core.simd import wide_vectors
+from symtop.methods.framework.angles import BareTop
+from symtop.methods.framework.equations import FORMULATIONS, Formulation
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.lanes import Lanes, W, column, put
+from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.plan import OK
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.framework.space import SpaceTop
+from symtop.methods.vectors import accumulate
+
+
+@register_jitable
+def begin_in_lanes(par: Any, rule: Any, state: Any, h: float) -> Any:
+    """Nothing is carried from step to step, and an empty tuple has no type of entry."""
+    return (0.0,)
+
+
+def lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
+    """h a and h b of one member in the order in which a step reads them."""
+    n = len(rule.b)
+    weights = n * (n - 1) // 2
+    for i in range(weights):
+        numbers[i] = h * rule.a[i]
+    for i in range(n):
+        numbers[weights + i] = h * rule.b[i]
+
+
+def read(numbers: Any) -> Any:
+    """What `observe` sees of the rule, which asks for nothing."""
+    return numbers
+
+
+def _sum(add: Callable[..., Any], terms: int, weights: int) -> Callable[..., Any]:
+    """``(place, slopes, table, j)`` to place + w_1 k_1 + ... of so many terms, whose weights begin at this number."""
+    if terms == 0:
+
+        def added(place, slopes, table, j):  # type: ignore[no-untyped-def]
+            return place
+    else:
+        before, last, weight = _sum(add, terms - 1, weights), terms - 1, weights + terms - 1
+
+        def added(place, slopes, table, j):  # type: ignore[no-untyped-def]
+            return add(before(place, slopes, table, j), slopes[last], table[weight * W + j])
+
+    registered: Callable[..., Any] = register_jitable(added)
+    return registered
+
+
+def _stages(field: Callable[..., Any], add: Callable[..., Any], count: int, tops: int) -> Callable[..., Any]:
+    """``(par, state, table, j)`` to the first `count` slopes, a tuple of tuples."""
+    if count == 1:
+
+        def slopes(par, state, table, j):  # type: ignore[no-untyped-def]
+            return (field(par, state),)
+    else:
+        before = _stages(field, add, count - 1, tops)
+        place = _sum(add, count - 1, tops + (count - 1) * (count - 2) // 2)
+
+        def slopes(par, state, table, j):  # type: ignore[no-untyped-def]
+            made = before(par, state, table, j)
+            return (*made, field(par, place(state, made, table, j)))
+
+    registered: Callable[..., Any] = register_jitable(slopes)
+    return registered
+
+
+def explicit_in_lanes(
+    field: Callable[..., Any], add: Callable[..., Any], ended: Callable[..., Any], *, top: Any, dimension: int
+) -> Callable[[Any], Lanes]:
+    """Explicit tableaux in lanes: ``add(place, slope, weight)`` is a term, ``ended(state, step)`` a step's outcome."""
+    d, zeros, numbers = dimension, (0.0,) * dimension, (0.0,) * len(top._fields)
+    tops, step_at, flag = len(numbers), 2 * d, 3 * d
+
+    @functools.cache
+    def lanes(count: int) -> Lanes:
+        stages, total = _stages(field, add, count, tops), _sum(add, count, tops + count * (count - 1) // 2)
+
+        def step(block, table):  # type: ignore[no-untyped-def]
+            wide_vectors()
+            for j in range(W):
+                state, par = column(block, 0, j, zeros), top(*column(table, 0, j, numbers))
+                step = total(zeros, stages(par, state, table, j), table, j)
+                block[flag * W + j] = block[flag * W + j] if ended(state, step) == OK else 1.0
+                moved, low = accumulate(state, column(block, d, j, zeros), step)
+                put(block, 0, j, moved)
+                put(block, d, j, low)
+                put(block, step_at, j, step)
+
+        return Lanes(step, lay, read, _size, top, d, 1, effort=_evaluations, begin=begin_in_lanes)
+
+    return lambda rule: lanes(len(rule.b))
+
+
+def _size(rule: Any) -> int:
+    n = len(rule.b)
+    return n * (n + 1) // 2
+
+
+def _evaluations(rule: Any) -> int:
+    return len(rule.b)
+
+
+Row = Sequence[float] | NDArray[Any]
+Rows = Sequence[Row] | NDArray[Any]
+
+TABLE_ROUNDING = 1e-12  # sums of a tableau may be off by this: coefficients come with 15 digits or more
+
+
+class Tableau(NamedTuple):
+    """An explicit Butcher tableau; `a` is its strict lower triangle row by row: a21, a31, a32, a41, ..."""
+
+    a: tuple[float, ...]
+    b: tuple[float, ...]
+
+
+@register_jitable
+def store(slopes: Any, i: int, slope: Any) -> None:
+    """Write a slope into row i."""
+    for m in range(len(slope)):
+        slopes[i, m] = slope[m]
+
+
+@register_jitable
+def _row(slopes: Any, i: int, like: Any) -> Any:
+    """Row i as a tuple as long as `like`."""
+    for m in range(len(like)):
+        like = set_item(like, m, slopes[i, m])
+    return like
+
+
+@register_jitable
+def add(place: Any, slope: Any, weight: float) -> Any:
+    """place + weight slope. With the stages as the inner loop rk4 takes 1.6 times as long."""
+    for m in range(len(place)):
+        place = set_item(place, m, place[m] + weight * slope[m])
+    return place
+
+
+@register_jitable
+def plus(state: Any, step: Any) -> Any:
+    """state + step, component by component."""
+    total = state
+    for m in range(len(state)):
+        total = set_item(total, m, state[m] + step[m])
+    return total
+
+
+@register_jitable
+def later_stages(field: Any, par: Any, a: Any, stages: int, state: Any, slopes: Any, h: float) -> None:
+    """Fill the rows 1 .. stages-1 of `slopes`; row 0 is the slope at the start of the step."""
+    row = 0
+    for i in range(1, stages):
+        place = state
+        for j in range(i):
+            place = add(place, _row(slopes, j, place), h * a[row + j])
+        row += i
+        store(slopes, i, field(par, place))
+
+
+@register_jitable
+def weighted(weights: Any, state: Any, slopes: Any, h: float) -> Any:
+    """h sum_i weights_i slopes_i, a tuple as long as the state."""
+    step = state
+    for m in range(len(state)):
+        step = set_item(step, m, 0.0)
+    for i in range(len(weights)):
+        step = add(step, _row(slopes, i, step), h * weights[i])
+    return step
+
+
+@register_jitable
+def explicit_step(field: Any, par: Any, rule: Any, state: Any, slopes: Any, h: float) -> Any:
+    """Increment of one step; `slopes` is working space, shape (stages, dimension)."""
+    store(slopes, 0, field(par, state))
+    later_stages(field, par, rule.a, len(rule.b), state, slopes, h)
+    return weighted(rule.b, state, slopes, h)
+
+
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+    """Working space for the slopes of any tableau; as fast as C that knows the number of stages (`make bench`)."""
+    return np.empty((len(rule.b), len(state)))
+
+
+def _loop(form: Formulation, top: Any, dimension: int) -> Loop:
+    """The loop on states of one formulation; the work counted is the number of force evaluations."""
+    field, ended_at = form.field, form.ended
+
+    @register_jitable
+    def ended(state, step):  # type: ignore[no-untyped-def]
+        return ended_at(plus(state, step))
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        step = explicit_step(field, par, rule, state, carry, h)
+        return step, carry, len(rule.b), ended(state, step)
+
+    lanes = explicit_in_lanes(field, add, ended, top=top, dimension=dimension)
+    return kernel_loop(begin, increment, form.observe, lanes=lanes)
+
+
+_STEPPED = {"angles": (BareTop, 6), "axis": (SpaceTop, 6), "attitude": (SpaceTop, 7)}
+LOOPS = {chart: _loop(form, *_STEPPED[chart]) for chart, form in FORMULATIONS.items()}
+
+
+def _explicit(a: Rows, b: Row) -> tuple[list[list[float]], list[float]]:
+    """The strict lower triangle, by rows, and the weights; refuses what is not an explicit tableau."""
+    weights = row("b", b)
+    try:
+        rows = None if isinstance(a, (str, bytes, dict)) else [row("a", values) for values in a]
+    except TypeError:  # nothing to go through, such as an array without dimensions
+        rows = None
+    if rows is None:
+        raise SymtopError(f"a must be rows of numbers, not {short(a)}")
+    if not weights or len(rows) != len(weights):
+        raise SymtopError(
+            f"a must have one row for each of the {len(weights)} entries of b (at least one), not {len(rows)}"
+        )
+    lower = []
+    for i, values in enumerate(rows):
+        if len(values) not in (i, len(weights)) or any(value != 0.0 for value in values[i:]):
+            raise SymtopError(
+                f"row {i + 1} of a must have {i} entries (or zeros after them) for an explicit method, not {values}"
+            )
+        lower.append(values[:i])
+    if abs(math.fsum(weights) - 1.0) > TABLE_ROUNDING:
+        raise SymtopError(f"b must sum to 1, not {math.fsum(weights)!r}")
+    return lower, weights
+
+
+def runge_kutta(
+    name: str, a: Rows, b: Row, c: Row | None = None, *,
+    order: int | None = None, summary: str = "", reference: str = "",
+) -> Integrator:  # fmt: skip
+    """An explicit Runge-Kutta method from its Butcher tableau.
+
+    `a` has one row a stage, either the entries below the diagonal (the first row empty) or whole rows with zeros from
+    the diagonal on; `b` must sum to 1. All may be arrays. With `c` given, the row sums of `a` are checked against it.
+
+    Raises SymtopError for a tableau that is implicit, ragged or inconsistent.
+    """
+    lower, weights = _explicit(a, b)
+    if c is not None:
+        sums, nodes = [math.fsum(values) for values in lower], row("c", c)
+        if len(nodes) != len(sums) or any(abs(x - y) > TABLE_ROUNDING for x, y in zip(sums, nodes, strict=True)):
+            raise SymtopError(f"c must be the row sums of a, {sums}, not {nodes}")
+    triangle = tuple(value for values in lower for value in values)
+    rule = Tableau(triangle or (0.0,), tuple(weights))  # Euler's is empty, and an empty tuple has no type of entry
+    return Integrator(
+        name=name,
+        family="runge-kutta",
+        summary=summary or f"explicit Runge-Kutta method with {len(weights)} stages",
+        solvers={
+            chart: FixedStep(LOOPS[chart], rule, form.prepare, 1, implicit=False, present=form.present)
+            for chart, form in FORMULATIONS.items()
+        },
+        order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
+        reference=reference,
+    )  # fmt: skip
+
+
+def built_in() -> list[Integrator]:
+    """The tableaux that ship with symtop."""
+    return [
+        runge_kutta(
+            "rk4",
+            ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
+            (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0),
+            order=4,
+            summary="classical Runge-Kutta method on the unreduced equations",
+            reference="kutta-1901",
+        )
+    ]

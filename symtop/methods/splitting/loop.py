@@ -1,0 +1,239 @@
+"""The one composition loop that all splitting kernels share, whatever their chart.
+
+    step = kick(b_0 h) drift(a_1 h) kick(b_1 h) ... drift(a_n h) kick(b_n h)
+
+A kick with a force gradient is the flow of ``b V + c h^2 {V, {V, T}}``: where that bracket depends on position alone it
+costs a multiplication and lets all other coefficients stay positive at order 4 (Chin, Phys. Lett. A 226 (1997) 344).
+A force is evaluated only where it is kicked with, and the one at the end of a step serves the start of the next, so a
+kick-first table with n drifts costs n forces and a drift-first one n - 1, but n drifts: its last drift and the first of
+the next step are not merged.
+
+The kernels see no h: `stages` multiplies the tables out before a run, each row closed to the product that its sum
+stands for. A sum that is wrong by one rounding is a clock that runs fast by 1e-16 in every step.
+
+In lanes, kick, drift and force of a stage are one loop over the lanes; the last kick and the sums are another. A kick
+or a force that a table leaves out is carried out with the coefficient 0, which changes no bit. The coefficients lie in
+the table as b_0 c_0 a_1  b_1 c_1 a_2 ... b_n c_n and the processor's parameter: one kernel for tables of any length.
+"""
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symtop.core.jit import register_jitable, set_item, times, to_fixed_tuple, with_item
+from symtop.core.simd import wide_vectors
+from symtop.methods.framework.lanes import Lanes, W, column, put
+from symtop.methods.framework.plan import OK
+from symtop.methods.framework.preparation import as_fields
+from symtop.methods.vectors import accumulate
+
+SHORT = 2  # drifts
+
+
+class Composition(NamedTuple):
+    """The coefficients of a splitting method, in units of the step."""
+
+    drift: tuple[float, ...]  # a_1 .. a_n
+    kick: tuple[float, ...]  # b_0 .. b_n
+    gradient: tuple[float, ...]  # c_0 .. c_n
+    forces: int  # a step
+    turn: int = 0  # which rotation a drift is
+    processor: float = 0.0
+
+
+@functools.cache
+def _opened(n: int) -> Callable[[Any], Composition]:
+    """From the numbers of a composition with n drifts, in a row, to the composition, in compiled code."""
+    m, end = n + 1, 3 * n + 2
+
+    @register_jitable
+    def opened(row: Any) -> Composition:
+        drift, kick = to_fixed_tuple(row[:n], n), to_fixed_tuple(row[n : n + m], m)
+        gradient = to_fixed_tuple(row[n + m : end], m)
+        return Composition(drift, kick, gradient, int(row[end]), int(row[end + 1]), row[end + 2])
+
+    making: Callable[[Any], Composition] = opened
+    return making
+
+
+@register_jitable
+def _of_any_length(row: Any) -> Composition:
+    row, n = row.copy(), (len(row) - 5) // 3  # a copy of its own: `times` multiplies in place
+    m, end = 2 * n + 1, 3 * n + 2
+    return Composition(row[:n], row[n:m], row[m:end], int(row[end]), int(row[end + 1]), row[end + 2])
+
+
+def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]]:
+    """How a composition travels into compiled code: what opens an array of numbers, and the array.
+
+    numba looks at every number of a tuple, 20 ns each, and at an array as a whole, 0.1 us. Short tables are tuples
+    inside, longer ones are rows of the array, so that one kernel is compiled for all of them, 1 to 2 s: their steps
+    take as long as with tuples, to 1 %.
+    """
+    drift, kick, gradient = rule[:3]
+    opened = _opened(len(drift)) if len(drift) <= SHORT else _of_any_length
+    return opened, np.array([*drift, *kick, *gradient, *rule[3:]], dtype=float)
+
+
+def packed_for_lanes(rule: Any) -> tuple[Callable[[Any], Any], Any]:
+    """The same of many members: short tables travel as they are, for to open an array costs 0.15 us a member."""
+    short = type(rule) is not Composition or len(rule.drift) <= SHORT
+    return as_fields(rule) if short else packed(rule)
+
+
+class Stages(NamedTuple):
+    """What one run of a kernel drifts and kicks by, in tuples, or in arrays where the table is long."""
+
+    drift: Any
+    kick: Any
+    bend: Any
+    forces: int
+    turn: int  # which rotation a drift is
+    boost: float  # parameter of the processor
+
+
+@register_jitable
+def close(values: Any, total: float) -> Any:
+    """`coefficients.exact_sum` of a row in a kernel: what is missing from `total` goes to the middle.
+
+    The sum of Knuth's two-sums and of what they round off is that of `math.fsum` but for 1e-16 of the surplus itself.
+    """
+    high, low, n = -total, 0.0, len(values)
+    for i in range(n):
+        moved = high + values[i]
+        back = moved - high
+        low += (high - (moved - back)) + (values[i] - back)
+        high = moved
+    surplus, middle = high + low, n // 2
+    if n % 2:
+        return with_item(values, middle, values[middle] - surplus)
+    values = with_item(values, middle - 1, values[middle - 1] - 0.5 * surplus)
+    return with_item(values, middle, values[middle] - 0.5 * surplus)
+
+
+@register_jitable
+def stages(rule: Any, drift: float, kick: float, bend: float, boost: float) -> Any:
+    """The coefficients of a `Composition` times what a whole step drifts, kicks, bends and boosts by."""
+    drifts, kicks = close(times(rule.drift, drift), drift), close(times(rule.kick, kick), kick)
+    return Stages(drifts, kicks, times(rule.gradient, bend), rule.forces, rule.turn, boost)
+
+
+def closed(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float]) -> Composition:
+    """A composition whose sums are exactly 1, and what it costs."""
+    forces = sum(b != 0.0 for b in kick) - (kick[0] != 0.0 and kick[-1] != 0.0)
+    return Composition(exact_sum(drift), exact_sum(kick), tuple(gradient), forces)
+
+
+@register_jitable
+def compose(force: Any, kick: Any, drift: Any, par: Any, rule: Any, state: Any, at_start: Any) -> Any:
+    """Increment of one step and the force at its end. A force nobody kicks with is not evaluated."""
+    step = state
+    for i in range(len(state)):
+        step = set_item(step, i, 0.0)
+    now = at_start
+    n = len(rule.drift)
+    for i in range(n):
+        if rule.kick[i] != 0.0:
+            step = kick(par, now, step, rule.kick[i], rule.bend[i])
+        step = drift(rule, state, step, rule.drift[i])
+        if rule.kick[i + 1] != 0.0:
+            now = force(par, state, step)
+    if rule.kick[n] != 0.0:
+        step = kick(par, now, step, rule.kick[n], rule.bend[n])
+    elif rule.kick[0] != 0.0:  # what the next step kicks with first
+        now = force(par, state, step)
+    return step, now
+
+
+def exact_sum(values: Sequence[float], total: float = 1.0) -> tuple[float, ...]:
+    """The same coefficients with what is missing from `total` given to the middle one, or to the middle two equally."""
+    closed, n = list(values), len(values)
+    surplus = math.fsum((*closed, -total))
+    if n % 2:
+        closed[n // 2] -= surplus
+    else:
+        closed[n // 2 - 1] -= 0.5 * surplus
+        closed[n // 2] -= 0.5 * surplus
+    return tuple(closed)
+
+
+def lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
+    """The stages of one member in the order in which a step reads them."""
+    n = len(rule.drift)
+    for i in range(n + 1):
+        numbers[3 * i], numbers[3 * i + 1] = rule.kick[i], rule.bend[i]
+    for i in range(n):
+        numbers[3 * i + 2] = rule.drift[i]
+    numbers[3 * n + 2] = rule.boost
+
+
+def read(numbers: Any) -> Any:
+    """The stages that `lay` wrote."""
+    last = len(numbers) - 1
+    return Stages(numbers[2:last:3], numbers[0:last:3], numbers[1:last:3], 0, 0, numbers[last])
+
+
+def composed(
+    force: Callable[..., Any], kick: Callable[..., Any], drift: Callable[..., Any], ended: Callable[..., Any], *,
+    top: Any, dimension: int, carry: int, still: int = 0,
+) -> Lanes:  # fmt: skip
+    """A composition in lanes, from the functions that `compose` takes, but for the drift.
+
+    ``drift(state, step, a)`` returns the step and whether it can do without a branch. ``ended(state, step)`` is the
+    outcome of a step, `carry` how many numbers a force has. The last `still` components of a state never move: of their
+    sums only the one is made that turns -0 into 0.
+    """
+    zeros, none, numbers = (0.0,) * dimension, (0.0,) * carry, (0.0,) * len(top._fields)
+    moving, rest = zeros[: dimension - still], zeros[dimension - still :]
+    coefficients, step_at, flag, still_at = len(numbers), 2 * dimension, 3 * dimension, len(moving)
+    force_at = flag + 2
+
+    @register_jitable
+    def stage(block, row, table, step, j):  # type: ignore[no-untyped-def]
+        state, par = column(block, 0, j, zeros), top(*column(table, 0, j, numbers))
+        step = kick(par, column(block, force_at, j, none), step, row[j], row[W + j])
+        step, near = drift(state, step, row[2 * W + j])
+        put(block, step_at, j, step[:still_at])
+        put(block, force_at, j, force(par, state, step))
+        block[flag * W + j] = block[flag * W + j] if near else 1.0
+
+    @register_jitable
+    def last(block, row, table, j):  # type: ignore[no-untyped-def]
+        state, step = column(block, 0, j, zeros), column(block, step_at, j, moving) + rest
+        par = top(*column(table, 0, j, numbers))
+        step = kick(par, column(block, force_at, j, none), step, row[j], row[W + j])
+        block[flag * W + j] = block[flag * W + j] if ended(state, step) == OK else 1.0
+        moved, low = accumulate(state[:still_at], column(block, dimension, j, moving), step[:still_at])
+        put(block, 0, j, moved)
+        put(block, dimension, j, low)
+        put(block, step_at, j, step[:still_at])
+        for i in range(still):
+            block[(still_at + i) * W + j] = state[still_at + i] + 0.0
+
+    def step(block, table):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        drifts = (len(table) // W - coefficients) // 3 - 1
+        row = table[coefficients * W :]
+        for j in range(W):  # on its own: the sums begin with 0, which need not be written and read
+            stage(block, row, table, zeros, j)
+        for i in range(1, drifts):
+            row = table[(coefficients + 3 * i) * W :]
+            for j in range(W):
+                stage(block, row, table, column(block, step_at, j, moving) + rest, j)
+        row = table[(coefficients + 3 * drifts) * W :]
+        for j in range(W):
+            last(block, row, table, j)
+
+    return Lanes(step, lay, read, _size, top, dimension, carry, effort=_forces, pack=packed_for_lanes)
+
+
+def _size(rule: Composition) -> int:
+    return 3 * len(rule.kick)
+
+
+def _forces(rule: Composition) -> int:
+    return rule.forces

@@ -1,0 +1,240 @@
+"""Taylor series of the space-frame equations by heyoka, without poles.
+
+    axis:      e' = L x e / I1,  L' = mgl k x e                      six variables, every term quadratic
+    attitude:  q' = (L q / I1 + (1/I3 - 1/I1) p_psi q k)/2,  L' as above with e = q k q*    seven variables
+    angles:    the Euler-Lagrange equations, with poles (see `euler_lagrange`)               six variables
+
+All constants, |e| = 1, L.e = p_psi, L_z = p_phi and the energy, are linear or quadratic in (e, L). The axis chart is
+three times cheaper than the attitude chart and is used whenever nobody asks for the spin angle. The order follows
+from the tolerance (about 20 in double); the step from the size of the series' last terms. Asking for a
+hundredth of the rounding unit removes the truncation bias that makes energy drift linearly at tolerance eps.
+`taylor` works in double, `taylor-longdouble` and `taylor-quad` with mantissas of 64 and 113 bits: they show what the
+method does without rounding, and `symtop.reference` is made by the same function. A Taylor step of order n computes n
+derivatives of the state; `force_evaluations` counts them.
+The registry has the two charts without poles. In angles the method would be the first choice for whoever observes the
+nutation or the attitude, and it is neither the fastest there nor safe: the study of charts makes a record for itself.
+Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
+"""
+
+import functools
+import importlib.util
+import sys
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.core.multiprecision import context
+from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.registry import Array, Integrator, Solver
+from symtop.model import charts
+from symtop.model.charts import space_momenta
+from symtop.model.top import Angles, SymmetricTop
+
+START_DIGITS = 60  # of the multiprecision that a start is converted in
+EPSILON = float(np.finfo(np.float64).eps)
+MOST_STEPS = {"double": 30_000_000, "longdouble": 5_000_000, "quad": 100_000}  # of one run: 10 to 25 s
+
+
+def equations(chart: str) -> list[Any]:
+    """heyoka's system of a chart; par[0] = 1/I1, par[1] = mgl, par[2] = p_psi (1/I3 - 1/I1), or I3 in angles."""
+    import heyoka as hy  # Linux only
+
+    if chart == "angles":
+        theta, phi, psi, *rates = hy.make_vars("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
+        theta_dot, phi_dot, psi_dot = rates
+        s, c, ratio = hy.sin(theta), hy.cos(theta), hy.par[0] * hy.par[2]
+        spin = ratio * (psi_dot + phi_dot * c)
+        theta_ddot = s * (phi_dot * (phi_dot * c - spin) + hy.par[0] * hy.par[1])
+        phi_ddot = theta_dot * (spin - 2.0 * phi_dot * c) / s
+        turns = [theta_ddot, phi_ddot, theta_dot * phi_dot * s - phi_ddot * c]
+        return [*zip((theta, phi, psi), rates, strict=True), *zip(rates, turns, strict=True)]
+    Lx, Ly, Lz = momentum = hy.make_vars("Lx", "Ly", "Lz")
+    inverse, mgl, twist = hy.par[0], hy.par[1], hy.par[2]
+    if chart == "axis":
+        x, y, z = axis = hy.make_vars("ex", "ey", "ez")
+        motion = [inverse * (Ly * z - Lz * y), inverse * (Lz * x - Lx * z), inverse * (Lx * y - Ly * x)]
+    else:
+        q0, q1, q2, q3 = axis = hy.make_vars("q0", "q1", "q2", "q3")
+        x, y = 2.0 * (q1 * q3 + q0 * q2), 2.0 * (q2 * q3 - q0 * q1)
+        motion = [
+            0.5 * (inverse * (-Lx * q1 - Ly * q2 - Lz * q3) - twist * q3),
+            0.5 * (inverse * (Lx * q0 + Ly * q3 - Lz * q2) + twist * q2),
+            0.5 * (inverse * (Ly * q0 + Lz * q1 - Lx * q3) - twist * q1),
+            0.5 * (inverse * (Lz * q0 + Lx * q2 - Ly * q1) + twist * q0),
+        ]
+    return [*zip(axis, motion, strict=True), *zip(momentum, [-mgl * y, mgl * x, 0.0 * x], strict=True)]
+
+
+Read = Callable[[SymmetricTop, Array, Array], tuple[Array, Array, Array]]  # (top, times, states)
+
+
+class Arithmetic(NamedTuple):
+    """A floating-point type that heyoka offers."""
+
+    kind: Any  # converts a decimal string
+    epsilon: float
+    compact: bool  # unrolled code in quadruple precision takes 20 times longer to build and runs no faster
+
+
+def arithmetic(precision: str) -> Arithmetic:
+    """The type behind "double", "longdouble" (80 bits on x86) or "quad" (113 bits)."""
+    if precision == "double":
+        return Arithmetic(float, EPSILON, compact=False)
+    if precision == "longdouble":
+        return Arithmetic(np.longdouble, float(np.finfo(np.longdouble).eps), compact=False)
+    import heyoka as hy
+
+    return Arithmetic(hy.real128, 2.0**-112, compact=True)
+
+
+def stepper(chart: str, precision: str, tolerance: float) -> Any:
+    """A compiled heyoka integrator; building one costs 0.1 s the first time, then milliseconds from its disk cache."""
+    import heyoka as hy
+
+    system, working = equations(chart), arithmetic(precision)
+    zero, bound = [working.kind("0")] * len(system), working.kind(repr(tolerance))
+    fp_type = np.float64 if precision == "double" else working.kind
+    return hy.taylor_adaptive(system, zero, tol=bound, fp_type=fp_type, compact_mode=working.compact)
+
+
+@functools.lru_cache(maxsize=32)
+def _idle(chart: str, precision: str, tolerance: float) -> list[Any]:
+    """The steppers of one kind that no run is using. A stepper holds the state of its run, so no two runs share one."""
+    return []
+
+
+@functools.lru_cache(maxsize=256)
+def start_numbers(chart: str, precision: str, top: SymmetricTop, at: Angles) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """State and parameters of a start, correctly rounded to the working precision from its exact doubles.
+
+    Momenta that were rounded to double first would move theta(8) by 5e-15 in the first scene.
+    """
+    kind, mp = arithmetic(precision).kind, context(START_DIGITS)
+    theta, phi, psi, *rates = (mp.mpf(getattr(at, name)) for name in at.__slots__)
+    if chart == "angles":
+        numbers = 1 / mp.mpf(top.I1), mp.mpf(top.mgl), mp.mpf(top.I3)
+        return _rounded(kind, mp, (theta, phi, psi, *rates)), _rounded(kind, mp, numbers)
+    place = charts.axis_parts(mp, theta, phi) if chart == "axis" else charts.quaternion_parts(mp, theta, phi, psi)
+    state = [*place, *charts.momentum_parts(mp, top, theta, phi, *rates)]
+    spin = top.I3 * (rates[2] + rates[1] * mp.cos(theta))
+    twist = spin * (1 / mp.mpf(top.I3) - 1 / mp.mpf(top.I1))
+    return _rounded(kind, mp, state), _rounded(kind, mp, (1 / mp.mpf(top.I1), mp.mpf(top.mgl), twist))
+
+
+def _rounded(kind: Any, mp: Any, values: Iterable[Any]) -> tuple[Any, ...]:
+    return tuple(kind(mp.nstr(value, 50)) for value in values)
+
+
+class Flight(NamedTuple):
+    """What one run of heyoka returns."""
+
+    states: Any  # (times, dimension of the chart), in the working precision
+    steps: int
+    order: int
+    outcome: str  # heyoka's word
+
+
+def propagate(
+    chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array, most: int = 0
+) -> Flight:
+    """heyoka's states at increasing times, in the working precision; the one place where heyoka is run.
+
+    After `most` steps (0: never) it stops, and the states end at the last time that was reached.
+    """
+    idle, kind = _idle(chart, precision, tolerance), arithmetic(precision).kind
+    try:
+        integrator = idle.pop()  # in one instruction: another thread may be here, too
+    except IndexError:
+        integrator = stepper(chart, precision, tolerance)
+    state, parameters = start_numbers(chart, precision, top, start)
+    integrator.time = kind("0")
+    integrator.state[:] = state
+    integrator.pars[:] = parameters[: integrator.pars.size]  # the axis chart does not need the last one
+    grid = times if times[0] == 0.0 else np.concatenate([[0.0], times])
+    numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
+    outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=most)
+    order = int(integrator.order)
+    idle.append(integrator)  # not after an exception, which may leave it in any state
+    return Flight(states[grid.size - times.size :], int(steps), order, outcome.name)
+
+
+def solver(chart: str, precision: str, read: Read | None = None) -> Solver:
+    """A solver of the registry in one chart and one arithmetic; samples are rounded to double.
+
+    In angles, `read` makes states of the chart and both momenta of the states that were integrated.
+    """
+
+    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        most = max(1, int(min(plan.most(MOST_STEPS[precision]), sys.maxsize)))  # infinity is a budget, too
+        flight = propagate(chart, precision, plan.tolerance, top, start, plan.times, most)
+        count, size = len(flight.states), plan.times.size
+        states = _padded(flight.states, size)
+        if read is None:
+            p_phi, p_psi = (_padded(values, size) for values in space_momenta(chart, flight.states))
+        else:
+            states, p_phi, p_psi = read(top, plan.times, states)
+        good: Any = np.isfinite(states).all(axis=1)
+        word = "ok" if good.all() and "time_limit" in flight.outcome else "not_finite"
+        if "step_limit" in flight.outcome and good[:count].all():
+            word = "out_of_budget"
+        reached = plan.horizon if word == "ok" else float(plan.times[good][-1]) if good.any() else 0.0
+        return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, word, reached)
+
+    return solve
+
+
+def _padded(values: Any, size: int) -> Array:
+    """Values as doubles, and NaN for the times that were not reached."""
+    if len(values) == size and values.dtype == np.float64:
+        whole: Array = values  # of a run's own, 2 us sooner
+        return whole
+    padded = np.full((size, *values.shape[1:]), np.nan)
+    padded[: len(values)] = values
+    return padded
+
+
+# beyond double there are no vector units, and quadruple precision is software: a step costs 12 and 500 times as much
+_SUMMARIES = {
+    "double": "heyoka's Taylor series on the space-frame equations, without poles",
+    "longdouble": "heyoka's Taylor series in 80-bit arithmetic, samples rounded to double",
+    "quad": "heyoka's Taylor series in quadruple precision, samples rounded to double; slow, keep the horizon short",
+}
+
+
+def built_in() -> list[Integrator]:
+    """heyoka's integrator in three arithmetics, where heyoka is installed."""
+    try:
+        import heyoka as hy
+    except ImportError:
+        return []
+    wide = ["longdouble"] if np.finfo(np.longdouble).eps < EPSILON else []
+    quad = ["quad"] if hasattr(hy, "real128") else []
+    return [
+        _entry(precision, {chart: solver(chart, precision) for chart in ("axis", "attitude")})
+        for precision in ("double", *wide, *quad)
+    ]
+
+
+def missing() -> dict[str, str]:
+    """Names that cannot be registered here, each with the reason."""
+    if importlib.util.find_spec("heyoka") is not None:
+        return {}
+    reason = "needs the package heyoka, which has wheels for Linux only (elsewhere: conda-forge)"
+    names = ["taylor", *(f"taylor-{precision}" for precision in _SUMMARIES if precision != "double")]
+    return {name: f"{name} {reason}" for name in names}
+
+
+def _entry(precision: str, solvers: dict[str, Solver]) -> Integrator:
+    epsilon = arithmetic(precision).epsilon
+    return Integrator(
+        name="taylor" if precision == "double" else f"taylor-{precision}",
+        family="taylor",
+        summary=_SUMMARIES[precision],
+        solvers=solvers,
+        control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
+        least_tolerance=epsilon / 1000.0,
+        default_tolerance=epsilon / 100.0,
+        reference="biscani-izzo-2021",
+        speed=0.002 if precision == "quad" else 1.0,
+    )  # fmt: skip
