@@ -20,8 +20,8 @@ from symtop_studies.work_precision.timing_rounds import (
 
 import symtop
 from symtop.measure import ranking
+from symtop.measure.settings import TARGETS, least_work, work_table
 from symtop.measure.timing import Timing
-from symtop.measure.work import TARGETS, least_work, work_table
 from symtop.runner import store
 from symtop.runner.study import Case
 
