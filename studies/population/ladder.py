@@ -32,8 +32,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.measure.settings import FLAT, LEAST_STEPS, ROUNDED
-from symtop.measure.work import TARGETS
+from symtop.measure.settings import FLAT, LEAST_STEPS, ROUNDED, TARGETS
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.fixed_step import inside

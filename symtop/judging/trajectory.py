@@ -28,8 +28,7 @@ from symtop.core.errors import SymtopError, at_home
 from symtop.judging.claims.long_run import KEPT, Constant
 from symtop.judging.findings import NOTHING, Finding, Measured, undecided
 from symtop.measure.conservation import CONSTANTS, constant_of
-from symtop.measure.errors import errors
-from symtop.measure.trajectory import completed, refuse_other_scene, sampled
+from symtop.measure.errors import completed, errors, refuse_other_scene, sampled
 from symtop.model.charts import space_energy
 from symtop.model.scenes import Scene
 

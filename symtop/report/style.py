@@ -67,7 +67,7 @@ RAISED, FIRM = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"), "
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
-# The looks of the integrators that ship with symtop. A new one gets a line here; the others keep theirs.
+# Looks set by hand; `look` finds one for every other integrator.
 _LOOKS = {
     "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "simpson-linear": Look(PURPLE, "v"),
     "midpoint-unreduced": Look(BLUE, "^"), "trapezoidal-unreduced": Look(BLUES[1], "<"),
@@ -120,8 +120,8 @@ FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, b
 def look(name: str) -> Look:
     """Colour and marker of an integrator or a variant: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
 
-    Those that ship with symtop have a fixed look. An added one gets a shade of its family and a marker that no shipped
-    one of these shades has; which of them depends on its name alone, not on what else is registered.
+    One that `_LOOKS` does not name gets a shade of its family and a marker that none of these has; which of them
+    depends on its name alone, not on what else is registered.
     """
     from symtop.methods.framework.registry import integrators, split_name
 

@@ -21,8 +21,8 @@ from symtop_studies.work_precision.timing_rounds import (
 
 import symtop
 from symtop.measure import ranking
+from symtop.measure.settings import TARGETS, least_work, work_table
 from symtop.measure.timing import Timing
-from symtop.measure.work import TARGETS, least_work, work_table
 from symtop.runner import depends, run as runner, store
 from symtop.runner.study import Case, Study
 

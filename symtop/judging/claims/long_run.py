@@ -13,7 +13,7 @@ A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 ta
 is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
 
 In the space frame p_phi = L_z and p_psi = L.e are those of the states, whatever the run reports; in angles, where they
-are parameters of a state, those of the increments are set beside the reported ones (`symtop.measure.increments`).
+are parameters of a state, those of the increments are set beside the reported ones (`symtop.measure.conservation`).
 
 Python solvers are too slow for a million steps: they run for as many as `EVALUATIONS` allow, and the ledger says so.
 """
@@ -25,9 +25,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.measure.conservation import Changed, constant_of, residuals
+from symtop.measure.conservation import Changed, Difference, constant_of, from_increments, residuals
 from symtop.measure.growth import behaviour, tops
-from symtop.measure.increments import Difference, from_increments
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator

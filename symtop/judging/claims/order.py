@@ -29,10 +29,9 @@ from symtop.core.errors import SymtopError
 from symtop.judging.claims.series import ChartSeries, series_of
 from symtop.judging.claims.subject import FINEST, Subject
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, yes_no
-from symtop.measure import splitting_conditions as splitting
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order_verdict
-from symtop.measure.order_conditions import Conditions, conditions, triangle
+from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
 from symtop.measure.step_series import AGREES, SURE
@@ -315,7 +314,7 @@ def table_of(method: Integrator) -> Conditions | None:
         if isinstance(rule, Tableau):
             return conditions(triangle(rule.a, len(rule.b)), rule.b)
         if isinstance(rule, Composition) and rule.turn == EXACT:
-            return splitting.conditions(rule.drift, rule.kick, rule.gradient, rule.processor)
+            return splitting_conditions(rule.drift, rule.kick, rule.gradient, rule.processor)
     return None
 
 
