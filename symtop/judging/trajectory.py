@@ -49,15 +49,8 @@ def is_trajectory(target: Any) -> bool:
 def read(target: Any) -> dict[str, Any]:
     """Columns by name, of a text file, a Dataset or a mapping; SymtopError for anything else."""
     if not isinstance(target, (str, Path)):
-        columns = {str(name): np.asarray(target[name]) for name in target if str(name) in (*VECTORS, *SCALARS)}
-        return columns | {"time": np.asarray(target["time"])} if "time" in target else columns
-    if str(target).lower().endswith(".nc"):
-        return read(netcdf.read(at_home(target)))
-    return _text(at_home(target))
-
-
-def _text(path: Path) -> dict[str, Any]:
-    """The columns of a text file."""
+        return {name: np.asarray(target[name]) for name in (*VECTORS, *SCALARS) if name in target}
+    path = at_home(target)
     try:
         head, *lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError, ValueError) as error:
@@ -108,22 +101,18 @@ def findings(target: Any, scene: Scene, conserves: Collection[str] = (), energy:
         if values is not None:
             shown.append(_constant(name, declared, time, np.asarray(values, float), scene))
         elif declared:
-            shown.append(undecided(name, declared, f"the trajectory shows no {name}{_remedy(name)}"))
+            remedy = f"; it would with {name}, or with the angular momentum beside the axis"
+            remedy = remedy if name in CONSTANTS else ", as its axes are scaled to length one"
+            shown.append(undecided(name, declared, f"the trajectory shows no {name}{remedy}"))
     return shown
-
-
-def _remedy(name: str) -> str:
-    """What would show a constant, or why nothing can."""
-    if name in CONSTANTS:
-        return f"; it would with {name}, or with the angular momentum beside the axis"
-    return ", as its axes are scaled to length one" if name == "axis_length" else ""
 
 
 def _from_states(scene: Scene, given: Mapping[str, Any], momentum: Any) -> dict[str, np.ndarray]:
     """Energy and momenta by the angular momentum and the axis; nothing where one of them is not there."""
     if momentum is None:
         return {}
-    whole = completed(xr.Dataset({name: (_dimensions(name), given[name]) for name in given if name != "time"}))
+    dims = {"axis": ("time", "component"), "quaternion": ("time", "part")}
+    whole = completed(xr.Dataset({name: (dims.get(name, "time"), given[name]) for name in given if name != "time"}))
     if "axis" not in whole:
         return {}
     axis = whole["axis"].values
@@ -132,10 +121,6 @@ def _from_states(scene: Scene, given: Mapping[str, Any], momentum: Any) -> dict[
         raise SymtopError(f"momentum must have the shape {axis.shape}, one row for each time, not {L.shape}")
     p_psi = np.sum(L * axis, axis=1)
     return {"energy": space_energy(scene.top, axis, L, p_psi), "p_phi": L[:, 2], "p_psi": p_psi}
-
-
-def _dimensions(name: str) -> tuple[str, ...]:
-    return {"axis": ("time", "component"), "quaternion": ("time", "part")}.get(name, ("time",))
 
 
 def _error(name: str, time: np.ndarray, apart: xr.Dataset) -> Finding:
