@@ -95,6 +95,15 @@ class LongRun(NamedTuple):
     reported: Difference | None  # of the momenta from those of the states; None where the states show none
     energy: tuple[Array, Array]  # times, in nutations, and the largest relative change around each, shape (WINDOWS,)
 
+    @property
+    def span(self) -> str:
+        """Its length in words."""
+        return f"{f'{self.steps} steps' if self.steps else 'a formula'} over {self.nutations:.3g} nutations"
+
+    def most_in_a_nutation(self, constant: Constant) -> float:
+        """What an error that returns with the nutation cannot exceed: the largest change of a step, all one way."""
+        return constant.a_step * self.steps / self.nutations if self.nutations > 1.0 else math.inf
+
 
 def _run(
     method: Integrator, scene: Scene, chart: str, steps: float, step: float, samples: int

@@ -1,4 +1,4 @@
-"""Sockets: what fits is judged; what hangs, crashes, raises or keeps something is told so and takes nobody along."""
+"""Adapters: what fits is judged; what hangs, crashes, raises or keeps something is reported and stops nothing else."""
 
 import os
 import shutil
