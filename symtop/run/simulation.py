@@ -171,8 +171,7 @@ def simulate(
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
-<<<<<<< HEAD
-    heard = guard if callable(guard) else _warn if truth("guard", guard) else None
+    heard = guard if callable(guard) else _warn if boolean("guard", guard) else None
     run = _prepared(scene, integrator, step_size, tolerance, horizon, samples, observe, budget)
     trajectory, caution = _guarded(run, heard)
     chosen, method, plan = run.scene, run.method, run.plan
@@ -217,10 +216,6 @@ def _prepared(
 ) -> _Run:  # fmt: skip
     """Check the arguments of `simulate`, and choose chart, steps and samples."""
     chosen, method = find_scene(scene), find_integrator(integrator)
-=======
-    chosen, method = _scene(scene), _integrator(integrator)
-    guard = guard if callable(guard) else boolean("guard", guard)
->>>>>>> main
     end = chosen.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2, MOST_SAMPLES)
     chart = chart_of(method, chosen.observes, observe)
