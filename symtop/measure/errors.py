@@ -123,7 +123,7 @@ def _beside(run: xr.Dataset, columns: dict[str, charts.Array]) -> xr.Dataset:
 
 
 def _columns(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> dict[str, charts.Array]:
-    mine, true = run.variables, truth.variables  # ``run[name]`` would make a DataArray, 6 us for each
+    mine, true = run.variables, truth.variables  # ``run[name]`` would make a DataArray
     columns = {}
     units = {"theta": 1.0, "energy": scene.energy_scale, "p_phi": scene.momentum_scale, "p_psi": scene.momentum_scale}
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
