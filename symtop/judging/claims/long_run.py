@@ -4,10 +4,10 @@ A constant is kept, bounded, a random walk, a drift or just growing by the rule 
 `symtop.measure.growth.behaviour`: by its size, and by the exponent of its growth (0, 1/2, 1) if the 95 % interval
 excludes the others. Somebody else's sums may be plain. So a change that grows is rounding, too, while it is no more
 than `KEPT`, relative, or than the random walk that the rounding seen in one step makes, n^1/2 times as much: a bias
-beyond a thousandth of that rounding is seen in a million steps. A drift that hides below a
-bounded oscillation shows in the means of 24 equal stretches, and counts if the line through them exceeds `SURE` of its
-own intervals. Random walks pass a plain test of the slope in one case in three; this one they do not pass, and at the
-size of rounding nothing but the size is judged. Every chart of a method makes its own run.
+beyond a thousandth of that rounding is visible in a million steps. A drift that hides below a bounded oscillation shows
+in the means of 24 equal stretches, and counts if the line through them exceeds `SURE` of its own intervals. A random
+walk passes a plain test of the slope in one case in three, and not this one; at the size of rounding only the size is
+judged. Every chart of a method makes its own run.
 
 A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau, whatever its tau: c is fitted, and it
 is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
