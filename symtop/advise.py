@@ -202,7 +202,7 @@ def _not_tried() -> tuple[str, ...]:
 
 
 def _same(row: str, usable: Sequence[str]) -> str | None:
-    """The usable name of a stored row, of the same method in another chart if need be; None if there is none."""
+    """The usable name of a stored variant, of the same method in another chart if need be; None if there is none."""
     method = split_name(row)[0]
     return next((name for name in (row, *usable) if name in usable and split_name(name)[0] == method), None)
 
@@ -328,7 +328,7 @@ def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
 
 
 def _on_nearest(near: Near | None, name: str) -> str:
-    """How many of the nearest random tops a method served; empty if its rows are not in the study."""
+    """How many of the nearest random tops a method served; empty if its variants are not in the study."""
     rows = [row for row in near.served if split_name(row)[0] == split_name(name)[0]] if near is not None else []
     return near.words(name if name in rows else rows[0]) if near is not None and rows else ""
 
