@@ -108,10 +108,11 @@ def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
 
 
 @functools.cache
-def _words(name: str, units: str) -> dict[str, str]:
-    """The attributes of a variable."""
-    long_name, *choice = VARIABLES[name]
-    return {"long_name": long_name} | ({"units": choice[0 if units == "SI" else -1]} if choice else {})
+def variable_attributes(name: str, units: str) -> dict[str, str]:
+    """The long name and units of a variable; none of one that symtop does not know."""
+    long_name, *choice = VARIABLES.get(name, ("",))
+    named = {"long_name": long_name} if long_name else {}
+    return named | ({"units": choice[0 if units == "SI" else -1]} if choice else {})
 
 
 def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree:
@@ -121,11 +122,15 @@ def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree
     """
     for group in groups(data).values():
         for name, variable in group.variables.items():  # ``group[name]`` would make a DataArray, 6 us for each
-            if name in VARIABLES:
-                variable.attrs.update(_words(str(name), units))
-    plain = {key: _plain(value) for key, value in attributes.items()}
-    data.attrs.update({**CONVENTIONS, "title": title, **plain, **provenance()})
+            variable.attrs.update(variable_attributes(str(name), units))
+    data.attrs.update(attributes_of(title, **attributes))
     return data
+
+
+def attributes_of(title: str, **attributes: Any) -> dict[str, Any]:
+    """The attributes of a dataset: conventions, title, those given and provenance."""
+    plain = {key: _plain(value) for key, value in attributes.items()}
+    return {**CONVENTIONS, "title": title, **plain, **provenance()}
 
 
 def _plain(value: Any) -> Any:

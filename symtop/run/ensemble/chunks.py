@@ -208,7 +208,7 @@ class Job:
         return Plan.until(plan.times[i, :count], tolerance, self.budget)
 
     def _observables(self, runs: _Runs, times: Array) -> dict[str, Array]:
-        """Of what `simulation.as_dataset` shows of one run, what is asked for, of all."""
+        """Of what a `Trajectory` shows of one run, what is asked for, of all."""
         top: Any = _Top(*(self.numbers[:, k : k + 1] for k in range(3)))
         seen = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
         turned = [name for name in ("phi", "psi") if name in self.shown and self.chart != "angles"]

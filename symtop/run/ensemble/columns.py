@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.core.over_time import PARTS
+from symtop.run.trajectory import LABELS
 
 
 def same_times(times: Any, row: Any) -> bool:
@@ -34,6 +34,6 @@ def as_dataset(columns: dict[str, Any], labels: dict[str, Any], *, shared: bool 
         {**variables, **{name: ("member", values) for name, values in labels.items()}},
         {
             "time": ("time", times[0]) if shared else (("member", "time"), times),
-            **{name: list(PARTS[name]) for name in parts},
+            **{name: list(LABELS[name]) for name in parts},
         },
     )
