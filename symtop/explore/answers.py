@@ -80,8 +80,8 @@ _budgets: dict[tuple[str, int], float] = {}  # by method and decade of the toler
 def _budget(chosen: Setup) -> float:
     """As much work as takes two seconds, from a trial of the run itself, and at most `MOST_WORK`.
 
-    An evaluation costs 0.03 us to 40 us, and a step of a Taylor method 0.2 us to 1 ms, which grows as the tolerance
-    shrinks: no field of an integrator says as much.
+    The cost of an evaluation differs a thousandfold between methods, and that of a Taylor step also grows as the
+    tolerance shrinks: no field of an integrator says as much.
     """
     tolerance = chosen.setting or 1.0
     key = chosen.method.name, math.floor(math.log10(tolerance))
@@ -121,7 +121,7 @@ def setup(fields: Mapping[str, Any]) -> Setup:
     top = SymmetricTop(*(finite(name, fields[name]) for name in TOP))
     start = Angles(*(finite(name, fields[name]) for name in START))
     method = integrator(str(fields["integrator"]))
-    method.chart_for("attitude")  # refuses a row such as rk4[axis]: the page shows the whole attitude
+    method.chart_for("attitude")  # refuses a variant such as rk4[axis]: the page shows the whole attitude
     scene = Scene(str(fields.get("scene", "explored")), top, start, horizon_of(fields["horizon"]))
     if method.control is None:
         return Setup(scene, method, None)
