@@ -27,7 +27,9 @@ class StepLedger(Ledger):
     implied: frozenset[str] = frozenset()  # claims that follow from those that were made
 
     def __str__(self) -> str:
-        return text_report.report(self.about._asdict(), self.scene, self.findings, implied=self.implied)
+        lines = [text for one in self.findings if (text := text_report.line(one))]
+        head = text_report.heading(self.about._asdict(), self.scene)
+        return "\n".join([head, *lines, text_report.summary(self.findings, self.implied)])
 
     def dataset(self) -> xr.Dataset:
         """As of any ledger, with attributes that say what was judged."""

@@ -85,11 +85,3 @@ def summary(findings: Sequence[Finding], implied: Collection[str] = ()) -> str:
 def _counted(findings: Sequence[Finding]) -> str:
     counts = Counter(one.verdict for one in findings)
     return ", ".join(f"{counts[word]} {word}" for word in ("confirmed", "refuted", "undecided") if counts[word])
-
-
-def report(
-    about: Mapping[str, Any], scene: str, findings: Sequence[Finding], width: int = WIDTH, implied: Collection[str] = ()
-) -> str:
-    """All of it."""
-    lines = [text for one in findings if (text := line(one, width))]
-    return "\n".join([heading(about, scene), *lines, summary(findings, implied)])

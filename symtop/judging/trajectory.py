@@ -126,13 +126,13 @@ def _from_states(scene: Scene, given: Mapping[str, Any], momentum: Any) -> dict[
 def _error(name: str, time: np.ndarray, apart: xr.Dataset) -> Finding:
     """The largest error of a quantity and its law of growth."""
     values = apart[name].values
-    seen = constant_of(time, values) if time.size >= FEWEST else None
+    growth = constant_of(time, values) if time.size >= FEWEST else None
     largest = float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
     bound = float(np.nanmax(apart[f"{name}_bound"].values))
     why = f"largest error {largest:.1e} rad in {time.size} samples up to t = {time[-1]:.4g}"
-    if seen is not None and math.isfinite(seen.exponent):
-        why += f", growing as t^{seen.exponent:.2f} +- {seen.exponent_interval:.2f} ({seen.law})"
-    law = seen.law if seen is not None and seen.law not in ("undecided", "not judged") else ""
+    if growth is not None and math.isfinite(growth.exponent):
+        why += f", growing as t^{growth.exponent:.2f} +- {growth.exponent_interval:.2f} ({growth.law})"
+    law = growth.law if growth is not None and growth.law not in ("undecided", "not judged") else ""
     measured = Measured(law, largest, unit="rad", text=f"{largest:.0e} rad{law and ', '}{law}")
     return Finding(f"{name}_error", "", measured, "measured", why, largest, bound)
 
@@ -142,19 +142,19 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     scale, grain = (scene.energy_scale, scene.energy_grain) if name == "energy" else (scene.momentum_scale, 1.0)
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
     change = (values - values[0]) / scale
-    seen = Constant(constant_of(time, change), math.nan, KEPT * grain, grain)
-    largest, off = seen.changed.largest, abs(values[0] - true) / scale
+    constant = Constant(constant_of(time, change), math.nan, KEPT * grain, grain)
+    largest, off = constant.changed.largest, abs(values[0] - true) / scale
     why = f"largest relative change {largest:.1e} in {time.size} samples; it begins {off:.1e} from the scene's"
-    kind = seen.kind if time.size >= FEWEST else "kept" if largest <= seen.floor else "unknown"
+    kind = constant.kind if time.size >= FEWEST else "kept" if largest <= constant.floor else "unknown"
     measured, verdict = Measured(kind, largest), "undecided"
     if kind == "unknown":
         measured, why = NOTHING, f"{why}; no law of growth to judge it by"
     else:
         if kind != "kept":
-            why += f", growth exponent {seen.changed.exponent:.2f} +- {seen.changed.exponent_interval:.2f}"
-        holds = {"kept": kind == "kept" or largest <= seen.floor, "bounded": not seen.grows}.get(declared)
-        if declared == "bounded" and seen.grows is None:
+            why += f", growth exponent {constant.changed.exponent:.2f} +- {constant.changed.exponent_interval:.2f}"
+        holds = {"kept": kind == "kept" or largest <= constant.floor, "bounded": not constant.grows}.get(declared)
+        if declared == "bounded" and constant.grows is None:
             measured, why = NOTHING, f"{why}, which leaves open whether it grows"
         else:
             verdict = "measured" if holds is None else "confirmed" if holds else "refuted"
-    return Finding(name, declared, measured, verdict, why, largest, seen.floor)
+    return Finding(name, declared, measured, verdict, why, largest, constant.floor)

@@ -19,6 +19,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from symtop.core.numbers import EPSILON
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import Fit, order
 from symtop.methods.framework.registry import Integrator
@@ -110,7 +111,7 @@ def extended_errors(scene: Scene, method: Integrator) -> xr.Dataset | None:
     None for a method that is no such composition, and where long double is double or there is no reference in it.
     """
     stages = _composition(scene, method)
-    if stages is None or not have_heyoka() or np.finfo(Wide).eps == np.finfo(float).eps:
+    if stages is None or not have_heyoka() or np.finfo(Wide).eps == EPSILON:
         return None
     horizon = NUTATIONS * scene.time_scale()
     truth = reference(scene, [horizon], "longdouble")

@@ -39,7 +39,7 @@ SHORT = 12.37  # nutations of a trial run
 LEAST = 0.3  # of the target: the least error that ends a search
 TRIES = 9  # runs of a search
 MOST_EVALUATIONS = {"compiled": 3e8, "python": 3e5}  # of one run
-FLAT, ROUNDED = 1.3, 1e-8  # a finer setting that gains less has met rounding, if its error is below this
+FLAT, NEAR_ROUNDING = 1.3, 1e-8  # a finer setting that gains less has met rounding, if its error is below this
 
 STOPPED = "Stopped by rounding or by what the method's settings allow"
 BUDGET = "Not within the work that a run may take"
@@ -159,7 +159,7 @@ def seek(
             met = setting, error
             if error >= least * target or setting >= coarsest:
                 break
-        elif met is None and missed is not None and missed[1] < FLAT * error < ROUNDED:
+        elif met is None and missed is not None and missed[1] < FLAT * error < NEAR_ROUNDING:
             why = STOPPED  # a finer setting gains nothing
             break
         else:
@@ -269,7 +269,7 @@ REFINEMENTS = 2
 NEARBY = 1.2  # a setting less coarser than that is not worth a run
 MOST_RUNS = 24  # runs of one walk
 ABOVE = 2.0  # times the budget: a run that costs more ends, whatever was foreseen (rk45 at 1e-2 may shrink its steps)
-STALLED = 1.5  # two steps in a row that gain less than this, below `ROUNDED`, have met rounding
+STALLED = 1.5  # two steps in a row that gain less than this, below `NEAR_ROUNDING`, have met rounding
 STOPS = ("all targets met", "rounding", "budget", "least tolerance", "nothing to set", "too many runs")
 TOO_WIDE = "wider than the nutation"  # of a target
 CAPPED = "met at the longest step"  # or the loosest tolerance: a longer one might do
@@ -328,7 +328,7 @@ class Walk:
                 return
             error = self.error(setting)
             work = float(self.rows[setting]["force_evaluations"])
-            flat = flat + 1 if error < ROUNDED and error > last / STALLED else 0
+            flat = flat + 1 if error < NEAR_ROUNDING and error > last / STALLED else 0
             if error <= min(targets) or flat == 2 or setting <= self.finest or len(self.rows) >= MOST_RUNS:
                 met, stuck = error <= min(targets), flat == 2
                 least = setting <= self.finest

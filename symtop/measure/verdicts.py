@@ -195,7 +195,7 @@ class Truths(NamedTuple):
 
 
 def truths(scenes: Sequence[Scene]) -> Truths:
-    """Closed forms and bounds of scenes: 0.1 ms each, and kept for the last 1024 of them."""
+    """Closed forms and bounds of scenes, whose numbers are kept for the last 1024 of them."""
     forms = ClosedForms([flat(scene.top, scene.start) for scene in scenes])
     return Truths(forms.constants, np.array([_numbers(scene) for scene in scenes]))
 

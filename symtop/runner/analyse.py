@@ -88,7 +88,7 @@ def findings_of(
         "failures": failures,
         "cases": cases,
         "quick": False,
-        "provenance": netcdf.provenance(),
+        "provenance": netcdf.provenance(changes=True),
     }
 
 

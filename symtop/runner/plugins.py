@@ -6,7 +6,7 @@ wherever that stands.
 
 from pathlib import Path
 
-from symtop.core.errors import SymtopError, door
+from symtop.core.errors import SymtopError, foreign_code
 from symtop.core.files import execute, python_file
 from symtop.methods.framework.registry import integrators, is_built_in, split_name
 from symtop.model.scenes import added_scenes, scenes
@@ -20,7 +20,7 @@ def load(path: str | Path) -> list[str]:
     if file in _loaded:
         return _loaded[file]
     before = [*integrators().values(), *scenes().values()]
-    with door(f"plugin {file.name}"):
+    with foreign_code(f"plugin {file.name}"):
         try:
             execute(f"symtop_plugin_{file.stem}", file)
         except SymtopError as error:  # the names in it are the file's, and no options of a command
