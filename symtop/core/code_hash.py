@@ -328,11 +328,11 @@ class Code:
 
 def by_file(parts: Iterable[Part]) -> Reasons:
     """Hashes of parts, those of a file together."""
-    hashes: dict[str, set[str]] = {}
+    texts: dict[str, set[str]] = {}
     for part in parts:
         label = f"code {part.file}" if part.file else part.label
-        hashes.setdefault(label, set()).add(hashed(part.label, *part.values))
-    return {label: hashed(*sorted(several)) for label, several in hashes.items()}
+        texts.setdefault(label, set()).add("\n".join((part.label, *part.values)))
+    return {label: hashed(*sorted(several)) for label, several in texts.items()}
 
 
 def codes(code: CodeType) -> Iterator[CodeType]:

@@ -97,7 +97,7 @@ def load_case(path: Path) -> xr.Dataset | None:
     if not path.is_file():
         return None
     try:
-        with np.load(path) as file:
+        with path.open("rb") as stream, np.load(stream) as file:
             arrays = {name: file[name] for name in file.files}
         text, content = str(arrays.pop("about")), str(arrays.pop("content"))
         about = json.loads(text)
