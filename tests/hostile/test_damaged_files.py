@@ -11,7 +11,7 @@ import symtop
 from symtop.core import netcdf
 from symtop.core.jit import compile_kernel, is_kept
 from symtop.run import long_run as longrun
-from symtop.run.disk_cache import kept
+from symtop.run.disk_cache import cached
 from symtop.run.reference import truth as references
 
 FLIPS = [pytest.param(12, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)]
@@ -78,10 +78,10 @@ def test_a_damaged_reference_is_computed_again(tmp_path, flips):
         made.append(1)
         return _MADE.copy()
 
-    kept(path, compute, None)
+    cached(path, compute, None)
     for _ in range(flips):
         whole = flipped(path, draw)
-        data = kept(path, compute, None)
+        data = cached(path, compute, None)
         assert np.array_equal(data["theta"], _MADE["theta"])
         assert np.array_equal(data["time"], _MADE["time"])
         path.write_bytes(whole)
