@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.engines import documentation, listed, study, tables, words
+from symtop_studies.engines import listed, study, tables, words
 
 import symtop
 from symtop.methods.framework.registry import engines, integrator
@@ -114,8 +114,8 @@ def test_without_the_term_the_spherical_top_is_followed_by_order_h_and_with_it_n
 def test_every_table_has_a_cell_below_each_heading_and_every_engine_a_source(measured):
     for table in listed.tables(measured):
         assert {len(row) for row in table.rows} == {len(table.header)}
-    assert all(one.says.endswith(".") and one.source for one in documentation.STATEMENTS)
-    assert len({one.engine for one in documentation.STATEMENTS}) == len(documentation.STATEMENTS)
+    assert all(one.says.endswith(".") and one.source for one in listed.STATEMENTS)
+    assert len({one.engine for one in listed.STATEMENTS}) == len(listed.STATEMENTS)
 
 
 def test_shares_count_tops_within_five_degrees(measured):

@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 from symtop_studies.notebook import words as notebook_words
 from symtop_studies.notebook.long_energy import better_from
-from symtop_studies.notebook.long_words import long_table
 from symtop_studies.notebook.tables import SOLVER, Column
+from symtop_studies.notebook.words import long_table
 
 
 def long_runs(level, slope):

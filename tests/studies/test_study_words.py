@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from symtop_studies.drift import messages, tables, words
-from symtop_studies.drift.histories import run_history
+from symtop_studies.drift.runs import run_history
 from symtop_studies.drift.study import TOLERANCE, cases
 from symtop_studies.truth import tables as truth_tables, words as truth_words
 

@@ -1,4 +1,4 @@
-"""Sockets: what fits is judged; what hangs, crashes, raises or keeps something is told so and takes nobody along."""
+"""Adapters: what fits is judged; what hangs, crashes, raises or keeps something is reported and stops nothing else."""
 
 import os
 import shutil
@@ -22,7 +22,7 @@ from symtop.judging.adapters.separable import SeparableStep
 from symtop.judging.battery import CLAIMS, TABLE
 from symtop.judging.findings import VERDICTS, read
 from symtop.judging.heartbeat import heartbeat
-from symtop.judging.text_report import described
+from symtop.judging.text_report import description
 
 SPHEROID = symtop.scene("spheroid")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
@@ -340,7 +340,9 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset():
     screen = str(ledger).splitlines()
     assert screen[0].startswith("changes_its_input in the axis chart on spheroid, ")
     assert screen[-1] == "No claims were made."
-    assert described(ledger.findings).startswith("order 1, not symplectic, not reversible, keeps p_phi; not the energy")
+    assert description(ledger.findings).startswith(
+        "order 1, not symplectic, not reversible, keeps p_phi; not the energy"
+    )
     assert all(len(line) <= 100 for line in screen)
 
 
