@@ -76,6 +76,6 @@ def findings(rows: Sequence[dict[str, Any]], missing: Sequence[str], measured: s
         "question": "Are the maps of the catalogue those that the engines take?",
         "how_to_read": HOW_TO_READ, "verdict": verdict(rows), "tables": [table], "charts": [], "opening": None,
         "pictures": [], "failures": [*missing, *failed], "cases": len(rows), "quick": False,
-        "provenance": netcdf.provenance(), "measured": measured, "rows": list(rows),
+        "provenance": netcdf.provenance(changes=True), "measured": measured, "rows": list(rows),
         "missing": list(missing),
     }  # fmt: skip

@@ -19,7 +19,7 @@ from symtop.methods.runge_kutta import dormand_prince
 from symtop.methods.runge_kutta.explicit import LOOPS, Tableau, runge_kutta
 from symtop.model.scenes import closed_form
 from symtop.model.top import flat
-from symtop.run.simulation import make_plan
+from symtop.run.simulation import integrate, make_plan
 from tests.slopes import assert_order
 
 KUTTA_A = ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0))
@@ -83,11 +83,9 @@ def test_one_step_is_the_definition():
 def test_rk4_loses_energy_linearly():
     scene = symtop.scene("spheroid")
     period = scene.nutation_period
-    run = symtop.simulate(
-        scene, "rk4", step_size=period / 40.3, horizon=2000 * period, samples=4001, observe="axis", guard=False
-    )
+    run = integrate(scene, "rk4", step_size=period / 40.3, horizon=2000 * period, samples=4001, observe="axis")
     residual = residuals(scene, run)["energy"]
-    drift, power = trend(run["time"], residual), growth(run["time"], residual)
+    drift, power = trend(run.time, residual), growth(run.time, residual)
     assert drift.significant
     assert abs(drift.rise) > 1e-3
     assert abs(power.slope - 1.0) < 0.05

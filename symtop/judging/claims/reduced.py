@@ -1,4 +1,4 @@
-"""The battery of a map of (theta, p_theta): the claims of `claims`, asked of the nutation alone.
+"""The claims of a map of (theta, p_theta): order, structure and energy of the nutation alone.
 
 Such a map is judged in the plane. Its order is that of the distance from the true (theta, p_theta), p_theta in units of
 the larger momentum; it is symplectic if it keeps the area, {theta, p_theta} = 1; and the one constant of its motion is

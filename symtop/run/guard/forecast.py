@@ -172,13 +172,13 @@ def _probe(
 def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
     """The largest error of a probe, grown to the horizon; `straight` if the method's error grows linearly."""
     half = 0.5 * float(probe.times[-1])
-    whole = float(np.max(probe.error))
+    whole = float(probe.error.max())
     n = horizon / half
     if n <= 2.0 * (1.0 + 1e-9) or not math.isfinite(whole):
         return whole
     if whole < ROUNDED:
         return whole * math.pow(0.5 * n, 1.5)
-    first = float(np.max(probe.error[probe.times <= half], initial=0.0))
+    first = float(probe.error[probe.times <= half].max(initial=0.0))
     if straight:
         return whole + max(whole - first, LEAST_GROWTH * whole) * (n - 2.0)
     return n * first + 0.5 * max(abs(whole - 2.0 * first), LEAST_GROWTH * whole) * n * (n - 1.0)

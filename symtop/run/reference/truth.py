@@ -24,7 +24,6 @@ from numpy.typing import ArrayLike
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, one_of
 from symtop.core.numbers import EPSILON, TINY, real_numbers
-from symtop.core.over_time import over_time
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
@@ -43,6 +42,7 @@ from symtop.run.reference.independent_checks import (
     integrated,
 )
 from symtop.run.reference.sensitivity import conditioning, unbounded
+from symtop.run.trajectory import dataset
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
 MOST_CACHED = 200_000  # times; larger results are not kept on disk
@@ -157,7 +157,7 @@ def _dataset(
     form = closed_form(scene)
     constants = {"energy": form.energy, "p_phi": form.p_phi, "p_psi": form.p_psi}
     columns = columns | {f"{name}_error_bound": bound for name, bound in bounds.items()}
-    return over_time(times, columns | {name: np.full(times.size, value) for name, value in constants.items()})
+    return dataset(times, columns | {name: np.full(times.size, value) for name, value in constants.items()})
 
 
 def _integration(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
