@@ -121,7 +121,7 @@ def setup(fields: Mapping[str, Any]) -> Setup:
     top = SymmetricTop(*(finite(name, fields[name]) for name in TOP))
     start = Angles(*(finite(name, fields[name]) for name in START))
     method = integrator(str(fields["integrator"]))
-    method.chart_for("attitude")  # refuses a row such as rk4[axis]: the page shows the whole attitude
+    method.chart_for("attitude")  # refuses a variant such as rk4[axis]: the page shows the whole attitude
     scene = Scene(str(fields.get("scene", "explored")), top, start, horizon_of(fields["horizon"]))
     if method.control is None:
         return Setup(scene, method, None)
