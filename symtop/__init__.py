@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from symtop.run.long_run import long_run as long_run
     from symtop.run.reference.truth import reference as reference
     from symtop.run.simulation import simulate as simulate
+    from symtop.runner.compare import compare as compare
     from symtop.runner.study import Case as Case, Picture as Picture, Study as Study, Table as Table
     from symtop.runner.sweep import sweep as sweep
 
@@ -74,6 +75,7 @@ _NAMES = {  # by the module that holds them
     "run.simulation": "simulate",
     "report.card": "card",
     "report.plot": "plot",
+    "runner.compare": "compare",
     "runner.study": "Case Picture Study Table",
     "runner.sweep": "sweep",
 }

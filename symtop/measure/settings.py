@@ -291,26 +291,30 @@ def nutation_width(scene: Scene) -> float:
 
 
 class Walk:
-    """All runs of one method on one scene to one horizon, by setting."""
+    """All runs of one method on one scene to one horizon, by setting; errors are those of `quantity`."""
 
-    def __init__(self, scene: Scene, method: Integrator, horizon: float, budget: float) -> None:
+    def __init__(
+        self, scene: Scene, method: Integrator, horizon: float, budget: float, quantity: str = "axis"
+    ) -> None:  # fmt: skip
         self.scene, self.method, self.horizon, self.budget = scene, method, horizon, budget
+        self.quantity = quantity
         self.rows: dict[float, Row] = {}
         self.stopped = ""
         self.power = float(method.order or (2 if method.fixed_step else 8))
-        self.finest, self.coarsest = limits(scene, method, horizon)
+        self.finest, self.coarsest = limits(scene, method, horizon, quantity)
 
     def run(self, setting: float) -> Row:
         """Measure a setting, once."""
         if setting not in self.rows:
             most = ABOVE * self.budget if self.method.adaptive else None
-            row = error_row(self.scene, self.method, setting, self.horizon, "axis", phases=True, budget=most)
+            observe = observed(self.quantity)
+            row = error_row(self.scene, self.method, setting, self.horizon, observe, phases=True, budget=most)
             self.rows[setting] = row | {"setting_value": setting}
         return self.rows[setting]
 
     def error(self, setting: float) -> float:
-        """Largest axis error at a setting, infinite after a failure."""
-        error = float(self.run(setting)["axis"])
+        """The largest error at a setting, infinite after a failure."""
+        error = float(self.run(setting)[self.quantity])
         return error if math.isfinite(error) else math.inf
 
     def growth(self, ratio: float) -> float:

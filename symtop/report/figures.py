@@ -81,3 +81,48 @@ def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]], size: flo
             arrowprops={"arrowstyle": "-", "color": color, "lw": 0.5, "shrinkA": 0, "shrinkB": 1, "relpos": (0.0, 0.5)},
             annotation_clip=False,
         )  # fmt: skip
+
+
+def name_beside(axis: Any, ends: Sequence[tuple[str, float, float, str]], size: float = LEAST_TEXT) -> None:
+    """Write each name beside the end of its line, within the panel; `ends` are name, x, y, colour; axes logarithmic.
+
+    The panel becomes wider until the longest name fits. A name moves up or down until it covers no other name and no
+    line, and if it moves it is joined to its end.
+    """
+    figure = axis.figure.canvas.figure  # the root of a subfigure
+    figure.draw_without_rendering()
+    frame, unit = axis.get_window_extent(), size * figure.dpi / 72.0
+    widths = [0.57 * unit * len(name) + unit for name, *_ in ends]
+    low, high = axis.get_xlim()
+    parts = [np.log(x / low) / np.log(high / low) / max(1.0 - width / frame.width, 0.2)
+             for (_, x, *_), width in zip(ends, widths, strict=True)]  # fmt: skip
+    axis.set_xlim(low, low * (high / low) ** max(1.0, *parts))
+    lines = [line.get_xydata() for line in axis.get_lines() if line.get_transform() == axis.transData]
+    taken = [_along(axis.transData.transform(corners), 0.4 * unit) for corners in lines]
+    points = np.concatenate([*taken, np.empty((0, 2))])
+    moves = unit * np.array([0.65 * sign * k for k in range(40) for sign in (1, -1)])
+    for (name, x, y, color), width in sorted(zip(ends, widths, strict=True), key=lambda end: -end[0][2]):
+        left, end = axis.transData.transform((x, min(y, axis.get_ylim()[1]))) + np.array([0.8 * unit, 0.0])
+        heights = points[(points[:, 0] > left) & (points[:, 0] < left + width), 1]
+        covered = (np.abs(heights - end - moves[:, None]) < 0.75 * unit).sum(axis=1) + 0.02 * np.abs(moves) / unit
+        outside = (end + moves < frame.y0 + 0.7 * unit) | (end + moves > frame.y1 - 0.7 * unit)
+        move = moves[np.argmin(covered + 1e6 * outside)]
+        box = np.arange(left, left + width, 0.05 * unit)
+        rows = [np.column_stack([box, np.full(box.size, end + move + half * unit)]) for half in (-0.45, 0.45)]
+        points = np.concatenate([points, *rows])
+        joined = {"arrowstyle": "-", "color": color, "lw": 0.5, "shrinkA": 0, "shrinkB": 2, "relpos": (0.0, 0.5)}
+        axis.annotate(
+            name, (x, min(y, axis.get_ylim()[1])), (0.8 * size, move * 72.0 / figure.dpi), textcoords="offset points",
+            va="center", fontsize=size, color=ink(color), arrowprops=joined if abs(move) > 1.5 * unit else None,
+        )  # fmt: skip
+
+
+def _along(corners: Any, gap: float) -> Any:
+    """Points (n, 2) along a line through corners (m, 2), at most about `gap` apart."""
+    corners = corners[np.isfinite(corners).all(axis=1)]
+    if len(corners) < 2:
+        return corners
+    lengths = np.maximum(np.hypot(*np.diff(corners, axis=0).T), 1e-9)
+    place = np.concatenate([[0.0], np.cumsum(lengths)])
+    marks = np.linspace(0.0, place[-1], int(min(place[-1] / gap, 5000.0)) + 2)
+    return np.column_stack([np.interp(marks, place, corners[:, k]) for k in (0, 1)])

@@ -2,6 +2,7 @@
 
 a run        its motion beside the true one, its errors, and the residuals of constants of the motion
 a sweep      the largest error against what was varied
+a comparison the largest error against run time
 an ensemble  how the errors of its members spread as time goes on
 """
 
@@ -17,6 +18,7 @@ from symtop.measure import spread
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES, errors
 from symtop.model.scenes import Scene
+from symtop.report.figures import BELOW, error_band, name_beside
 from symtop.report.style import (
     BLACK,
     BLUE,
@@ -29,11 +31,13 @@ from symtop.report.style import (
     VERMILLION,
     headline,
     legend_below,
+    line,
     look,
     panels,
     save,
 )  # fmt: skip
 from symtop.run.trajectory import Trajectory
+from symtop.runner.compare import fails_from
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,13 +53,15 @@ def plot(
     data: xr.Dataset, ax: "Axes | None" = None, *, quantity: str = "axis", x: str | None = None,
     members: xr.Dataset | None = None,
 ) -> "Axes":  # fmt: skip
-    """Draw a dataset of `simulate`, `errors`, `sweep` or `ensemble` and return the Axes, a new one if `ax` is None.
+    """Draw a dataset of `simulate`, `errors`, `sweep`, `compare` or `ensemble`; return the Axes, new if `ax` is None.
 
         a run         the error of `quantity` over time, or a variable of the run itself (``phi``, ``p_theta``, ...)
         its errors    (a dataset of `errors`) the error of `quantity` over time, and the least that can be seen
         a sweep       the largest error of `quantity` against ``step_size`` or ``tolerance``, or work where
                       some methods have one and some the other, or what `x` names: a line for each integrator, dashed
                       for further scenes
+        a comparison  (a dataset of `compare`) the error against run time or evaluations, of `quantity` if that is not
+                      the axis; crosses are runs that failed, the grey band is what the reference cannot judge
         an ensemble   quantiles over members of the error of `quantity` ("axis" or "energy") over time; `members` are
                       the tops that were run (the dataset does not hold them)
 
@@ -66,10 +72,13 @@ def plot(
     if not isinstance(quantity, str):
         raise SymtopError(f"quantity must be the name of one, not {type(quantity).__name__}")
     drawn = _ensemble if "member" in data.dims else _sweep if "setting" in data.dims else _over_time
+    drawn = _compare if "cost" in data.attrs and drawn is _sweep else drawn
     if ax is None:
         ax = plt.subplots(figsize=(7.2, 4.4), layout="constrained")[1]
     if drawn is _ensemble:
         _ensemble(ax, data, quantity, members)
+    elif drawn is _compare:
+        _compare(ax, data, quantity)
     elif drawn is _sweep:
         _sweep(ax, data, quantity, x)
     else:
@@ -120,22 +129,77 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
     controls = [name for name in ("step_size", "tolerance") if name in data and data[name].notnull().any()]
     x = x or (controls[0] if len(controls) == 1 else "force_evaluations")
     x = one_of("x", x, [str(name) for name, values in data.data_vars.items() if _can_be_x(values)])
+    ax.set(xscale="log", yscale="log", ylabel=f"largest {QUANTITIES[quantity]}", xlabel=x.replace("_", " "))
+    ends = []
     for number, scene in enumerate(data["scene"].values):
         for name in data["variant"].values:
-            cell = data.sel(scene=scene, variant=name)
-            across = cell[x].values
-            good = np.isfinite(across) & np.isfinite(cell[quantity].values)
-            if not good.any():
-                continue
-            order = np.argsort(across[good])
+            cell = data.sel(scene=scene, variant=name).sortby(x)
             row = str(name) if "chart" not in cell or str(name).endswith("]") else f"{name}[{cell['chart'].item()}]"
             label = row if data.sizes["scene"] == 1 else f"{row} on {scene}"
-            ax.plot(
-                across[good][order], np.maximum(cell[quantity].values[good][order], LEAST), LINES[number % len(LINES)],
-                color=look(str(name)).color, marker=look(str(name)).marker, ms=4.5, lw=1.2, label=label,
-            )  # fmt: skip
-    ax.set(xscale="log", yscale="log", ylabel=f"largest {QUANTITIES[quantity]}", xlabel=x.replace("_", " "))
-    ax.legend(fontsize=8, frameon=False)
+            options = line(row) | ({"ls": LINES[number % len(LINES)]} if data.sizes["scene"] > 1 else {})
+            good = np.isfinite(cell[x].values) & np.isfinite(cell[quantity].values)
+            failed = np.isfinite(cell[x].values) & ~np.isin(cell["outcome"].values, ("ok", "not_run"))
+            _crosses(ax, cell[x].values[failed], options["color"])
+            if good.any():
+                across, errors = cell[x].values[good], np.maximum(cell[quantity].values[good], LEAST)
+                ax.plot(across, errors, lw=1.2, label=label, **options)
+                ends.append((label, float(across[-1]), float(errors[-1]), options["color"]))
+    name_beside(ax, ends)
+
+
+def _crosses(ax: "Axes", places: Any, color: str) -> None:
+    """Crosses at the top edge: runs that failed."""
+    edge = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 3}
+    ax.scatter(places, np.full(np.size(places), 0.975), 26.0, color, "x", lw=1.0, **edge)
+
+
+def _compare(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
+    """Error against cost, a line for each method, with the time of the exact motion and the bound of the truth.
+
+    A method that fails has a cross where its coarsest good run would be with the longest step from which it fails.
+    """
+    facts, x = data.attrs, "seconds" if data.attrs["cost"] == "time" else "force_evaluations"
+    own = facts["quantity"]
+    shown = own if quantity == "axis" else one_of("quantity", quantity, [own, *(q for q in QUANTITIES if q in data)])
+    y = "error" if shown == own else shown
+    runs = f"{facts['nutations']:.3g} nutations" if facts["nutations"] > 0.0 else f"t = {facts['horizon']:g}"
+    words = "time of a run, one core (s)" if x == "seconds" else "force evaluations of a run"
+    ax.set(xscale="log", yscale="log", ylabel=f"largest {QUANTITIES[shown]}", xlabel=words)
+    ax.set_title(f"Speed against accuracy: {facts['scene']}, {runs}", loc="left", weight="bold")
+    ends, failures = [], []
+    for name in map(str, data["variant"].values):
+        cell, color = data.sel(variant=name), look(name).color
+        cost, errors, last = cell[x].values, np.maximum(cell[y].values, LEAST), fails_from(cell)
+        good = np.flatnonzero(np.isfinite(cost) & np.isfinite(errors))
+        if good.size:
+            ax.plot(cost[good], errors[good], **line(name), lw=1.6, label=name)
+            ends.append((name, float(cost[good[-1]]), float(errors[good[-1]]), color))
+        if last >= 0:
+            count, tolerance = cell["steps_per_nutation"].values, cell["tolerance"].values[last]
+            place = cost[good[0]] * count[last] / count[good[0]] if good.size else np.nan
+            longest = f"{count[last]:.2g}" if np.isnan(tolerance) else f"{tolerance:.0e}"
+            failures.append((longest if good.size else f"{name}: failed", place, color))
+    known = [data[x].values.ravel(), [data["exact_seconds"].item() if x == "seconds" else np.nan]]
+    places = np.concatenate([*known, [place for _, place, _ in failures]])
+    low, high = (float(end) for end in (np.nanmin(places[places > 0.0]) / 1.6, np.nanmax(places) * 1.6))
+    largest = np.nanmax(data[y].values, initial=1e-12)
+    ax.set(xlim=(low, high), ylim=(None, 20.0 * largest))
+    small, beside, below = {"color": "0.35", "fontsize": LEAST_TEXT}, ax.get_yaxis_transform(), ax.get_xaxis_transform()
+    if y == "error":
+        level = error_band(ax, data["error_bound"].values)
+        ax.set_ylim(bottom=0.1 * level)
+        ax.text(0.99, 0.3 * level, BELOW, va="center", ha="right", transform=beside, **small)
+    if x == "seconds":
+        exact = data["exact_seconds"].item()
+        ax.axvline(exact, color="0.35", ls=(0, (1, 2)), lw=1.0)
+        ax.text(exact, 0.15, "exact motion ", rotation=90, ha="right", transform=below, **small)
+    for label, place, color in failures:
+        _crosses(ax, [place if np.isfinite(place) else low], color)
+        ends.append((label, float(place) if np.isfinite(place) else low, np.inf, color))
+    if failures:
+        words = "\N{MULTIPLICATION SIGN} fails at so many steps a nutation and fewer"
+        ax.text(0.99, 0.975, words, va="center", ha="right", transform=ax.transAxes, **small)
+    name_beside(ax, ends)
 
 
 def _can_be_x(values: xr.DataArray) -> bool:
@@ -236,3 +300,10 @@ def _draw_quantiles(axis: Any, times: Any, errors: Any, most: float, color: str)
             name, (times[-1], 10.0**place), xytext=(5, 0), textcoords="offset points", fontsize=LEAST_TEXT, va="center"
         )
     axis.set_xlim(0.0, times[-1] * 1.07)
+
+
+def draw_compare(data: xr.Dataset, path: str | Path) -> None:
+    """The figure of a comparison in a file."""
+    figure, axes = panels(1, 1, height=3.6)
+    _compare(axes[0, 0], data, "axis")
+    save(figure, at_home(path))

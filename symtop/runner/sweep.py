@@ -79,8 +79,8 @@ def sweep(
     integrators may be asked for than are in the file, but not fewer. Raises SymtopError for arguments that make no
     sense.
     """
-    chosen = [find_scene(one) for one in _listed(scenes)]
-    methods = [find_integrator(one) for one in _listed(integrators)]
+    chosen = [find_scene(one) for one in listed(scenes)]
+    methods = [find_integrator(one) for one in listed(integrators)]
     silent = boolean("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
     for words, names in (("scenes", [one.name for one in chosen]), ("integrators", [one.name for one in methods])):
@@ -136,7 +136,7 @@ def sweep(
     return data
 
 
-def _listed(things: Any) -> list[Any]:
+def listed(things: Any) -> list[Any]:
     """One thing, or several, as a list."""
     if isinstance(things, (str, Scene, Integrator)) or not isinstance(things, Iterable):
         return [things]
