@@ -59,9 +59,15 @@ def bundle(results: Path, target: Path | None = None) -> Path:
     """
     page.write(results)
     files = {f"results/{path.relative_to(results).as_posix()}": path.read_bytes() for path in _stored(results)}
-    files |= _test_set()
+    with tempfile.TemporaryDirectory() as folder:
+        states = netcdf.write(scene_states.states(list(scenes().values())), Path(folder) / "states.nc")
+        files["scenes/states.nc"] = states.read_bytes()
+    files["scenes/states.csv"] = scene_states.states_csv(list(scenes().values())).encode()
+    files["scenes/scenes.csv"] = scene_states.scenes_csv(list(scenes().values())).encode()
     files["citations.bib"] = resources.files("symtop.methods").joinpath("citations.bib").read_bytes()
-    files["versions.txt"] = _packages().encode()
+    packages = {(str(one.metadata["Name"]), one.version) for one in metadata.distributions()}
+    versions = (f"{name}=={version}\n" for name, version in sorted(packages, key=lambda pair: pair[0].lower()))
+    files["versions.txt"] = "".join(versions).encode()  # as pip writes them
     files["machine.txt"] = _machine().encode()
     files["README.md"] = readme(results, files).encode()
     sums = "".join(f"{hashlib.sha256(content).hexdigest()}  {name}\n" for name, content in sorted(files.items()))
@@ -80,17 +86,6 @@ def _stored(results: Path) -> list[Path]:
     shown = {results / "figures" / picture["file"] for study in page.gather(results) for picture in study["pictures"]}
     files = [path for ending in ("*.nc", "*.json", "report.html", "report.md") for path in results.glob(ending)]
     return sorted([*files, *shown])
-
-
-def _test_set() -> dict[str, bytes]:
-    chosen = list(scenes().values())
-    with tempfile.TemporaryDirectory() as folder:
-        binary = netcdf.write(scene_states.states(chosen), Path(folder) / "states.nc").read_bytes()
-    return {
-        "scenes/states.nc": binary,
-        "scenes/states.csv": scene_states.states_csv(chosen).encode(),
-        "scenes/scenes.csv": scene_states.scenes_csv(chosen).encode(),
-    }
 
 
 def readme(results: Path, files: Mapping[str, bytes]) -> str:
@@ -119,12 +114,6 @@ def _described(name: str, data: xr.Dataset | xr.DataTree) -> str:
         if rows:
             parts += [f"Group `{group}`:" if group else "", table(["variable", "dimensions", "unit", "meaning"], rows)]
     return "\n\n".join(filter(None, parts))
-
-
-def _packages() -> str:
-    """Every package of this Python with its version, as pip writes them."""
-    named = {(str(one.metadata["Name"]), one.version) for one in metadata.distributions()}
-    return "".join(f"{name}=={version}\n" for name, version in sorted(named, key=lambda pair: pair[0].lower()))
 
 
 def _machine() -> str:
