@@ -176,7 +176,11 @@ def filled(text: str) -> str:
     width = terminal_width()
     return "\n".join(
         textwrap.fill(
-            line, width, break_on_hyphens=False, break_long_words=False, subsequent_indent=" " * (2 + 2 * (line[:1] == " "))
+            line,
+            width,
+            break_on_hyphens=False,
+            break_long_words=False,
+            subsequent_indent=" " * (2 + 2 * (line[:1] == " ")),
         )
         for line in text.splitlines()
     )

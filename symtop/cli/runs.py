@@ -162,7 +162,7 @@ def long(
 @click.option("--nutations", type=float, help="In place of a horizon: nutation periods of each top.")
 @click.option("--samples", type=int, default=101, show_default=True, help="Number of samples of each top.")
 @click.option("--observe", help="nutation, axis or attitude; the axis by default.")
-@click.option("--variables", metavar="NAMES", callback=separated, help="What is kept over time; all by default.")
+@click.option("--variables", metavar="NAME,...", callback=separated, help="What is kept over time; all by default.")
 @click.option("--budget", type=float, help="Most steps of a top, or force evaluations of an adaptive method.")
 @click.option("--threads", type=int, help="Threads; one a core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on this dask cluster.")

@@ -156,7 +156,7 @@ def ink(color: str) -> tuple[float, ...]:
     return tuple(map(float, shown))
 
 
-PAPER = {
+PAPER: dict[Any, Any] = {
     "figure.dpi": 100, "savefig.dpi": DPI, "figure.constrained_layout.use": True, "font.size": 8.0,
     "figure.titlesize": 9.5, "axes.titlesize": 8.0, "axes.labelsize": 8.0, "xtick.labelsize": 7.5,
     "ytick.labelsize": 7.5, "legend.fontsize": 7.5, "legend.title_fontsize": 7.5, "axes.grid": True,
