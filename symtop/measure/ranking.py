@@ -163,9 +163,9 @@ def relative_costs(data: xr.Dataset, among: list[str]) -> xr.DataArray:
                 for scene in data["scene"].values for far in range(data.sizes["horizon"])]  # fmt: skip
     table = np.full((len(TARGETS), len(names), len(problems)), np.inf)
     for k, cell in enumerate(problems):
-        asked = targets(cell)
+        meaningful = targets(cell)
         for number, target in enumerate(TARGETS):
-            if target not in asked:
+            if target not in meaningful:
                 table[number, :, k] = np.nan
                 continue
             for place in cheapest(cell, target):

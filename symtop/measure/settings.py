@@ -382,7 +382,7 @@ def work_table(scene: Scene, method: Integrator, horizons: Sequence[float], budg
     finer, ``reached(horizon, target)``, "met" or why not, and the method's ``control`` and ``nutation_width``.
     """
     width = nutation_width(scene)
-    asked = [target for target in TARGETS if target < width] or [min(TARGETS)]
+    targets = [target for target in TARGETS if target < width] or [min(TARGETS)]
     tables: list[list[Row]] = []
     stops: list[str] = []
     reached: list[list[str]] = []
@@ -395,10 +395,10 @@ def work_table(scene: Scene, method: Integrator, horizons: Sequence[float], budg
             walk.run(math.nan)
             walk.stopped = "nothing to set"
         else:
-            walk.descend(asked, expected)
+            walk.descend(targets, expected)
             if walk.rows:
-                walk.coarsen(max(asked))
-                for target in asked:
+                walk.coarsen(max(targets))
+                for target in targets:
                     walk.approach(target)
         spent = {setting: float(row["force_evaluations"]) for setting, row in walk.rows.items()} or spent
         before = horizon if walk.rows else before

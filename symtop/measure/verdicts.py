@@ -158,8 +158,8 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
     elif word == "drifting":
         sentence = f"the energy error passed {DRIFT:.0%} at {when} and grew on, to {energy.max():.2g}"
     else:
-        kept = f"while the energy stayed within {energy.max():.2g}"
-        sentence = f"the axis error passed {truth.accurate:.2g} rad at {when} {kept}"
+        energies = f"while the energy stayed within {energy.max():.2g}"
+        sentence = f"the axis error passed {truth.accurate:.2g} rad at {when} {energies}"
     return Judgement(word, float(times[first]), sentence)
 
 

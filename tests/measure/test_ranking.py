@@ -103,6 +103,14 @@ def test_the_closed_form_is_compared_with_the_fastest_row():
     assert row == ["x", "ten", "10 (1e+05 us; b)", "10 (1e+05 us; b)", "", ""]
 
 
+def test_the_median_of_the_closed_form_is_over_all_combinations_and_not_those_that_it_wins():
+    short = cell([[2.0] * 3, [1.0] * 3, [4.0] * 3], errors=[1e-16, 1e-4, 1e-7])
+    short["control"][0] = ""
+    message = work_closed_form.headline(short.expand_dims(scene=["x"]).expand_dims(horizon=[10.0]), ["over ten"])
+    assert "1 of 2" in message
+    assert "0.5 to 2 (median of all 2: 1.2)" in message  # of the one that it wins it would be 2
+
+
 def test_own_rows_are_compared_with_taylor():
     """One is ahead at 1e-3 and alone at 1e-9; without taylor nothing is said, and a slower row is named as such."""
     data = cell([[0.5] * 3, [1.0] * 3, [2.0] * 3], errors=[1e-4, 1e-7, 1e-10])
@@ -112,6 +120,7 @@ def test_own_rows_are_compared_with_taylor():
     assert row == ["x", "over ten", "0.50 (series[axis])", "2.00 (rk4[axis])", "rk4[axis] alone", "neither"]
     only = data.sel(variant=["series[axis]", "rk4[axis]"])
     assert against_taylor.compared(only) == {}
+    assert [one.alone for one in against_taylor.compared(data).values()] == ["", "", "own", ""]
 
 
 def test_the_rival_is_taylor_in_double_precision_and_its_longer_forms_are_told_where_they_are_alone():

@@ -52,6 +52,7 @@ WINDOWS = {2: (60, 2000), 4: (40, 400), 6: (25, 130), 8: (18, 50), 10: (8, 26), 
 @pytest.mark.parametrize("scene", ["spheroid", "goldstein"])
 @pytest.mark.parametrize("order", WINDOWS)
 def test_order(scene, order):
+    assert integrator(f"gauss-{order}").order == order
     assert_order(scene, integrator(f"gauss-{order}"), order, 0.05 if order <= 6 else 0.3, WINDOWS[order])
 
 

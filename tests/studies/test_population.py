@@ -7,7 +7,16 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.population import costs, ladder, messages, prices as pricing, study, tops as tops_module, verdicts
+from symtop_studies.population import (
+    costs,
+    ladder,
+    messages,
+    prices as pricing,
+    study,
+    tops as tops_module,
+    verdicts,
+    words,
+)
 from symtop_studies.population.costs import Share, cost_to_reach, detection, quantiles, run_lengths, slowdowns, winner
 from symtop_studies.population.prices import prices
 from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, numbers_of, strata_of
@@ -431,6 +440,13 @@ def test_standings_of_known_costs():
     assert third.solved == Share(1, 4)
 
 
+def test_the_widest_solves_the_most_tops_and_is_the_first_of_equals():
+    for fails_too, row in ((0, "b"), (4, "a")):
+        data = tree({"a": [1.0] * 6 + [INF] * 4, "b": [3.0] * (10 - fails_too) + [INF] * fails_too})
+        taken = verdicts.costs(data, Cell("short", "axis", 1e-3), "alone")
+        assert verdicts.widest(verdicts.standings(taken)).name == row
+
+
 def test_a_method_made_worse_loses():
     """The same costs with a hundredth of noise: level; one of them twice as dear: it wins nowhere."""
     draw = np.random.default_rng(1)
@@ -521,3 +537,13 @@ def test_advice_counts_the_nearest_tops_of_the_quick_results(quick_results, quan
     advice = symtop.recommend(scene, accuracy=1e-6, quantity=quantity, horizon=20.0, results=quick_results)
     assert "of the 50 nearest random tops" in advice.nearest
     assert advice.nearest in str(advice)
+
+
+def test_silent_runs_at_small_steps_are_counted_by_kind_of_top(quick_results):
+    data = netcdf.read_any(quick_results / "population.nc")
+    share, each = words.hidden(data), words.hidden_by_steps(data)
+    assert share.kind in verdicts.strata(data)
+    assert share.of_kind <= share.silent_fine == pytest.approx(share.fine * share.wrong_fine)
+    assert [step for step, _, _ in each] == sorted(step for step, _, _ in each)
+    assert sum(wrong for step, wrong, _ in each if step >= words.FINE) == share.wrong_fine < share.wrong
+    assert sum(silent for step, _, silent in each if step >= words.FINE) == pytest.approx(share.silent_fine)

@@ -149,8 +149,8 @@ class Integrator:
         if self.conserves is not None:
             if isinstance(self.conserves, str) or not isinstance(self.conserves, Collection):
                 raise SymtopError(f"conserves must be a set of names, not {self.conserves!r}")
-            kept = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in self.conserves)
-            object.__setattr__(self, "conserves", kept)
+            names = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in self.conserves)
+            object.__setattr__(self, "conserves", names)
 
     def _check_kinds(self) -> None:
         for name, allowed in ALLOWED.items():
@@ -254,8 +254,8 @@ def _load() -> None:
             module = importlib.import_module(f"symtop.methods.{_BUILT_IN[len(_loaded)]}")
             _loaded.append(module.__name__)
             for entry in module.built_in():
-                told = replace(entry, about=entry.about or paragraphs().get(entry.name, ""))
-                _registry.setdefault(entry.name, told)
+                described = replace(entry, about=entry.about or paragraphs().get(entry.name, ""))
+                _registry.setdefault(entry.name, described)
                 _shipped.add(entry.name)
             if hasattr(module, "missing"):
                 _missing.update(module.missing())
