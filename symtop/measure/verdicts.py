@@ -29,7 +29,7 @@ from symtop.model.exact import samples
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.scenes import Scene
 from symtop.model.top import effective_potential, flat
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 
 ACCURATE = EXPECTED  # rad: what is wrong afterwards is what the guard warns of before
 OUTSIDE = 0.1  # of the nutation's width, or rad if it has none

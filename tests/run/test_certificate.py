@@ -13,10 +13,17 @@ from symtop.model.exact import closed_form as forms, layout as at
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import Scene, closed_form, scene, scenes
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.reference import bounds as bounds_module, certificate as module
-from symtop.run.reference.bounds import ROUNDING, SUSPICIOUS, closed_bounds, closed_values, disagreement
-from symtop.run.reference.certificate import Certificate, certificate
+from symtop.run.reference import truth as bounds_module, truth as module
 from symtop.run.reference.independent_checks import MAP_STEPS, iterated, iterated_with_error
+from symtop.run.reference.truth import (
+    ROUNDING,
+    SUSPICIOUS,
+    Certificate,
+    certificate,
+    closed_bounds,
+    closed_values,
+    disagreement,
+)
 
 TIMES = np.array([0.3, 17.0, 1e3, 1e6])
 

@@ -11,7 +11,7 @@ from symtop.methods.framework.lanes import W
 from symtop.methods.framework.many import members_of
 from symtop.model.exact.closed_form import NUMBERS, ClosedForms
 from symtop.run.ensemble import chunks
-from symtop.run.sampling import nutation_periods, schedule
+from symtop.run.ensemble.chunks import nutation_periods, schedule
 from symtop.run.simulation import sample_times
 
 SOME = symtop.population(36, seed=5)
