@@ -212,7 +212,7 @@ def test_what_a_killed_writer_left_is_swept_and_a_library_without_room_says_so(t
     assert {file.name for file in tmp_path.iterdir()} == {"runs.nc.parts"}
     monkeypatch.undo()
     monkeypatch.setattr(chunks, "CHUNK", 21 * 7)
-    monkeypatch.setattr(chunks.Job, "columns", no_room)  # nothing is left to be computed
+    monkeypatch.setattr(ensemble.Stream, "keep", no_room)  # nothing is left to be computed
     symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED).close()
     assert path.exists()
 

@@ -277,8 +277,10 @@ class Job:
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
             runs = _whole(self._runs(plan), plan)
             columns = self._observables(runs, plan.times)
-        counts = np.array(ENDS)[runs.outcome], runs.steps, runs.force_evaluations, runs.newton_iterations
-        each = (*counts, runs.reached, plan.step_size, self.horizon, plan.dithered)
+        each: tuple[Any, ...] = (
+            np.array(ENDS)[runs.outcome], runs.steps, runs.force_evaluations, runs.newton_iterations, runs.reached,
+            plan.step_size, self.horizon, plan.dithered,
+        )  # fmt: skip
         columns = {"time": plan.times, **columns, **dict(zip(PER_MEMBER, each, strict=True))}
         return columns | ({RAISED: runs.raised} if runs.raised else {})
 
@@ -306,8 +308,11 @@ class Job:
         """
         n = len(plan.counts)
         states = np.full((n, self.samples, charts.DIMENSIONS[self.chart]), np.nan)
-        momenta, counts = np.full((n, self.samples, 2), np.nan), np.zeros((4, n), int)
-        runs = _Runs(states, momenta, *counts, np.zeros(n))
+        momenta, (steps, evaluations, iterations, outcome) = (
+            np.full((n, self.samples, 2), np.nan),
+            np.zeros((4, n), int),
+        )
+        runs = _Runs(states, momenta, steps, evaluations, iterations, outcome, np.zeros(n))
         for i, (top, start) in enumerate(members_of(self.numbers)):
             heed()
             if self.chart == "angles" and not 0.0 < start.theta < np.pi:
