@@ -21,13 +21,14 @@ from symtop_studies.population.costs import Share, cost_to_reach, detection, qua
 from symtop_studies.population.prices import prices
 from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, numbers_of, strata_of
 from symtop_studies.population.verdicts import Cell
+from symtop_studies.work_precision.walk import nutation_width
 
 import symtop
 from symtop import advise
 from symtop.core import netcdf
 from symtop.measure.accuracy import error_row
-from symtop.measure.nearest import nearest
-from symtop.measure.settings import TARGETS, nutation_width
+from symtop.measure.ranking import nearest
+from symtop.measure.settings import TARGETS
 from symtop.measure.timing import Timing
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
