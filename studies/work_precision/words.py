@@ -145,17 +145,17 @@ def fastest(data: xr.Dataset, wins: Sequence[leads.Win]) -> str:
 def least_times(data: xr.Dataset) -> str:
     """From where to where the times of the fastest variants lie at each run length, and their leads."""
     times: dict[int, list[float]] = {}
-    leads = []
+    ratios = []
     for (_, far, _), won in leads.winners(data).items():
         if won is not None:
             times.setdefault(far, []).append(won.best.cost)
-            leads += [won.ratio] if won.behind and not won.level else []
+            ratios += [won.ratio] if won.behind and not won.level else []
     parts = [f"{seconds(min(values))} to {seconds(max(values))} {spans(data)[far]}" for far, values in times.items()]
     if not parts:
         return ""
     said = f"The fastest variant takes {joined(parts)}, by scene and error."
-    if leads:
-        said += f" Where its lead is sure, the next variant takes {min(leads):.1f} to {max(leads):.1f} times as long."
+    if ratios:
+        said += f" Where its lead is sure, the next variant takes {min(ratios):.1f} to {max(ratios):.1f} times as long."
     return said
 
 

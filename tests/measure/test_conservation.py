@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.measure.conservation import residuals, trend
-from symtop.measure.growth import growth
+from symtop.measure.conservation import growth, residuals, trend
 from symtop.run.simulation import integrate
 
 DISCRETE = ("midpoint", "trapezoidal", "stormer-verlet")

@@ -9,9 +9,8 @@ import xarray as xr
 
 import symtop
 from symtop.measure.accuracy import error_table
-from symtop.measure.conservation import trend
+from symtop.measure.conservation import growth, trend
 from symtop.measure.errors import errors_against
-from symtop.measure.growth import growth
 from symtop.measure.order import order, power_law
 from symtop.measure.settings import ladder
 from symtop.measure.timing import Timing, timings
