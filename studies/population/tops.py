@@ -114,7 +114,7 @@ class Tops:
 
     @cached_property
     def regime(self) -> Array:
-        """Four numbers without units that fix the motion of the axis, (n, 4); see `symtop.measure.nearest`."""
+        """Four numbers without units that fix the motion of the axis, (n, 4); see `symtop.measure.ranking`."""
         I1, _, mgl = (self.numbers[:, k] for k in range(3))
         unit = np.sqrt(I1 * np.maximum(np.abs(mgl), TINY))
         high, low = np.cos(self.forms.theta_range.T)

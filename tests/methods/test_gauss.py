@@ -8,8 +8,7 @@ import pytest
 from symtop_studies.stability.linear_limits import linear_limits
 
 import symtop
-from symtop.measure.conservation import residuals, trend
-from symtop.measure.growth import growth
+from symtop.measure.conservation import growth, residuals, trend
 from symtop.measure.step_map import one_step as map_of, symplectic_defect
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.registry import integrator
