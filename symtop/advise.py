@@ -41,7 +41,7 @@ from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import Integrator, integrator, integrators, is_built_in, split_name
 from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
-from symtop.run.guard.guard import MOST_STEPS
+from symtop.run.guard import MOST_STEPS
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
 STORED_STUDY = "work_precision.nc"

@@ -17,7 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.model.scenes import Scene
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 
 ACCURATE = EXPECTED  # rad: what is wrong afterwards is what the guard warns of before
 OUTSIDE = 0.1  # of the nutation's width, or rad if it has none

@@ -33,7 +33,7 @@ from symtop.measure.timing import Timing
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 from symtop.runner.check import differences
 
 INF, NAN = math.inf, math.nan
