@@ -7,32 +7,24 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.population import (
-    costs,
-    ladder,
-    messages,
-    prices as pricing,
-    study,
-    tops as tops_module,
-    verdicts,
-    words,
-)
+from symtop_studies.population import costs, ladder, prices as pricing, study, tops as tops_module, verdicts, words
 from symtop_studies.population.costs import Share, cost_to_reach, detection, quantiles, run_lengths, slowdowns, winner
-from symtop_studies.population.prices import prices
+from symtop_studies.population.prices import Pair, prices
 from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, numbers_of, strata_of
 from symtop_studies.population.verdicts import Cell
+from symtop_studies.work_precision.walk import nutation_width
 
 import symtop
 from symtop import advise
 from symtop.core import netcdf
 from symtop.measure.accuracy import error_row
-from symtop.measure.nearest import nearest
-from symtop.measure.settings import TARGETS, nutation_width
+from symtop.measure.ranking import nearest
+from symtop.measure.settings import TARGETS
 from symtop.measure.timing import Timing
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 from symtop.runner.cases import differences
 
 INF, NAN = math.inf, math.nan
@@ -459,14 +451,6 @@ def test_a_method_made_worse_loses():
     assert (won.row, won.share, won.next_share) == (1, Share(500, 500), Share(0, 500))
 
 
-def test_what_is_not_zero_is_not_printed_as_zero_and_what_is_not_all_not_as_all():
-    shares = Share(0, 9), Share(1, 9000), Share(32, 9883), Share(1, 2)
-    assert [messages.share_won(share) for share in shares] == ["0%", "<0.1%", "0.3%", "50%"]
-    assert messages.found_of(Share(9998, 10000)) == "all but 2 of 10,000 wrong runs"
-    assert messages.found_of(Share(70, 70)) == "all 70 wrong runs"
-    assert messages.found_of(Share(70, 100), whole=False) == "70.0% of wrong runs"
-
-
 def test_a_winner_by_times_that_are_not_met_again_is_not_sure():
     even = {"a": np.ones(500), "b": np.ones(500)}
     for price, sure in (({"a": (1.0, 1.0), "b": (1.3, 1.3)}, True), ({"a": (1.0, 1.4), "b": (1.3, 1.3)}, False)):
@@ -547,3 +531,12 @@ def test_silent_runs_at_small_steps_are_counted_by_kind_of_top(quick_results):
     assert [step for step, _, _ in each] == sorted(step for step, _, _ in each)
     assert sum(wrong for step, wrong, _ in each if step >= words.FINE) == share.wrong_fine < share.wrong
     assert sum(silent for step, _, silent in each if step >= words.FINE) == pytest.approx(share.silent_fine)
+
+
+def test_a_price_lost_in_noise_is_the_long_runs_whole_time():
+    """A short run that was timed longer than the long one gives no slope; a price is positive all the same."""
+    pair = Pair((lambda: None, 100.0), (lambda: None, 300.0))
+    assert pair.slopes(Timing((1.0, 2.0), 0.0), Timing((5.0, 4.0), 0.0), 2) == pytest.approx(
+        [3 / 200, 4 / 200, 2 / 200]
+    )
+    assert pair.slopes(Timing((6.0, 6.0), 0.0), Timing((3.0, 3.0), 0.0), 2) == pytest.approx([0.01] * 3)
