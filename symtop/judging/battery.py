@@ -1,17 +1,14 @@
-"""The battery: every claim, whom it is asked of, and what measures it.
-
-One table judges registered integrators, ours and a plug-in's, and bare steps from an adapter, through nothing but their
-solvers:
+"""The battery: one table of every claim, whom it is asked of and what measures it, through nothing but the solvers.
 
     calls          a step is a function of its arguments (bare steps)                                 (`claims.calls`)
     order          the power series of a step, slopes of the errors, the limit of small steps         (`claims.order`)
-    time           the order where f depends on time (bare steps that take f)                        (`claims.series`)
+    time           the order where f depends on time (bare steps that take f)                         (`claims.order`)
     symplectic     the bracket after one step, in every chart                                     (`claims.structure`)
     symmetric      one step forth and back, in every chart                                        (`claims.structure`)
+    pole           the axis passes a pole exactly                                                 (`claims.structure`)
     energy, p_phi, p_psi, axis_length, invariant      a million steps, in every chart             (`claims.constants`)
     reported       the momenta that a run reports beside those of its states                      (`claims.constants`)
     explicit, work                                    what a step costs, as its solver reports it (`claims.constants`)
-    pole           the axis passes a pole exactly                                                      (`claims.pole`)
 
 A map of (theta, p_theta) is judged in its plane (`claims.reduced`). A claim is refuted only far beyond what the
 measurement itself leaves in doubt; both numbers are in the ledger (`symtop.judging.findings`).
@@ -22,7 +19,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims import calls, constants, order, pole, reduced, series, structure
+from symtop.judging.claims import calls, constants, order, reduced, structure
 from symtop.judging.claims.subject import Subject, declared
 from symtop.judging.findings import Finding, Ledger, undecided
 from symtop.methods.framework.registry import Integrator
@@ -46,7 +43,7 @@ EVERY, STEP, INTEGRATOR = ("integrator", "step"), ("step",), ("integrator",)
 TABLE = (
     Claim("calls", STEP, calls.measure, calls.measure),
     Claim("order", EVERY, order.measure, reduced.order),
-    Claim("time", STEP, series.time_order),
+    Claim("time", STEP, order.time_order),
     Claim("symplectic", EVERY, structure.measure, reduced.structure),
     Claim("symmetric", EVERY, structure.measure, reduced.structure),
     Claim("energy", EVERY, constants.measure, reduced.constants),
@@ -57,14 +54,14 @@ TABLE = (
     Claim("invariant", EVERY, constants.measure, reduced.constants),
     Claim("explicit", EVERY, constants.measure, reduced.constants),
     Claim("work", EVERY, constants.measure, reduced.constants),
-    Claim("pole", EVERY, pole.measure),
+    Claim("pole", EVERY, structure.pole),
 )
 CLAIMS = tuple(claim.name for claim in TABLE if "integrator" in claim.applies)
 
 
 def stages(kind: str) -> list[Stage]:
     """The claims that apply to an "integrator" or a "step", those together that are measured together."""
-    chosen = [claim for claim in TABLE if kind in claim.applies]
+    chosen = (claim for claim in TABLE if kind in claim.applies)
     return [tuple(group) for _, group in groupby(chosen, key=lambda claim: claim.measure)]
 
 

@@ -21,10 +21,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from symtop.core.errors import SymtopError, words_of
+from symtop.judging.adapters.adapter import heartbeat
 from symtop.judging.battery import Stage, measure, stages, unmeasured
 from symtop.judging.claims.subject import Request
-from symtop.judging.findings import Finding
-from symtop.judging.heartbeat import heartbeat
+from symtop.judging.findings import About, Finding
 
 THREADED = "jax"  # hangs in a process that was forked after its import
 LOOK = 0.05  # seconds between two looks
@@ -32,15 +32,6 @@ OPENING = 60.0  # seconds for loading a file and its imports
 # seconds for the claims of one stage: at most, for all stages together, and at least however many were spent
 VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
 WORDS = 160  # characters of what a process says before it ends
-
-
-class About(NamedTuple):
-    """What is judged, once it is open."""
-
-    name: str
-    chart: str
-    implementation: str
-    seconds_a_step: float
 
 
 class Results(NamedTuple):

@@ -6,9 +6,7 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import symtop
-from symtop.judging.findings import Finding, Measured
-from symtop.judging.judge_step import StepLedger
-from symtop.judging.sandbox import About
+from symtop.judging.findings import About, Finding, Measured, StepLedger
 from symtop.report.card import badge, card, figures, write_badge
 
 

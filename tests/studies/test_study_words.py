@@ -12,7 +12,7 @@ from symtop_studies.drift.variants import charts_table
 from symtop_studies.truth import tables as truth_tables, words as truth_words
 
 import symtop
-from symtop.judging.claims.long_run import KEPT, Constant
+from symtop.judging.claims.constants import KEPT, Constant
 from symtop.measure import conservation
 
 

@@ -1,9 +1,10 @@
 """What every adapter gives: something that steps a state of one formulation, and its record for the battery.
 
 The momenta of the runs of a `Stepper` are read off its states here and never asked from it, so that it cannot report
-others than it has.
+others than it has. Each call of it stands in the context of `heartbeat`, which the process that waits for it can see.
 """
 
+import mmap
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from symtop.core.errors import SymtopError, words_of
 from symtop.measure.step_map import reversed_rates
 from symtop.methods.framework.equations import Formulation, as_run
 from symtop.methods.framework.plan import NOT_FINITE, OK, Array, Plan, Run
@@ -20,6 +22,8 @@ from symtop.model.top import Angles, SymmetricTop
 
 Marks = NDArray[np.int64]
 LOOK = 64  # steps from one look at whether the state is finite to the next
+CALLS, STEP, INSIDE, ALLOWED = range(4)
+PATIENCE, QUICK_PATIENCE = 10.0, 3.0  # seconds for one call
 
 
 class March(NamedTuple):
@@ -57,14 +61,10 @@ def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable
     return states
 
 
-def label_of(text: str) -> str:
-    """A name of an integrator made of any text."""
+def label_of(thing: Any) -> str:
+    """A name of an integrator made of any text, or of what a function or the class of something callable is called."""
+    text = thing if isinstance(thing, str) else getattr(thing, "__name__", type(thing).__name__)
     return re.sub(r"[^A-Za-z0-9._+-]+", "-", text).strip("-._+")[:64] or "step"
-
-
-def function_name(function: Callable[..., Any]) -> str:
-    """The name of a function, or of the class of something that is called like one."""
-    return getattr(function, "__name__", type(function).__name__)
 
 
 @dataclass(frozen=True)
@@ -102,8 +102,7 @@ class AdapterSolver:
         turned = np.ones(len(state))
         turned[-3 if turned.size > 2 else -1 :] = -1.0  # L, w, the rates or p_theta
         y = turned * self._once(top, par, np.array(state, dtype=float), h)
-        back, _ = form.prepare(top, reversed_rates(start))
-        y = turned * self._once(top, back, y, h)
+        y = turned * self._once(top, form.prepare(top, reversed_rates(start))[0], y, h)
         return as_run(form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
 
     def _once(self, top: SymmetricTop, par: Any, y: Array, h: float) -> Array:
@@ -114,12 +113,60 @@ class AdapterSolver:
 def integrator(stepper: Stepper, **claims: Any) -> Integrator:
     """The record of a stepper with the claims that are made for it."""
     chart = "angles" if stepper.chart == "nutation" else stepper.chart
-    return Integrator(
-        name=stepper.name,
-        family="other",
-        summary="given through an adapter",
-        solvers={chart: stepper.adaptive or AdapterSolver(stepper)},
-        control="tolerance" if stepper.adaptive else "step_size",
-        implementation=stepper.implementation,
-        **claims,
-    )
+    solvers = {chart: stepper.adaptive or AdapterSolver(stepper)}
+    claims |= {"control": "tolerance" if stepper.adaptive else "step_size", "implementation": stepper.implementation}
+    return Integrator(stepper.name, "other", "given through an adapter", solvers, **claims)
+
+
+class Beat(NamedTuple):
+    """One look at a heartbeat."""
+
+    calls: int  # begun so far
+    step: float  # h of the last one
+    inside: bool
+    allowed: float  # seconds that this call may take
+
+
+class Heartbeat:
+    """Counts calls of a step, in memory that a forked process shares: ``with heartbeat.call(h): step(...)``.
+
+    What the call raises becomes a SymtopError. `forward_only` is set after a step backwards has not returned: such
+    steps are refused from then on.
+    """
+
+    def __init__(self) -> None:
+        self._numbers = np.frombuffer(mmap.mmap(-1, 4 * 8))
+        self.reset(quick=False)
+
+    def reset(self, *, quick: bool) -> None:
+        """Something else is judged from now on."""
+        self.forward_only, self.patience = False, QUICK_PATIENCE if quick else PATIENCE
+
+    def call(self, h: float, seconds: float = 0.0) -> "Heartbeat":
+        """The context of a call that steps by h, which may take so many seconds beyond the usual."""
+        if self.forward_only and h < 0.0:
+            raise SymtopError("it makes no step backwards: a step of -h did not return")
+        self._numbers[STEP] = h
+        self._numbers[ALLOWED] = self.patience + seconds
+        return self
+
+    def __enter__(self) -> None:
+        self._numbers[INSIDE] = 1.0
+        self._numbers[CALLS] += 1.0
+
+    def end(self) -> None:
+        """No call is under way."""
+        self._numbers[INSIDE] = 0.0
+
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
+        self.end()
+        if isinstance(error, Exception) and not isinstance(error, SymtopError):
+            raise SymtopError(f"a step of h = {self._numbers[STEP]:.3g} raises {words_of(error)}") from error
+
+    def look(self) -> Beat:
+        """What the last call was, from any process."""
+        calls, step, inside, allowed = self._numbers.tolist()
+        return Beat(int(calls), step, bool(inside), allowed)
+
+
+heartbeat = Heartbeat()  # of the judged step of this process: there is one at a time

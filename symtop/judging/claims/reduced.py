@@ -13,18 +13,17 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import AdapterSolver
-from symtop.judging.adapters.separable import SeparableStep
-from symtop.judging.claims import long_run as long
-from symtop.judging.claims.constants import of_run, traces_of
-from symtop.judging.claims.order import NUTATIONS, Order, settings_shown, weighed
-from symtop.judging.claims.series import ChartSeries
+from symtop.judging.adapters.python_step import SeparableStep
+from symtop.judging.claims import constants as long
+from symtop.judging.claims.constants import of_run
+from symtop.judging.claims.order import NUTATIONS, ChartSeries, Order, settings_shown, weighed
 from symtop.judging.claims.structure import ONE_MAP, structure_of
 from symtop.judging.claims.subject import FEWEST, STEPS, Subject
 from symtop.judging.findings import Finding, inapplicable
 from symtop.measure.order import order as order_of
 from symtop.measure.step_map import SHARE, StepMap, angles_at, coarsest, generic_start, restart_gap
 from symtop.measure.step_series import step_series
-from symtop.methods.framework.plan import NOT_FINITE, OK, OUTCOMES, Array, Run, sentence
+from symtop.methods.framework.plan import NOT_FINITE, OK, OUTCOMES, Array, Run
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, Momenta
 
@@ -107,7 +106,7 @@ def constants(subject: Subject) -> list[Finding]:
     """What a long run shows."""
     steps = min(subject.long_steps or STEPS, long.QUICK_STEPS if subject.quick else STEPS)
     run = long_run(subject.stepper, subject.scene, round(steps))
-    subject.traces.update(traces_of(run))
+    subject.traces.update(run.traces())
     return of_run(subject.method, run)
 
 
@@ -139,33 +138,22 @@ def order(subject: Subject) -> list[Finding]:
 def long_run(stepper: SeparableStep, scene: Scene, steps: int) -> long.LongRun:
     """The energy over many steps, and in each of the first."""
     par, state = stepper.form.prepare(scene.top, scene.start)
-    h, most = scene.time_scale() / long.STEPS_A_NUTATION, max(steps, long.PILOT)
     p_phi, p_psi = (float(value[0]) for value in stepper.form.momenta(par, np.array([state])))
 
-    def change(marks: Array, h: float) -> tuple[Array, int]:
+    def change(marks: Array, h: float) -> tuple[dict[str, Array], int]:
         """The change of the energy since the start, as a share of the nutation's, and the forces."""
         states, forces = stepper.march(scene.top, par, np.array(state), h, marks.astype(np.int64))
         with np.errstate(all="ignore"):
             energy = scene.top.reduced_energy(states[:, 0], states[:, 1], p_phi, p_psi)
-        return (energy - energy[0]) / scene.energy_scale, forces
+        return {"energy": (energy - energy[0]) / scene.energy_scale}, forces
 
-    marks = np.unique(np.rint(np.linspace(0, most, long.SAMPLES)))
+    h, first = scene.time_scale() / long.STEPS_A_NUTATION, np.arange(long.PILOT + 1.0)
+    marks = np.unique(np.rint(np.linspace(0, max(steps, long.PILOT), long.SAMPLES)))
     values, forces = change(marks, h)
-    every, few = change(np.arange(long.PILOT + 1.0), h)
-    _, other = change(np.arange(long.PILOT + 1.0), 0.21 * h)
-    good, times = np.isfinite(values), marks * h
-    made = int(marks[good][-1])
-    outcome = OUTCOMES[OK if good.all() else NOT_FINITE]
-    return long.LongRun(
-        constants={"energy": long.change_of(times, values, every, max(made, 1), scene.energy_grain)},
-        outcome=outcome,
-        message=sentence(outcome, made * h, most * h),
-        chart=CHART,
-        steps=made,
-        nutations=made * h / scene.time_scale(),
-        evaluations=forces / max(made, 1),
-        iterations=0.0,
-        steady_cost=few == other,
-        reported=None,
-        energy=long.windows(times / scene.time_scale(), values),
-    )
+    every, few = change(first, h)
+    _, other = change(first, 0.21 * h)
+    good = np.isfinite(values["energy"])
+    made, outcome = int(marks[good][-1]), OUTCOMES[OK if good.all() else NOT_FINITE]
+    nothing = np.empty(0)  # neither states nor momenta are shown
+    run = Run(nothing, nothing, nothing, made, forces, 0, outcome, made * h)
+    return long.found_in(run, scene, CHART, marks * h, values, every, few == other, None)
