@@ -3,7 +3,7 @@
     1. Candidates. A stored population study counts on how many of the random tops nearest to this one a method was
        the cheapest or nearly so; a stored work-precision study lists the methods that were cheapest on the nearest
        scene. The distance is that of four dimensionless numbers which fix the motion of the axis
-       (`symtop.measure.nearest`). Without a stored study every compiled method is a candidate.
+       (`symtop.measure.ranking`). Without a stored study every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
        (`symtop.measure.settings`). The error is measured against the closed form, its target is lowered by the law of
        growth, and one run is timed.
@@ -35,13 +35,13 @@ from symtop.core import netcdf
 from symtop.core.errors import SymtopError, one_of, positive
 from symtop.measure import ranking, settings
 from symtop.measure.errors import QUANTITIES
-from symtop.measure.nearest import STORED, Near, distances, nearest, regime
 from symtop.measure.phase import FREQUENCIES
+from symtop.measure.ranking import STORED, Near, distances, nearest, regime
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import Integrator, integrator, integrators, is_built_in, split_name
 from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
-from symtop.run.guard.guard import MOST_STEPS
+from symtop.run.guard import MOST_STEPS
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
 STORED_STUDY = "work_precision.nc"

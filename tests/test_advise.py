@@ -14,7 +14,7 @@ from symtop.advise import regime
 from symtop.cli.main import main
 from symtop.measure import settings
 from symtop.measure.errors import errors_against
-from symtop.measure.nearest import Near
+from symtop.measure.ranking import Near
 from symtop.methods.framework.registry import methods
 
 

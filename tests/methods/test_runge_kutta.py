@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.measure.conservation import residuals, trend
+from symtop.measure.conservation import growth, residuals, trend
 from symtop.measure.errors import errors_against
-from symtop.measure.growth import growth
 from symtop.methods.framework import angles, equations
 from symtop.methods.framework.angles import field_angles, to_angles, with_rates
 from symtop.methods.framework.equations import FORMULATIONS

@@ -18,10 +18,15 @@ from symtop.model import charts, scenes
 from symtop.model.exact import closed_form
 from symtop.model.exact.constants import RATE
 from symtop.model.exact.digits import PreciseForm
-from symtop.run.reference.bounds import closed_bounds, closed_values
-from symtop.run.reference.certificate import Certificate
 from symtop.run.reference.independent_checks import check_times, flown, integrate, precise_attitude
-from symtop.run.reference.truth import UNCERTIFIED, _cache_path, reference as reference_function
+from symtop.run.reference.truth import (
+    UNCERTIFIED,
+    Certificate,
+    _cache_path,
+    closed_bounds,
+    closed_values,
+    reference as reference_function,
+)
 
 
 @pytest.fixture

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 import xarray as xr
 from symtop_studies.stability import atlas, atlas_words, messages, outcome_maps, words
+from symtop_studies.stability.many_verdicts import JUDGED, VERDICTS
 from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row_plan, spin_unit, with_spin
 from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
 
 import symtop
 from symtop.core import netcdf
 from symtop.measure.errors import errors_against
-from symtop.measure.verdicts import JUDGED, VERDICTS, verdict
+from symtop.measure.verdicts import judgement
 from symtop.methods.framework.registry import integrator, methods
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
@@ -26,7 +27,7 @@ STEPS = [0.011, 0.053, 0.17, 0.31, 0.83]
 
 @pytest.mark.parametrize("name", ["midpoint", "stormer-verlet", "strang", "gauss-4", "rk4"])
 def test_a_map_says_what_single_runs_say(name):
-    """The same runs through `simulate`, the reference and `verdict`, sampled more densely."""
+    """The same runs through `simulate`, the reference and `judgement`, sampled more densely."""
     runs = outcome_map("cusp", [0.3, 1.0, 8.0], integrator(name), STEPS, 12.0)
     for place, ratio in enumerate((0.3, 1.0, 8.0)):
         spun = with_spin(scene("cusp"), ratio)
@@ -38,7 +39,7 @@ def test_a_map_says_what_single_runs_say(name):
             )  # fmt: skip
             error = errors_against(spun, run, reference(spun, run["time"].values, "closed-form"))["axis"].values
             mapped = VERDICTS[runs.verdict[place, column]]
-            single = verdict(spun, run, error)
+            single = judgement(spun, run, error).verdict
             assert (mapped == "accurate") == (single == "accurate"), (ratio, value, mapped, single)
             if run.attrs["outcome"] != "ok":
                 assert mapped == run.attrs["outcome"]

@@ -18,21 +18,22 @@ from symtop_studies.population import (
     words,
 )
 from symtop_studies.population.costs import Share, cost_to_reach, detection, quantiles, run_lengths, slowdowns, winner
-from symtop_studies.population.prices import prices
+from symtop_studies.population.prices import Pair, prices
 from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, numbers_of, strata_of
 from symtop_studies.population.verdicts import Cell
+from symtop_studies.work_precision.walk import nutation_width
 
 import symtop
 from symtop import advise
 from symtop.core import netcdf
 from symtop.measure.accuracy import error_row
-from symtop.measure.nearest import nearest
-from symtop.measure.settings import TARGETS, nutation_width
+from symtop.measure.ranking import nearest
+from symtop.measure.settings import TARGETS
 from symtop.measure.timing import Timing
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 from symtop.runner.check import differences
 
 INF, NAN = math.inf, math.nan
@@ -547,3 +548,12 @@ def test_silent_runs_at_small_steps_are_counted_by_kind_of_top(quick_results):
     assert [step for step, _, _ in each] == sorted(step for step, _, _ in each)
     assert sum(wrong for step, wrong, _ in each if step >= words.FINE) == share.wrong_fine < share.wrong
     assert sum(silent for step, _, silent in each if step >= words.FINE) == pytest.approx(share.silent_fine)
+
+
+def test_a_price_lost_in_noise_is_the_long_runs_whole_time():
+    """A short run that was timed longer than the long one gives no slope; a price is positive all the same."""
+    pair = Pair((lambda: None, 100.0), (lambda: None, 300.0))
+    assert pair.slopes(Timing((1.0, 2.0), 0.0), Timing((5.0, 4.0), 0.0), 2) == pytest.approx(
+        [3 / 200, 4 / 200, 2 / 200]
+    )
+    assert pair.slopes(Timing((6.0, 6.0), 0.0), Timing((3.0, 3.0), 0.0), 2) == pytest.approx([0.01] * 3)

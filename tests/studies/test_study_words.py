@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.drift import behaviours, messages, tables, words
+from symtop_studies.drift import behaviours, growth, messages, tables, words
 from symtop_studies.drift.runs import run_history
 from symtop_studies.drift.study import TOLERANCE, cases
 from symtop_studies.drift.variants import charts_table
@@ -13,7 +13,8 @@ from symtop_studies.truth import tables as truth_tables, words as truth_words
 
 import symtop
 from symtop.judging.claims.constants import KEPT, Constant
-from symtop.measure import conservation
+from symtop.measure.conservation import Changed
+from symtop.run.trajectory import Trajectory
 
 
 @pytest.mark.parametrize(
@@ -97,7 +98,7 @@ def test_the_same_run_has_one_behaviour_in_every_study():
         columns = {"outcome": ("scene", ["ok"]), **{name: ("scene", [value]) for name, value in measured.items()}}
         cell = xr.Dataset(columns, coords={"scene": ["spheroid"]})
         grain = symtop.scene("spheroid").energy_grain
-        changed = conservation.Changed(size, 0.0, 1.0, 0.0, exponent, interval, "")
+        changed = Changed(size, 0.0, 1.0, 0.0, exponent, interval, "")
         ledger = Constant(changed, 0.0, KEPT * grain, grain)
         assert tables.worst_behaviour(cell, "energy") == ledger.kind
 
@@ -133,14 +134,10 @@ def test_a_change_of_law_is_found_in_a_run_and_an_oscillation_that_switches_on_i
     where = symtop.scene("spheroid")
     time = np.linspace(0.0, 5000.0 * where.nutation_period, 4001)
     planted = {"energy": 1e-9 + 1e-9 * (time / time[-1] / 0.1) ** 2, "p_phi": np.tanh(time), "p_psi": 1e-9 * time}
-    run = xr.Dataset(
-        {name: ("time", values) for name, values in {**planted, "theta": time, "p_theta": time}.items()},
-        coords={"time": time},
-        attrs={"outcome": "ok", "steps": 1},
-    )
-    monkeypatch.setattr(conservation, "simulate", lambda *_, **__: run)
-    monkeypatch.setattr(conservation, "residuals", lambda *_: planted)
-    found = conservation.history(where, symtop.integrator("rk4"))
+    run = Trajectory(time, theta=time, p_theta=time, steps=1)
+    monkeypatch.setattr(growth, "integrate", lambda *_, **__: run)
+    monkeypatch.setattr(growth, "residuals", lambda *_: planted)
+    found = growth.history(where, symtop.integrator("rk4"))
     assert float(found["energy_change"]) == pytest.approx(0.1 * time[-1], rel=0.5)
     assert float(found["energy_after"]) == pytest.approx(2.0, abs=0.3)
     assert str(found["p_psi_law"].item()) == "linear"

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.work_precision import energy, figures, timing_rounds as rounds_module, trust
+from symtop_studies.work_precision import energy, figures, leads, timing_rounds as rounds_module, trust
 from symtop_studies.work_precision.timing_rounds import (
     PATIENCE,
     Effort,
@@ -17,10 +17,10 @@ from symtop_studies.work_precision.timing_rounds import (
     timed_runs,
     timing_rounds,
 )  # fmt: skip
+from symtop_studies.work_precision.walk import least_work, work_table
 
 import symtop
-from symtop.measure import ranking
-from symtop.measure.settings import TARGETS, least_work, work_table
+from symtop.measure.settings import TARGETS
 from symtop.measure.timing import Timing
 from symtop.runner import store
 from symtop.runner.study import Case
@@ -202,7 +202,7 @@ def test_times_that_no_other_predicts_are_told_apart(timed_study):
 def called(seconds, table):
     """The winners that are called beyond the noise, by horizon and target, with all winners."""
     data = store.combine([*table, (Case("goldstein", "together"), seconds)])
-    wins = ranking.winners(data)
+    wins = leads.winners(data)
     return {key: won.best.integrator for key, won in wins.items() if won and not won.level}, {
         key: won.best.integrator for key, won in wins.items() if won
     }
