@@ -126,7 +126,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
             about = {"integrator": ledger.integrator, "scene": chosen.name}
             entries += [{**about, **finding.plain()} for finding in ledger.findings]
         else:
-            say("\n".join(ledger.sentences()))
+            say("\n".join(finding.sentence(ledger.integrator) for finding in ledger.findings))
     if as_json:
         click.echo(as_text(entries))
     if refuted:

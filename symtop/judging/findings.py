@@ -26,12 +26,10 @@ def claim_name(claim: str) -> str:
 
 
 class Measured(NamedTuple):
-    """A measured value: a word (yes, drift, wrong limit), and a number with its 95 % interval and unit."""
+    """A measured value: a word (yes, drift, wrong limit) and a number."""
 
     kind: str = ""
     number: float = math.nan
-    interval: float = math.nan
-    unit: str = ""
     text: str = ""  # of the whole, where it is not "kind, number"
 
     def __str__(self) -> str:
@@ -118,10 +116,6 @@ class Ledger:
     def __iter__(self) -> Iterator[str]:
         """The claims, so that ``in`` asks for one of them."""
         return iter([finding.claim for finding in self.findings])
-
-    def sentences(self) -> list[str]:
-        """One sentence a verdict."""
-        return [finding.sentence(self.integrator) for finding in self.findings]
 
     def dataset(self) -> xr.Dataset:
         """Dimensions ``claim``, ``setting`` (of the order), ``width`` (of the differencing), ``window`` (in time)."""

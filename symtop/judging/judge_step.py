@@ -203,7 +203,7 @@ def _error(name: str, time: np.ndarray, apart: xr.Dataset) -> Finding:
     if growth is not None and math.isfinite(growth.exponent):
         why += f", growing as t^{growth.exponent:.2f} +- {growth.exponent_interval:.2f} ({growth.law})"
     law = growth.law if growth is not None and growth.law not in ("undecided", "not judged") else ""
-    measured = Measured(law, largest, unit="rad", text=f"{largest:.0e} rad{law and ', '}{law}")
+    measured = Measured(law, largest, text=f"{largest:.0e} rad{law and ', '}{law}")
     return Finding(f"{name}_error", "", measured, "measured", why, largest, bound)
 
 

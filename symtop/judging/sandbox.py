@@ -101,7 +101,7 @@ def _isolated(request: Request, todo: list[Stage], first: float) -> Iterator[Abo
         process = context.Process(target=_child, args=(request, list(todo), theirs, output), daemon=True)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # newer versions of Python warn of threads; the child uses none of theirs
-            heartbeat.end()
+            heartbeat.inside = False
             process.start()
         theirs.close()
         try:
@@ -133,7 +133,7 @@ def _child(request: Request, todo: list[Stage], pipe: Any, output: Any) -> None:
 def _events(process: Any, pipe: Any, output: Any, first: float, *, quick: bool) -> Iterator[About | Results | _Failure]:
     """What the process sends, until it ends, hangs in a call or takes too long for a stage."""
     limit, began = OPENING, _clock(process.pid)
-    calls, since = heartbeat.look().calls, began
+    calls, since = heartbeat.calls, began
     while True:
         if pipe.poll(LOOK):
             try:
@@ -150,12 +150,12 @@ def _events(process: Any, pipe: Any, output: Any, first: float, *, quick: bool) 
             most, together, least = QUICK_VERDICT if quick else VERDICT
             limit = max(least, min(most, together - (began - first)))
             continue
-        beat, now = heartbeat.look(), _clock(process.pid)
-        if beat.calls != calls or not beat.inside:
-            calls, since = beat.calls, now
-        if now - since > beat.allowed:
-            why = f"a step of h = {beat.step:.3g} had not returned after {now - since:.0f} s"
-            yield _Failure(why, beat.step < 0)
+        now = _clock(process.pid)
+        if heartbeat.calls != calls or not heartbeat.inside:
+            calls, since = heartbeat.calls, now
+        if now - since > heartbeat.allowed:
+            why = f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s"
+            yield _Failure(why, heartbeat.step < 0)
             return
         if now - began > limit:
             yield _Failure(f"it was not judged within {limit:.0f} s")
@@ -176,9 +176,9 @@ def _clock(pid: int) -> float:
 
 def _death(process: Any, output: Any) -> str:
     process.join(2.0)
-    code, beat = process.exitcode, heartbeat.look()
+    code = process.exitcode
     if code is not None and code < 0:
-        during = f" in a step of h = {beat.step:.3g}" if beat.inside else ""
+        during = f" in a step of h = {heartbeat.step:.3g}" if heartbeat.inside else ""
         return f"its process was ended by {signal.Signals(-code).name}{during}"
     output.seek(0)
     words = " ".join(output.read()[-4 * WORDS :].decode(errors="replace").split())[-WORDS:]

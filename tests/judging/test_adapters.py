@@ -337,7 +337,7 @@ def test_a_step_that_hangs_backwards_is_judged_forwards(impatient):
     assert (ledger["calls"].measured.kind, ledger["order"].verdict) == ("forward only", "confirmed")
     assert "a step of -h did not return" in ledger["calls"].why
     assert ledger["symplectic"].measured.kind == "no"
-    assert not heartbeat.look().inside
+    assert not heartbeat.inside
 
 
 def changes_its_input(f, t, y, h):

@@ -4,11 +4,13 @@ The momenta of the runs of a `Stepper` are read off its states here and never as
 others than it has. Each call of it stands in the context of `heartbeat`, which the process that waits for it can see.
 """
 
+import ctypes
 import mmap
 import re
 from collections.abc import Callable, Sequence
+from ctypes import c_bool, c_double, c_long
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +24,6 @@ from symtop.model.top import Angles, SymmetricTop
 
 Marks = NDArray[np.int64]
 LOOK = 64  # steps from one look at whether the state is finite to the next
-CALLS, STEP, INSIDE, ALLOWED = range(4)
 PATIENCE, QUICK_PATIENCE = 10.0, 3.0  # seconds for one call
 
 
@@ -118,55 +119,36 @@ def integrator(stepper: Stepper, **claims: Any) -> Integrator:
     return Integrator(stepper.name, "other", "given through an adapter", solvers, **claims)
 
 
-class Beat(NamedTuple):
-    """One look at a heartbeat."""
-
-    calls: int  # begun so far
-    step: float  # h of the last one
-    inside: bool
-    allowed: float  # seconds that this call may take
-
-
-class Heartbeat:
+class Heartbeat(ctypes.Structure):
     """Counts calls of a step, in memory that a forked process shares: ``with heartbeat.call(h): step(...)``.
 
-    What the call raises becomes a SymtopError. `forward_only` is set after a step backwards has not returned: such
+    `calls` have begun so far; `step` is the h of the last one, which is under way if `inside` and may take `allowed`
+    seconds. What it raises becomes a SymtopError. `forward_only` is set after a step backwards has not returned: such
     steps are refused from then on.
     """
 
-    def __init__(self) -> None:
-        self._numbers = np.frombuffer(mmap.mmap(-1, 4 * 8))
-        self.reset(quick=False)
+    _fields_ = (("calls", c_long), ("step", c_double), ("inside", c_bool), ("allowed", c_double))
+    forward_only, patience = False, PATIENCE
 
     def reset(self, *, quick: bool) -> None:
         """Something else is judged from now on."""
         self.forward_only, self.patience = False, QUICK_PATIENCE if quick else PATIENCE
 
-    def call(self, h: float, seconds: float = 0.0) -> "Heartbeat":
+    def call(self, h: float, seconds: float = 0.0) -> Self:
         """The context of a call that steps by h, which may take so many seconds beyond the usual."""
         if self.forward_only and h < 0.0:
             raise SymtopError("it makes no step backwards: a step of -h did not return")
-        self._numbers[STEP] = h
-        self._numbers[ALLOWED] = self.patience + seconds
+        self.step, self.allowed = h, self.patience + seconds
         return self
 
     def __enter__(self) -> None:
-        self._numbers[INSIDE] = 1.0
-        self._numbers[CALLS] += 1.0
-
-    def end(self) -> None:
-        """No call is under way."""
-        self._numbers[INSIDE] = 0.0
+        self.inside = True
+        self.calls += 1
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
-        self.end()
+        self.inside = False
         if isinstance(error, Exception) and not isinstance(error, SymtopError):
-            raise SymtopError(f"a step of h = {self._numbers[STEP]:.3g} raises {words_of(error)}") from error
-
-    def look(self) -> Beat:
-        """What the last call was, from any process."""
-        calls, step, inside, allowed = self._numbers.tolist()
-        return Beat(int(calls), step, bool(inside), allowed)
+            raise SymtopError(f"a step of h = {self.step:.3g} raises {words_of(error)}") from error
 
 
-heartbeat = Heartbeat()  # of the judged step of this process: there is one at a time
+heartbeat = Heartbeat.from_buffer(mmap.mmap(-1, ctypes.sizeof(Heartbeat)))  # of the one step that is judged at a time

@@ -1,17 +1,16 @@
-"""Steps on arrays of other libraries: functions on batches of torch or JAX, and solvers of diffrax.
+"""Steps on arrays of other libraries: batches of torch or JAX, and solvers of diffrax, all in double precision.
 
 *torch*, *jax*: a function ``step(f, t, y, h) -> y``; y has the shape (batch, 6), a row (e, L) on the axis, or
 (batch, 7), (q, L) on the attitude, and f(t, y) has the same. What is torch is called as it stands, without gradients;
-what is JAX is compiled by `jax.jit`. The batch has two rows, the state that is judged and another. A row must not
-depend on the other one: that is tried once, before all else.
+what is JAX is compiled by `jax.jit`. The batch has two rows, the state that is judged and another, on which it must not
+depend: that is tried once, before all else.
 
-*diffrax*: a solver such as ``diffrax.Tsit5()``, its formula with fixed steps, compiled as diffrax compiles it. It is
-asked for one step after another, in a loop of JAX's own, as `diffrax.diffeqsolve` with a constant step asks for them;
-its own memory (a last slope, a second state) goes with it through a run. An implicit solver needs a root finder with
-tolerances of its own, for there is no step control to take them from.
+*diffrax*: a solver such as ``diffrax.Tsit5()``, its formula with fixed steps, asked for one step after another in a
+compiled loop, as by `diffrax.diffeqsolve` with a constant step; its own memory (a last slope, a second state) goes with
+it through a run. An implicit solver needs a root finder with tolerances of its own: there is no step control.
 
 The equations of the axis and of the attitude are arithmetic alone, so that they are on arrays what they are on floats.
-A library is imported when something of it is judged, and computes in double precision.
+A library is imported when something of it is judged.
 """
 
 import contextlib
@@ -40,9 +39,8 @@ class BatchStep(Stepper):
     """A stepper around the function; `form` is torch or jax."""
 
     def __init__(self, function: Callable[..., Any], chart: str, form: str, name: str = "") -> None:
-        self.library, self.jax = library(form, form), form == "jax"
-        self.function, self.chart = function, on_these_charts(form, chart)
-        self.form = FORMULATIONS[chart]
+        self.library, self.jax = library(form, form, chart), form == "jax"
+        self.function, self.chart, self.form = function, chart, FORMULATIONS[chart]
         self.name = label_of(name or function)
         self._step = self.library.jit(self._called) if self.jax else self._called
         self._tried = False
@@ -87,19 +85,15 @@ def _once(step: Callable[..., Any], t: float, batch: Any, h: float, seconds: flo
     return after
 
 
-def library(form: str, name: str) -> Any:
-    """The package `name`; SymtopError if it is not there."""
+def library(form: str, name: str, chart: str) -> Any:
+    """The package `name`; SymtopError if it is not there, or for a chart whose equations are not arithmetic alone."""
     try:
-        return importlib.import_module(name)
+        package = importlib.import_module(name)
     except ImportError:
         raise SymtopError(f"form {form} needs the package {name}, which is not installed") from None
-
-
-def on_these_charts(form: str, chart: str) -> str:
-    """The chart; SymtopError for one whose equations are not arithmetic alone."""
     if chart not in CHARTS:
         raise SymtopError(f"chart must be axis or attitude for the form {form}, not {chart!r}", "chart")
-    return chart
+    return package
 
 
 def field_of(chart: str, par: Any, stack: Any) -> Any:
@@ -139,7 +133,7 @@ class DiffraxSolver(Stepper):
     own_loop = True
 
     def __init__(self, solver: Any, chart: str, name: str = "") -> None:
-        self.jax, self.diffrax = library("diffrax", "jax"), library("diffrax", "diffrax")
+        self.jax, self.diffrax = (library("diffrax", name, chart) for name in ("jax", "diffrax"))
         if not is_solver(solver):
             raise SymtopError(f"form diffrax needs an instance of a solver, such as diffrax.Tsit5(), not {solver!r}")
         if isinstance(solver.term_structure, tuple):
@@ -147,8 +141,7 @@ class DiffraxSolver(Stepper):
                 f"{type(solver).__name__} steps a system in two parts; form diffrax has one, y' = f(y): "
                 "judge it as a function, with form separable"
             )
-        self.solver, self.chart = solver, on_these_charts("diffrax", chart)
-        self.form = FORMULATIONS[chart]
+        self.solver, self.chart, self.form = solver, chart, FORMULATIONS[chart]
         self.name = label_of(name or solver)
         finder = getattr(solver, "root_finder", None)
         if finder is not None and not isinstance(getattr(finder, "rtol", 0.0), (int, float)):
@@ -181,8 +174,7 @@ class DiffraxSolver(Stepper):
 
     def _compiled(self) -> tuple[Any, Any]:
         """The start of a run, and so many steps of it; the numbers of the top are `args`, so that both compile once."""
-        jax, diffrax, solver = self.jax, self.diffrax, self.solver
-        stack = jax.numpy.stack
+        jax, diffrax, solver, stack = self.jax, self.diffrax, self.solver, self.jax.numpy.stack
         term = diffrax.ODETerm(lambda t, y, par: field_of(self.chart, par, lambda rows: stack(rows, axis=-1))(t, y))
 
         def begin(par: Any, y: Any, h: Any) -> Any:

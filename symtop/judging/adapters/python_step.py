@@ -1,38 +1,27 @@
-"""Steps in Python: functions of a state in a chart, of a rigid body or of the nutation, and classes of SciPy's.
+"""Steps in Python: functions of a state in a chart, of a rigid body or of the nutation, and classes of SciPy's kind.
 
-*ode*, for y' = f(t, y): y and what f returns are NumPy arrays of shape (6,), (e, L) on the axis or (theta, phi, psi and
-their rates) in angles, or (7,), (q, L) on the attitude. h may be negative. A step that changes its input in place, and
-returns it, works.
+*ode*, ``step(f, t, y, h) -> y`` for y' = f(t, y): y and what f returns are NumPy arrays of shape (6,), (e, L) on the
+axis or (theta, phi, psi and their rates) in angles, or (7,), (q, L) on the attitude. h may be negative. A step that
+changes its input in place, and returns it, works.
 
-    def step(f, t, y, h):
-        k1 = f(t, y)
-        return y + h * f(t + h / 2, y + h / 2 * k1)
+*rotation*, ``step(q, w, h, inertia, torque) -> q, w`` for a rigid body, as engines integrate it, in the body frame:
 
-*rotation*, ``step(q, w, h, inertia, torque) -> q, w`` for a rigid body, as engines integrate it:
+    q' = q (0, w) / 2,        inertia w' = (inertia w) x w + torque(q)
 
-    q' = q (0, w) / 2,        inertia w' = (inertia w) x w + torque(q)          all in the body frame
-
-q = (w, x, y, z) turns body vectors into space vectors, w is the angular velocity in the body frame, inertia holds the
-three principal moments (I1, I1, I3) about the pivot, and torque(q) is that of gravity, in the body frame. The angular
-momentum in space, L = R(q) inertia w, is made of both, R(q) with q at length one; a q that loses its length shows it
-as an axis that is not a unit vector.
+q = (w, x, y, z) turns body vectors into space vectors, w is the angular velocity, inertia holds the three principal
+moments (I1, I1, I3) about the pivot, and torque(q) is that of gravity. L in space is R(q) inertia w, R(q) with q at
+length one; a q that loses its length shows it as an axis that is not a unit vector.
 
 *separable*, ``step(state, h, dT, dV) -> state`` for the nutation alone, whose Hamiltonian separates:
 
     H = T(p_theta) + V(theta),     T = p_theta^2/2 I1,     V the effective potential at the p_phi and p_psi of the start
 
-    def step(state, h, dT, dV):
-        theta, p = state
-        p = p - h * dV(theta)
-        return theta + h * dT(p), p
-
 state is (theta, p_theta), a NumPy array of shape (2,), in radians and the units of the scene's top; dT is p_theta/I1
 and dV the slope of V, both of one number. The chart ends at theta = 0 and pi.
 
-*scipy*, a class derived from ``scipy.integrate.OdeSolver``: fixed steps are asked for by max_step = first_step = h with
-tolerances that accept any error, so that the formula is judged and not its step control; the end of the interval lies
-beyond the last step, which is never cut short. With a tolerance, rtol = atol, the class chooses its steps, as it does
-for ``solve_ivp``.
+*scipy*, a class derived from ``scipy.integrate.OdeSolver``: max_step = first_step = h with tolerances that accept any
+error make steps of h, so that the formula is judged and not its step control; the end of the interval lies beyond the
+last step, which is never cut short. With a tolerance, rtol = atol, the class chooses its steps, as for ``solve_ivp``.
 """
 
 from collections.abc import Callable

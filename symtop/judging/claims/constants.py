@@ -1,4 +1,4 @@
-"""What a million steps do to the constants of the motion, and what a step costs.
+"""What a million steps do to the constants of the motion, and what a step costs; the worst chart of a method decides.
 
 A constant is kept, bounded, a random walk, a drift or just growing by the rule of every study,
 `symtop.measure.conservation.behaviour`: by its size, and by the exponent of its growth (0, 1/2, 1) if the 95 % interval
@@ -7,16 +7,14 @@ than `KEPT`, relative, or than the random walk that the rounding seen in one ste
 beyond a thousandth of that rounding is visible in a million steps. A drift that hides below a bounded oscillation shows
 in the means of 24 equal stretches, and counts if the line through them exceeds `SURE` of its own intervals. A random
 walk passes a plain test of the slope in one case in three, and not this one; at the size of rounding only the size is
-judged. Every chart of a method makes its own run.
+judged.
 
 A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau, whatever its tau: c is fitted, and it
 is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
 
 In the space frame p_phi = L_z and p_psi = L.e are those of the states, whatever the run reports; in angles, where they
-are parameters of a state, those of the increments are set beside the reported ones (`symtop.measure.conservation`).
-
-Python solvers are too slow for a million steps: they run for as many as `EVALUATIONS` allow, and the ledger says so.
-The worst chart decides, and the finding names it.
+are parameters of a state, those of the increments are set beside the reported ones (`symtop.measure.conservation`). The
+one constant of a map of (theta, p_theta) is the energy at the p_phi and p_psi of the start, which are parameters.
 """
 
 import math
@@ -25,11 +23,11 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims.subject import CONSTANTS, Subject, declared
+from symtop.judging.claims.subject import CONSTANTS, PLANE, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
 from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, residuals, tops
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Array, Plan, Run, sentence
+from symtop.methods.framework.plan import NOT_FINITE, OK, OUTCOMES, Array, Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import space_momenta
 from symtop.model.scenes import Scene
@@ -175,6 +173,32 @@ def found_in(
     return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *cost, apart, energy)
 
 
+def run_in_plane(subject: Subject) -> LongRun:
+    """The energy of a map of (theta, p_theta) over many steps, and in each of the first."""
+    stepper, scene = subject.stepper, subject.scene
+    steps = round(min(subject.long_steps or STEPS, QUICK_STEPS if subject.quick else STEPS))
+    par, state = stepper.form.prepare(scene.top, scene.start)
+    p_phi, p_psi = (float(value[0]) for value in stepper.form.momenta(par, np.array([state])))
+
+    def change(marks: Array, h: float) -> tuple[dict[str, Array], int]:
+        """The change of the energy since the start, as a share of the nutation's, and the forces."""
+        states, forces = stepper.march(scene.top, par, np.array(state), h, marks.astype(np.int64))
+        with np.errstate(all="ignore"):
+            energy = scene.top.reduced_energy(states[:, 0], states[:, 1], p_phi, p_psi)
+        return {"energy": (energy - energy[0]) / scene.energy_scale}, forces
+
+    h, first = scene.time_scale() / STEPS_A_NUTATION, np.arange(PILOT + 1.0)
+    marks = np.unique(np.rint(np.linspace(0, max(steps, PILOT), SAMPLES)))
+    values, forces = change(marks, h)
+    every, few = change(first, h)
+    _, other = change(first, 0.21 * h)
+    good = np.isfinite(values["energy"])
+    made, outcome = int(marks[good][-1]), OUTCOMES[OK if good.all() else NOT_FINITE]
+    nothing = np.empty(0)  # neither states nor momenta are shown
+    run = Run(nothing, nothing, nothing, made, forces, 0, outcome, made * h)
+    return found_in(run, scene, PLANE, marks * h, values, every, few == other, None)
+
+
 def windows(nutations: Array, change: Array) -> tuple[Array, Array]:
     """The largest |change| in windows of the logarithm of time, with their middles; NaN where there is no sample."""
     middles, largest = np.full((2, WINDOWS), math.nan)
@@ -230,6 +254,10 @@ def change_of(time: Array, values: Array, every_step: Array, steps: int, grain: 
 def measure(subject: Subject) -> list[Finding]:
     """Everything that one long run in each chart shows; the worst chart decides, and the finding names it."""
     method, runs, by_chart = subject.method, [], []
+    if subject.in_plane:
+        run = run_in_plane(subject)
+        subject.traces.update(run.traces())
+        return of_run(method, run)
     for chart in method.charts():
         try:
             run = long_run(method, subject.scene, chart, quick=subject.quick, most=subject.long_steps)
@@ -333,5 +361,5 @@ def _costs(method: Integrator, run: LongRun) -> list[Finding]:
     solves = f" and {run.iterations:.2f} iterations" if run.iterations else ""
     why = f"{run.evaluations:.2f} force evaluations{solves} a step, in {run.span}"
     text = f"{run.evaluations:.1f}" + (f" ({run.iterations:.1f} it.)" if run.iterations else "")
-    measured = Measured("work", run.evaluations, unit="forces a step", text=text)
+    measured = Measured("work", run.evaluations, text=text)
     return [explicit, Finding("work", "", measured, "measured", why, run.evaluations, 0.0)]

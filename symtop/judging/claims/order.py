@@ -1,6 +1,6 @@
-"""The order claim, on the top and on equations that depend on time: what shows the order of a step.
+"""The order claim: what a table, the power series of a step, the slopes of runs and their limit show of it.
 
-Four see different defects, and a declared order is refuted if any of them refutes it. It is confirmed if the slope
+The four see different defects, and a declared order is refuted if any of them refutes it. It is confirmed if the slope
 confirms it, by `symtop.measure.order.order_verdict` as in every study, or the series where no slope can be judged.
 
 *Slopes* see what becomes of a run. They are extrapolated to h = 0 by `symtop.measure.order` from a ladder of steps,
@@ -8,24 +8,25 @@ then again with more steps put into the decades of error above rounding where a 
 the scene does not show it, on `FALLBACK` over longer runs. An adaptive method is fitted against its mean step.
 
 *The limit.* A method whose coefficients miss their sum by 1e-9 has the right slope down to an error of 1e-9 and stays
-there. So the error at the end of a short run of many steps, taken with its sign, is extrapolated to h = 0
-(Richardson's, eliminating h^p and h^(p+1)); what is left beyond rounding is a wrong limit.
+there. So the error at the end of a short run of many steps, with its sign, is extrapolated to h = 0 (Richardson's,
+eliminating h^p and h^(p+1)); what is left beyond rounding is a wrong limit.
 
-*The power series of one step* beside that of the motion (`symtop.measure.step_series`) sees an order condition that is
-off by 1e-10, which no slope does, but not what a run carries from step to step.
+*The power series of one step* (`symtop.measure.step_series`) sees an order condition that is off by 1e-10, which no
+slope does, but not what a run carries from step to step.
 
 *The table*, Butcher's or a splitting's, needs no run. A condition of order k that is off by d adds an error of
 d (w h)^k to a step, w = 2 pi/nutation, beside d' (w h)^(p+1), which a method of order p has anyway: a slope shows it
 below w h = (d/d')^(1/(p + 1 - k)), often a step that is so small that rounding is larger.
 
-*Time.* The top's equations are autonomous, so that a method whose f is called at wrong times, the nodes c of its
-tableau, is right on them. In a frame that turns about a horizontal axis at a rate w, z = R(t)^T y moves by
+A map of (theta, p_theta) is judged by its distance from the true point, p_theta in units of the larger momentum.
+
+*Time.* The top's equations are autonomous: a method whose f is called at wrong times, the nodes c of its tableau, is
+right on them. In a frame that turns about a horizontal axis at a rate w, z = R(t)^T y moves by
 
     z' = R^T f(R z) - w x z          for e and L alike, gravity being R^T k,
 
-which depends on t, and whose motion is R(t)^T y(t). The series of one step from t0 is set beside that of this motion.
-An order that is lower than in a frame at rest, w = 0, is one of wrong times. A step that asks f at t0 alone was written
-for f(y), which refutes nothing.
+which depends on t. The series of one step from t0 is set beside that of R(t)^T y(t). An order that is lower than in a
+frame at rest, w = 0, is one of wrong times. A step that asks f at t0 alone was written for f(y), which refutes nothing.
 """
 
 import math
@@ -35,11 +36,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims.structure import ONE_MAP
-from symtop.judging.claims.subject import FINEST, Subject
+from symtop.judging.claims.structure import ONE_MAP, plane
+from symtop.judging.claims.subject import FEWEST, FINEST, PLANE, Subject
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, yes_no
 from symtop.measure.accuracy import error_table
-from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order_verdict
+from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order as order_of, order_verdict
 from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
@@ -60,6 +61,8 @@ from symtop.run.simulation import integrate
 
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
 FALLBACK, LONGER = "goldstein", (8.37, 40.0)
+COARSEST, RUNS = 17, 13  # in the plane: steps of the shortest run, and how many runs
+BOUND = 1e-14  # of the closed form at the end of such a run
 QUICK_SHARE = 0.25  # of these; no verdict on a method of the package changes
 LARGEST_EXACT = 2.37  # steps a nutation that a method with exact steps is tried at, beside the ladder
 SHARE = 0.37  # of a nutation: length of the runs that are extrapolated to h = 0
@@ -77,7 +80,8 @@ def measure(subject: Subject) -> list[Finding]:
     method = subject.method
     if method.control is None:
         return [inapplicable("order", "it has no step and no tolerance", yes_no(method.order))]
-    finding = _exactness(subject) if method.exact_steps else _by_steps(subject)
+    measured = _in_plane if subject.in_plane else _exactness if method.exact_steps else _by_steps
+    finding = measured(subject)
     table = table_of(method)
     if table is not None:
         power = method.order or table.order
@@ -161,38 +165,36 @@ class Order(NamedTuple):
     def measured(self) -> Measured:
         """Its slope, if it can be judged."""
         fit = self.main
-        return Measured("slope", fit.slope, fit.interval, text=str(fit)) if math.isfinite(fit.slope) else NOTHING
+        return Measured("slope", fit.slope, text=str(fit)) if math.isfinite(fit.slope) else NOTHING
 
 
 def measured_order(method: Integrator, scene: Scene, *, quick: bool = False, finest: float | None = None) -> Order:
     """Slopes of the errors of attitude, theta and energy, where they can be judged; `finest`: most steps of a run."""
     if method.control is None:
         raise SymtopError(f"{method.name} has neither a step nor a tolerance")
-    fitted = _slopes(method, scene, NUTATIONS, quick, finest)
-    if finest is not None and method.fixed_step and not math.isfinite(fitted.main.slope):
-        shorter = _slopes(method, scene, SHARE, quick, finest)  # the same number of steps, and smaller errors
-        fitted = shorter if math.isfinite(shorter.main.slope) else fitted
-    if quick or not method.fixed_step or method.order is None or method.implementation == "python":
-        return fitted
-    for nutations in LONGER:
-        if math.isfinite(fitted.main.slope):
-            break
-        again = _slopes(method, find_scene(FALLBACK), nutations, quick, finest)
-        fitted = again if math.isfinite(again.main.slope) else fitted
-    return fitted
+    runs = [(scene, NUTATIONS)]
+    if finest is not None and method.fixed_step:
+        runs.append((scene, SHARE))  # the same number of steps, and smaller errors
+    if not (quick or not method.fixed_step or method.order is None or method.implementation == "python"):
+        runs += [(find_scene(FALLBACK), nutations) for nutations in LONGER]
+    tried: list[Order] = []
+    for where, nutations in runs:
+        tried.append(_slopes(method, where, nutations, quick, finest))
+        if math.isfinite(tried[-1].main.slope):
+            return tried[-1]
+    return tried[0]
 
 
-def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, finest: float | None = None) -> Order:
+def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, finest: float | None) -> Order:
     horizon = nutations * scene.time_scale()
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
     most = FINEST[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
-    settings = ladder(method, scene, horizon, count, most)
-    main = observable(method)
+    main, settings = observable(method), ladder(method, scene, horizon, count, most)
     table = order_table(scene, method, settings, horizon, main, dense=finest is None)
     step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
     fits = {name: order_fit(scene, method, table, name, horizon) for name in (main, "theta", "energy")}
-    bound = table[f"{main}_bound"].values
-    return Order(scene.name, step, table[main].values, bound, fits, main, method.fixed_step)
+    error, bound = table[main].values, table[f"{main}_bound"].values
+    return Order(scene.name, step, error, bound, fits, main, method.fixed_step)
 
 
 def _by_steps(subject: Subject) -> Finding:
@@ -219,6 +221,31 @@ def _by_steps(subject: Subject) -> Finding:
             verdict = "measured" if claim is None else "refuted"
             return Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
     return weighed(claim, fitted, series, slopes)
+
+
+def _in_plane(subject: Subject) -> Finding:
+    """What runs and steps show of the order of a map of (theta, p_theta)."""
+    method, scene, stepper = subject.method, subject.scene, subject.stepper
+    horizon = NUTATIONS * scene.time_scale()
+    finest = max(subject.finest or FEWEST, 4 * COARSEST)
+    counts = np.unique(np.rint(np.geomspace(COARSEST, finest, RUNS)).astype(np.int64))
+    truth = closed_form(scene)(np.array([horizon]))
+    end = np.array([float(truth.theta[0]), scene.top.I1 * float(truth.theta_dot[0])])
+    par, state = stepper.form.prepare(scene.top, scene.start)
+    errors, unit = [], np.array([1.0, scene.momentum_scale])
+    for count in counts:
+        done = stepper.march(scene.top, par, np.array(state), horizon / count, np.array([count]))
+        errors.append(float(np.linalg.norm((done.states[0] - end) / unit)))
+    step_size, error, bound = horizon / counts, np.array(errors), np.full(counts.size, BOUND)
+    omega = 2.0 * math.pi / scene.time_scale()
+    fit = order_of(step_size, error, bound, omega, method.order, symmetric=method.symmetric)
+    fitted = Order(scene.name, step_size, error, bound, {PLANE: fit}, PLANE, True)
+    subject.traces.update(settings_shown(fitted))
+    step, start = plane(subject)
+    one_map = restart_gap(step, start) <= ONE_MAP
+    series = ChartSeries(PLANE, step_series(step, start, scene.time_scale())) if one_map else None
+    slopes = f"slopes {PLANE} {fit} on {scene.name}" if math.isfinite(fit.slope) else "no slope"
+    return weighed(method.order, fitted, series, slopes)
 
 
 def weighed(claim: int | None, fitted: Order, series: ChartSeries | None, slopes: str) -> Finding:

@@ -6,23 +6,30 @@ nothing between. The answer is no if any chart says no, yes if one says yes and 
 
 At the pole the axis passes theta = 0 exactly, and must come out right on the other side. A method in the space frame
 claims to pass, one in angles claims nothing; both are run, with a step and with half of it.
+
+A map of (theta, p_theta) is symplectic if it keeps the area, {theta, p_theta} = 1; p_theta is in units of the larger
+momentum.
 """
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims.subject import Subject, declared
+from symtop.judging.adapters.adapter import AdapterSolver
+from symtop.judging.adapters.python_step import SeparableStep
+from symtop.judging.claims.subject import PLANE, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, undecided, yes_no
 from symtop.measure import step_map as maps
 from symtop.measure.errors import errors_against
+from symtop.methods.framework.plan import Array, Run
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.run.reference.truth import reference
 from symtop.run.simulation import simulate
 
@@ -44,6 +51,8 @@ Answer = tuple[bool | None, float, float, str]  # of a chart: yes, no or neither
 
 def measure(subject: Subject) -> list[Finding]:
     """The findings on symplectic and symmetric."""
+    if subject.in_plane:
+        return structure_of({PLANE: partial(plane, subject)}, subject)
     names = subject.method.charts()[-1:] if subject.quick else subject.method.charts()
     steps = {chart: partial(maps.step_map, subject.method, chart, subject.scene) for chart in names}
     return structure_of(steps, subject)
@@ -65,6 +74,64 @@ def structure_of(steps: Mapping[str, Callable[[], tuple[maps.StepMap, Angles]]],
         names = ("symplectic", "symmetric")
         by_chart.append([_in_chart(chart, subject.method, *each) for each in zip(names, answers, strict=True)])
     return [max(findings, key=_badness) for findings in zip(*by_chart, strict=True)]
+
+
+@dataclass(frozen=True)
+class Plane(maps.StepMap):
+    """The map of a step in the plane; z and Y are (theta, p_theta) alike."""
+
+    stepper: SeparableStep
+    momenta: Momenta
+
+    def run(self, start: Angles, h: float, steps: int = 1) -> Run:
+        """So many steps, shown at their end."""
+        done: Run = self.onward(self.top, start, (h,) * steps)
+        if not np.isfinite(done.states).all():
+            raise SymtopError(f"a step of {h:.3g} is not finite")
+        return done
+
+    @property
+    def onward(self) -> Any:
+        """Steps of given lengths, each from the state where the last one ended."""
+        return AdapterSolver(self.stepper).onward
+
+    @property
+    def there_and_back(self) -> Any:
+        """A step, and one from its end with p_theta reversed."""
+        return AdapterSolver(self.stepper).there_and_back
+
+    def scaled(self, state: Array, _phi: float, _psi: float) -> Array:
+        """A state as Y."""
+        return np.asarray(state / np.array([1.0, self.unit]))
+
+    def angles(self, z: Array) -> Angles:
+        """The start that a point stands for, phi and psi zero."""
+        whole = [float(z[0]), 0.0, 0.0, self.unit * float(z[1]), self.momenta.p_phi, self.momenta.p_psi]
+        return maps.angles_at(self.top, np.array(whole))
+
+    def point(self, start: Angles) -> Array:
+        """z of a start."""
+        return np.array([start.theta, self.top.I1 * start.theta_dot / self.unit])
+
+    def at(self, start: Angles) -> Array:
+        """Y of a start."""
+        return self.point(start)
+
+    def restart(self, y: Array) -> Angles:
+        """The start that a Y stands for."""
+        return self.angles(y)
+
+    def length(self, _: Array) -> float:
+        """A state of the plane has no length to keep."""
+        return 1.0
+
+
+def plane(subject: Subject) -> tuple[maps.StepMap, Angles]:
+    """The map at a step so large that its structure shows, and the point to judge it at."""
+    scene, start = subject.scene, maps.generic_start(subject.scene)
+    h, momenta = maps.SHARE * scene.time_scale(), scene.top.momenta(start)
+    trial = Plane(subject.method, PLANE, scene.top, scene.momentum_scale, h, subject.stepper, momenta)
+    return maps.coarsest(trial, start), start
 
 
 def _in_chart(chart: str, method: Integrator, claim: str, answer: Answer) -> Finding:

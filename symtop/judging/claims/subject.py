@@ -33,6 +33,7 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 ARGUMENTS = {"ode": "(f, t, y, h)", "separable": "(state, h, dT, dV)", "rotation": "(q, w, h, inertia, torque)"}
 LIBRARIES = (".so", ".dylib", ".dll")
 CONSTANTS = (*MOTION, "axis_length")
+PLANE = "nutation"  # the chart of a map of (theta, p_theta)
 LONG, SLOPES = (16.0, 2.5), (8.0, 1.5)  # seconds of a long run and of the runs of the order; the second with --quick
 STEPS = 1_000_000  # most steps of a long run
 SAMPLES = 4000  # intervals of a long run: a program that writes every so many steps needs a multiple
