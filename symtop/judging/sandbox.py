@@ -41,11 +41,8 @@ class Results(NamedTuple):
     traces: dict[str, Any]
 
 
-class _Failure(NamedTuple):
-    """Why a process was ended, or ended by itself."""
-
-    why: str
-    backwards: bool = False  # it was in a step of -h
+class _LostError(Exception):
+    """A process was ended, or ended by itself: why, and whether it was in a step of -h."""
 
 
 def run(request: Request) -> Iterator[About | Results]:
@@ -57,31 +54,29 @@ def run(request: Request) -> Iterator[About | Results]:
     heartbeat.reset(quick=request.quick)
     opened, began = False, time.monotonic()
     while todo:
-        failure = None
-        for event in _isolated(request, todo, began):
-            if isinstance(event, _Failure):
-                failure = event
-            elif isinstance(event, Results):
-                todo.pop(0)
-                yield event
-            elif not opened:
+        try:
+            for event in _isolated(request, todo, began):
+                if isinstance(event, Results):
+                    todo.pop(0)
+                if isinstance(event, Results) or not opened:
+                    yield event
                 opened = True
-                yield event
-        if failure is None:
+        except _LostError as failure:
+            if not opened:
+                raise SymtopError(f"it cannot be judged: {failure.args[0]}") from None
+            yield from _left_open(request, todo, *failure.args)
+        else:
             return
-        if not opened:
-            raise SymtopError(f"it cannot be judged: {failure.why}")
-        yield from _lost(request, failure, todo)
 
 
-def _lost(request: Request, failure: _Failure, todo: list[Stage]) -> Iterator[Results]:
+def _left_open(request: Request, todo: list[Stage], why: str, backwards: bool) -> Iterator[Results]:
     """What a failure leaves undecided: one stage; all without a call; none if it was a step of -h, then refused."""
-    if failure.backwards and not heartbeat.forward_only:
+    if backwards and not heartbeat.forward_only:
         heartbeat.forward_only = True
         return
     for stage in todo[:] if todo[0][0].name == "calls" else todo[:1]:
         todo.remove(stage)
-        yield Results(unmeasured(stage, request.claimed(), failure.why), {})
+        yield Results(unmeasured(stage, request.claimed(), why), {})
 
 
 def _work(request: Request, todo: list[Stage]) -> Iterator[About | Results]:
@@ -93,8 +88,8 @@ def _work(request: Request, todo: list[Stage]) -> Iterator[About | Results]:
         yield Results(measure(stage, subject), subject.traces)
 
 
-def _isolated(request: Request, todo: list[Stage], first: float) -> Iterator[About | Results | _Failure]:
-    """The stages in a forked process, and at last why it ended if not well; `first` is when the judging began."""
+def _isolated(request: Request, todo: list[Stage], first: float) -> Iterator[About | Results]:
+    """The stages in a forked process; `first` is when the judging began."""
     context: Any = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
     with tempfile.TemporaryFile() as output, ours:
@@ -123,15 +118,13 @@ def _child(request: Request, todo: list[Stage], pipe: Any, output: Any) -> None:
     try:
         for event in _work(request, todo):
             pipe.send(event)
-    except SymtopError as error:
-        pipe.send(error)
     except BaseException as error:  # noqa: BLE001  (somebody else's code)
-        pipe.send(_Failure(words_of(error)))
+        pipe.send(error if isinstance(error, SymtopError) else _LostError(words_of(error), False))
     pipe.send(None)
 
 
-def _events(process: Any, pipe: Any, output: Any, first: float, *, quick: bool) -> Iterator[About | Results | _Failure]:
-    """What the process sends, until it ends, hangs in a call or takes too long for a stage."""
+def _events(process: Any, pipe: Any, output: Any, first: float, *, quick: bool) -> Iterator[About | Results]:
+    """What the process sends; _LostError if it ends otherwise, hangs in a call or takes too long for a stage."""
     limit, began = OPENING, _clock(process.pid)
     calls, since = heartbeat.calls, began
     while True:
@@ -139,13 +132,12 @@ def _events(process: Any, pipe: Any, output: Any, first: float, *, quick: bool) 
             try:
                 event = pipe.recv()
             except EOFError:
-                event = _Failure(_death(process, output))
-            if isinstance(event, SymtopError):
+                event = _LostError(_death(process, output), False)
+            if isinstance(event, Exception):
                 raise event
-            if event is not None:
-                yield event
-            if event is None or isinstance(event, _Failure):
+            if event is None:
                 return
+            yield event
             began = _clock(process.pid)
             most, together, least = QUICK_VERDICT if quick else VERDICT
             limit = max(least, min(most, together - (began - first)))
@@ -155,11 +147,9 @@ def _events(process: Any, pipe: Any, output: Any, first: float, *, quick: bool) 
             calls, since = heartbeat.calls, now
         if now - since > heartbeat.allowed:
             why = f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s"
-            yield _Failure(why, heartbeat.step < 0)
-            return
+            raise _LostError(why, heartbeat.step < 0)
         if now - began > limit:
-            yield _Failure(f"it was not judged within {limit:.0f} s")
-            return
+            raise _LostError(f"it was not judged within {limit:.0f} s", False)
 
 
 def _clock(pid: int) -> float:
