@@ -34,6 +34,7 @@ from symtop.measure.errors import completed, errors, refuse_other_scene, sampled
 from symtop.methods.framework.registry import ENERGY_ERRORS
 from symtop.model.charts import CHARTS, space_energy
 from symtop.model.scenes import Scene, scene as find_scene
+from symtop.run.trajectory import Trajectory
 
 Listener = Callable[[About | Finding], object]
 FILES = (".csv", ".txt", ".dat", ".nc")
@@ -182,11 +183,9 @@ def _from_states(scene: Scene, given: Mapping[str, Any], momentum: Any) -> dict[
     """Energy and momenta by the angular momentum and the axis; nothing where one of them is not there."""
     if momentum is None:
         return {}
-    dims = {"axis": ("time", "component"), "quaternion": ("time", "part")}
-    whole = completed(xr.Dataset({name: (dims.get(name, "time"), given[name]) for name in given if name != "time"}))
-    if "axis" not in whole:
+    axis, L = completed(Trajectory.of_data(given)).axis, np.asarray(momentum, dtype=float)
+    if axis is None:
         return {}
-    axis, L = whole["axis"].values, np.asarray(momentum, dtype=float)
     if L.shape != axis.shape:
         raise SymtopError(f"momentum must have the shape {axis.shape}, one row for each time, not {L.shape}")
     p_psi = np.sum(L * axis, axis=1)

@@ -105,14 +105,6 @@ def test_the_closed_form_is_compared_with_the_fastest_row():
     assert row == ["x", "ten", "10 (1e+05 us; b)", "10 (1e+05 us; b)", "", ""]
 
 
-def test_the_median_of_the_closed_form_is_over_all_combinations_and_not_those_that_it_wins():
-    short = cell([[2.0] * 3, [1.0] * 3, [4.0] * 3], errors=[1e-16, 1e-4, 1e-7])
-    short["control"][0] = ""
-    message = work_closed_form.headline(short.expand_dims(scene=["x"]).expand_dims(horizon=[10.0]), ["over ten"])
-    assert "1 of 2" in message
-    assert "0.5 to 2 (median of all 2: 1.2)" in message  # of the one that it wins it would be 2
-
-
 def test_own_rows_are_compared_with_taylor():
     """One is ahead at 1e-3 and alone at 1e-9; without taylor nothing is said, and a slower row is named as such."""
     data = cell([[0.5] * 3, [1.0] * 3, [2.0] * 3], errors=[1e-4, 1e-7, 1e-10])
@@ -220,9 +212,7 @@ def test_when_to_choose_a_row_is_said_from_its_times_alone():
     one = cell([fast, slow, level, fast], errors).expand_dims(scene=["here"], horizon=[10.0])
     rows = {row[0]: row[1:] for row in worth.table(one).rows}
     assert rows["a"][:3] == ["2", "0", "2 of 4"]  # 1e-3 and 1e-6
-    assert rows["a"][-1] == "for errors of 1e-03 (1), 1e-06 (1) on here (2)"
     assert rows["c"][:2] == ["0", "2"]
-    assert rows["b"][-1] == "never: at its best it takes 3 times the fastest"
     assert rows["d"][-1] == worth.NO_TARGET
 
 
@@ -231,4 +221,3 @@ def test_a_row_far_behind_is_not_level_because_its_rounds_were_disturbed():
     assert leads.winners(data)["here", 0, 1e-6].level == ("b",)  # its least time was not met again
     rows = {row[0]: row[1:] for row in worth.table(data).rows}
     assert rows["b"][1] == "0"
-    assert rows["b"][-1] == "never: at its best it takes 3 times the fastest"
