@@ -153,26 +153,6 @@ def logarithm(words: Words) -> Words:
     return total
 
 
-def step_of(
-    drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] = (), processor: float = 0.0,
-    most: int = LONGEST_WORD,
-) -> Words:  # fmt: skip
-    """The step with these coefficients, kick[0] first, as a series of words."""
-    t, v = element(most, t=1.0), element(most, v=1.0)
-    bent = commutator(v, commutator(v, t))
-    bends = gradient or [0.0] * len(kick)
-    step = exponential(element(most))
-    for place, (b, c) in enumerate(zip(kick, bends, strict=True)):
-        if b or c:
-            step = product(step, exponential([b * one + c * more for one, more in zip(v, bent, strict=True)]))
-        if place < len(drift):
-            step = product(step, exponential(element(most, t=drift[place])))
-    if processor:
-        ends = [exponential([sign * processor * row for row in commutator(t, v)]) for sign in (1.0, -1.0)]
-        step = product(product(ends[0], step), ends[1])
-    return step
-
-
 @functools.cache
 def vanishing(length: int) -> Array:
     """An orthonormal basis of the words' combinations of a length that are zero here, shape (2^length, rank).
@@ -228,9 +208,20 @@ def splitting_conditions(
 ) -> Conditions:  # fmt: skip
     """What the conditions of a table are off by: the largest coefficient of each length that must vanish and does not.
 
-    `drift` and `kick` as in `symtop.composition`; ``gradient[i]`` and `processor` as there.
+    `drift`, `kick` (kick[0] comes first), `gradient` and `processor` are those of `symtop.composition`.
     """
-    defects = logarithm(step_of(drift, kick, gradient, processor, most))
+    t, v = element(most, t=1.0), element(most, v=1.0)
+    bent = commutator(v, commutator(v, t))
+    step = exponential(element(most))
+    for place, (b, c) in enumerate(zip(kick, gradient or [0.0] * len(kick), strict=True)):
+        if b or c:
+            step = product(step, exponential([b * one + c * more for one, more in zip(v, bent, strict=True)]))
+        if place < len(drift):
+            step = product(step, exponential(element(most, t=drift[place])))
+    if processor:
+        ends = [exponential([sign * processor * row for row in commutator(t, v)]) for sign in (1.0, -1.0)]
+        step = product(product(ends[0], step), ends[1])
+    defects = logarithm(step)
     defects[1] = defects[1] - 1.0
     rest = []
     for length, row in enumerate(defects[1:], start=1):
