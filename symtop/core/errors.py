@@ -189,11 +189,11 @@ def words_of(error: BaseException) -> str:
 
 
 @contextlib.contextmanager
-def foreign_code(what: str) -> Iterator[None]:
-    """Within it, whatever is raised becomes a SymtopError: `what` failed, and how. A SymtopError passes as it is."""
+def foreign_code(what: str, kind: type[SymtopError] = SymtopError) -> Iterator[None]:
+    """Within it, whatever is raised becomes an error of that kind: `what` failed, and how. One of that kind passes."""
     try:
         yield
     except BaseException as error:
-        if isinstance(error, SymtopError) or is_of_user(error):
+        if isinstance(error, kind) or is_of_user(error):
             raise
-        raise SymtopError(f"{what} failed: {words_of(error)}") from error
+        raise kind(f"{what} failed: {error if isinstance(error, SymtopError) else words_of(error)}") from error

@@ -104,13 +104,13 @@ def _overloads(function: FunctionType) -> Iterator[object]:
 
 def code_of(thing: object) -> list[Part]:
     """What a kernel, or anything that holds kernels, is compiled from; the same whatever a process has run before."""
-    return code().reached("kernel", thing, OPTIONS, sys.version_info[:2], numba.__version__)
+    _register_parts()
+    return Code(_overloads).reached("kernel", thing, OPTIONS, sys.version_info[:2], numba.__version__)
 
 
 def code() -> Code:
-    """What looks for code, as numba compiles it."""
-    _register_parts()
-    return Code(_overloads)
+    """What looks for code, as numba compiles it; a function counts alike before and after a kernel registers it."""
+    return Code(lambda function: () if function in _registered else _overloads(function))
 
 
 class _Folder:

@@ -121,7 +121,7 @@ def test_combining_refuses_cases_with_different_coordinates():
 
     joined = store.combine([case("a", [8.0, 100.0]), case("b", [8.0, 100.0, 1000.0])])
     assert np.isnan(joined["error"].sel(variant="a", horizon=1000.0))
-    with pytest.raises(symtop.SymtopError, match="coordinate horizon of spheroid--b differs"):
+    with pytest.raises(symtop.SymtopError, match="coordinate horizon of b on spheroid differs"):
         store.combine([case("a", [8.0, 100.0]), case("b", [8.0, 1000.0])])
 
 

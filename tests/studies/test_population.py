@@ -25,7 +25,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.run.guard import EXPECTED
-from symtop.runner.check import differences
+from symtop.runner.cases import differences
 
 INF, NAN = math.inf, math.nan
 
