@@ -14,7 +14,7 @@ from symtop_studies.drift.tables import ROUNDINGS
 from symtop_studies.drift.variants import charts_table
 
 import symtop
-from symtop.judging.claims.long_run import KEPT, Constant
+from symtop.judging.claims.constants import KEPT, Constant
 from symtop.measure.conservation import CONSTANTS, Changed
 from symtop.methods.framework.many import LEAST
 from symtop.methods.framework.registry import integrator
