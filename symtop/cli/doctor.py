@@ -46,17 +46,16 @@ def examine(results: Path) -> list[Finding]:
     from tqdm import tqdm
 
     findings = []
-    with beating(tqdm(total=len(CHECKS), desc="checking", unit="check", disable=None, leave=False)) as bar:
-        for topic, check in CHECKS.items():
+    with beating(tqdm(CHECKS.items(), desc="checking", unit="check", disable=None, leave=False)) as bar:
+        for topic, check in bar:
             try:
                 findings += check(results)
             except Exception as error:  # noqa: BLE001  (one check that fails must not hide the others)
                 findings.append(Finding(topic, words_of(error), False, "report this with all of this page"))
-            bar.update()
     return findings
 
 
-def _machine() -> list[Finding]:
+def _machine(_: Path) -> list[Finding]:
     from symtop.runner import scripts
 
     python = f"{platform.python_version()} at {sys.executable}, {platform.system()} {platform.machine()}"
@@ -69,7 +68,7 @@ def _machine() -> list[Finding]:
     ]
 
 
-def _packages() -> list[Finding]:
+def _packages(_: Path) -> list[Finding]:
     """Every requirement of symtop's metadata that applies to this machine, and whether its version is in range.
 
     A requirement of an extra may be absent; one that is installed must be in range too.
@@ -80,10 +79,9 @@ def _packages() -> list[Finding]:
     findings = []
     for requirement in map(Requirement, importlib.metadata.requires("symtop") or []):
         marker, requirement.marker = requirement.marker, None
-        applies = [marker is None or marker.evaluate({"extra": extra}) for extra in ("", *extras)]
-        if not any(applies):
+        required, *optional = (marker is None or marker.evaluate({"extra": extra}) for extra in ("", *extras))
+        if not (required or any(optional)):
             continue  # for another system or another Python
-        required = applies[0]
         try:
             result = importlib.metadata.version(requirement.name)
             healthy = requirement.specifier.contains(result, prereleases=True)
@@ -95,7 +93,7 @@ def _packages() -> list[Finding]:
     return findings
 
 
-def _heyoka() -> list[Finding]:
+def _heyoka(_: Path) -> list[Finding]:
     """The precisions that this build of heyoka has."""
     if importlib.util.find_spec("heyoka") is None:
         advice = "heyoka has wheels for Linux only; elsewhere try conda-forge. The closed form works without it"
@@ -116,7 +114,7 @@ def _heyoka() -> list[Finding]:
     return findings
 
 
-def _caches() -> list[Finding]:
+def _caches(_: Path) -> list[Finding]:
     root, yesterday = cache_root(), time.time() - DAY
     findings = [_writable("cache", root, "set SYMTOP_CACHE to a folder that can be written")]
     for name, kind, remedy in (("kernels", "kernel", "compiled again"), ("reference", "file", "computed again")):
@@ -147,7 +145,7 @@ def _writable(topic: str, folder: Path, advice: str) -> Finding:
     return Finding(topic, f"{folder}, {_bytes(free)} free", free > LEAST_SPACE, f"make room, or {advice}")
 
 
-def _self_check() -> list[Finding]:
+def _self_check(_: Path) -> list[Finding]:
     """Published values, and three ways to compute one motion, against each other."""
     import numpy as np
 
@@ -172,21 +170,14 @@ def _self_check() -> list[Finding]:
 
 
 def _bytes(size: float) -> str:
-    for unit in ("B", "kB", "MB"):
-        if size < 1000.0:
-            return f"{size:.0f} {unit}"
-        size /= 1000.0
-    return f"{size:.1f} GB"
+    power = min(math.floor(math.log10(max(size, 1.0))) // 3, 3)
+    return f"{size / 1000.0**power:.{power // 3}f} {('B', 'kB', 'MB', 'GB')[power]}"
 
 
 CHECKS: dict[str, Callable[[Path], list[Finding]]] = {
-    "machine": lambda _: _machine(),
-    "packages": lambda _: _packages(),
-    "heyoka": lambda _: _heyoka(),
-    "caches": lambda _: _caches(),
-    "results": _results,
-    "self-check": lambda _: _self_check(),
-}
+    "machine": _machine, "packages": _packages, "heyoka": _heyoka, "caches": _caches, "results": _results,
+    "self-check": _self_check,
+}  # fmt: skip
 SCENE = "goldstein"
 PERIODS = 0.02  # of a nutation: the length of a run that compiles
 
@@ -210,15 +201,12 @@ def _run(task: tuple[str, str]) -> str:
             return ""
         variant, span = integrator(name), PERIODS * period
         (chart,) = variant.charts()
-        setting: dict[str, Any] = {
-            **variant.setting(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance)).kwargs()
-        }
-        observe = "attitude" if chart == "angles" else chart
+        setting = variant.setting(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance)).kwargs()
+        options: dict[str, Any] = {**setting, "observe": "attitude" if chart == "angles" else chart}
         if kind == "alone":
-            simulate(SCENE, name, **setting, horizon=span, samples=2, observe=observe)
+            simulate(SCENE, name, **options, horizon=span, samples=2)
         else:
-            tops = [SCENE] * 2
-            ensemble(tops, name, **setting, horizon=span, samples=2, observe=observe, threads=1, quiet=True)
+            ensemble([SCENE] * 2, name, **options, horizon=span, samples=2, threads=1, quiet=True)
     except Exception as error:  # noqa: BLE001  (one that fails must not keep the others from being compiled)
         return f"{name or kind}: {words_of(error)}"
     return ""
@@ -245,13 +233,11 @@ def compile_all(jobs: int | None = None) -> tuple[int, list[str]]:
     from symtop.core.parallel import context, cores
 
     before, todo = kernels(), tasks()
-    bar = tqdm(desc="compiling", total=len(todo), unit="run", disable=None, leave=False)
-    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context()) as pool, beating(bar):
-        reasons = []
-        for reason in pool.map(_run, todo):
-            reasons.append(reason)
-            bar.update()
-    return kernels() - before, list(filter(None, reasons))
+    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context()) as pool:
+        runs = pool.map(_run, todo)
+        with beating(tqdm(runs, "compiling", len(todo), unit="run", disable=None, leave=False)) as bar:
+            reasons = list(filter(None, bar))
+    return kernels() - before, reasons
 
 
 @click.command(short_help="Check the installation; say what to do about faults.")
