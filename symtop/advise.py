@@ -1,12 +1,10 @@
 """`recommend`: the cheapest integrator, with its step or tolerance, that meets an accuracy on a scene.
 
     1. Candidates. A stored population study counts on how many of the random tops nearest to this one a method was
-       the cheapest or nearly so; a stored work-precision study lists the methods that were cheapest on the nearest
-       scene. The distance is that of four dimensionless numbers which fix the motion of the axis
-       (`symtop.measure.ranking`). Without a stored study every compiled method is a candidate.
+       the cheapest or nearly so (`symtop.measure.ranking`); a stored work-precision study lists the methods that were
+       cheapest on the nearest scene. Without a stored study every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
-       (`symtop.measure.settings`). The error is measured against the closed form, its target is lowered by the law of
-       growth, and one run is timed.
+       (`symtop.measure.settings`), against the closed form and a target lowered by the law of growth; one run is timed.
     3. Confirmation. The three fastest candidates are run to the whole horizon, if a budget of force evaluations allows
        it, and their settings are corrected.
 
@@ -17,16 +15,16 @@ The confidence of the advice is one of:
     extrapolated               it was not run to the end
     none                       no method meets the accuracy; the integrator is None
 
-An accuracy below the bound of the reference is answered with ``none`` before any run.
-The closed form is no candidate: it is what errors are measured by, and a top with friction, drive or another body
-attached has none. For the top as it stands it is mostly the fastest way, and the advice says so with its time.
+An accuracy below the bound of the reference is answered with ``none`` before any run. The closed form is no candidate:
+it is what errors are measured by, and a top with friction, drive or another body attached has none. For the top as it
+stands it is mostly the fastest way, and the advice says so with its time.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -162,27 +160,16 @@ def recommend(
     guesses, source = _candidates(question, data, near)
     source += f" ({Path(results) / STORED_STUDY})" if results is not None else ""
     trials: list[_Trial] = []
-    fails: dict[str, list[str]] = {}
-    patience = math.inf
-    methods = {name: integrator(name) for name in guesses}
-    # Methods of high order first: they are the cheapest at most accuracies, and their cost ends the other searches.
-    for name in sorted(guesses, key=lambda name: -(methods[name].order or 0)):
-        trial = _try(question, methods[name], guesses[name], patience)
-        if isinstance(trial, _Trial):
-            trials.append(trial)
-            patience = min(patience, TOO_DEAR * trial.met.evaluations)
-        else:
-            fails.setdefault(trial, []).append(name)
-    trials.sort(key=lambda trial: trial.seconds)
     ranked: list[_Trial] = []
-    for number, trial in enumerate(trials):
-        if number >= FINALISTS and ranked:
-            break
-        confirmed = _confirm(question, trial)
-        if isinstance(confirmed, _Trial):
-            ranked.append(confirmed)
-        else:
-            fails.setdefault(confirmed, []).append(trial.met.integrator.name)
+    fails: dict[str, list[str]] = {}
+    # Methods of high order first: they are the cheapest at most accuracies, and their cost ends the other searches.
+    for method in sorted(map(integrator, guesses), key=lambda method: -(method.order or 0)):
+        patience = TOO_DEAR * min((one.met.evaluations for one in trials), default=math.inf)
+        trial = _try(question, method, guesses[method.name], patience)
+        _sort_in(trial, trials, fails, method.name)
+    for number, tried in enumerate(sorted(trials, key=lambda trial: trial.seconds)):
+        if number < FINALISTS or not ranked:
+            _sort_in(_confirm(question, tried), ranked, fails, tried.met.integrator.name)
     ranked.sort(key=lambda trial: trial.seconds)
     # Times of the user's own methods in plain Python say nothing beside those of compiled ones.
     own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
@@ -190,6 +177,14 @@ def recommend(
         fails["Not tried, as only compiled methods are timed"] = own
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
     return _advice(question, ranked, sentences, source, near)
+
+
+def _sort_in(trial: "_Trial | str", trials: list[_Trial], fails: dict[str, list[str]], name: str) -> None:
+    """To the trials, or its name to those that fail for the same reason."""
+    if isinstance(trial, _Trial):
+        trials.append(trial)
+    else:
+        fails.setdefault(trial, []).append(name)
 
 
 def _stored(file: Path) -> xr.Dataset:
@@ -367,8 +362,7 @@ class EngineAdvice:
     advice: Advice | None
 
     def __str__(self) -> str:
-        default = next(iter(self.errors))
-        maps = SETTINGS[self.engine]
+        default, maps = next(iter(self.errors)), SETTINGS[self.engine]
         lines = [
             f"{self.engine} on {self.scene}, step {self.step_size:g}, to t = {self.horizon:g}: the axis is off by",
             *(f"    {value:.2e} rad  {name} ({maps[name]})" for name, value in self.errors.items()),
@@ -390,22 +384,18 @@ def i_use(engine: str, scene: "str | Scene", *, step_size: float = STEP, horizon
     not known and for numbers that are out of range. It takes some seconds.
     """
     one_of("engine", engine, SETTINGS)
-    start = scenes.scene(scene)
-    h = positive("step_size", step_size)
+    start, h = scenes.scene(scene), positive("step_size", step_size)
     end = start.horizon if horizon is None else horizon_of(horizon)
     if h >= end:
         raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")
     measured = {name: _error_and_forces(start, method, h, end) for name, method in SETTINGS[engine].items()}
     best = min(measured, key=lambda name: measured[name][0])
-    error, forces = measured[best]
-    off = {name: value for name, (value, _) in measured.items()}
+    (error, forces), off = measured[best], {name: value for name, (value, _) in measured.items()}
     advice = recommend(start, accuracy=error, horizon=end) if error <= WORST else None
     if advice is None or advice.integrator is None:
         return EngineAdvice(start.name, engine, h, end, off, best, math.nan, None)
-    needed = simulate(
-        start, advice.integrator, step_size=advice.step_size, tolerance=advice.tolerance, horizon=end, guard=False,
-        observe="axis",
-    )  # fmt: skip
+    setting: dict[str, Any] = {"step_size": advice.step_size, "tolerance": advice.tolerance}
+    needed = simulate(start, advice.integrator, **setting, horizon=end, guard=False, observe="axis")
     gain = forces / float(needed.attrs["force_evaluations"])
     return EngineAdvice(start.name, engine, h, end, off, best, gain, advice)
 

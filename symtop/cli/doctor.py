@@ -147,8 +147,6 @@ def _writable(topic: str, folder: Path, advice: str) -> Finding:
 
 def _self_check(_: Path) -> list[Finding]:
     """Published values, and three ways to compute one motion, against each other."""
-    import numpy as np
-
     from symtop.measure.published import published_values
     from symtop.run.simulation import simulate
 
@@ -159,11 +157,11 @@ def _self_check(_: Path) -> list[Finding]:
     result = f"{len(values) - len(missed)} of {len(values)} reproduced{': not ' + '; '.join(missed) if missed else ''}"
     findings = [Finding("published values", result, not missed, wrong)]
     exact = simulate("spheroid", "exact", samples=41)
-    runs: list[tuple[str, float | None, float]] = [("midpoint", 1e-3, MIDPOINT_GAP)]
-    runs += [("taylor", None, TAYLOR_GAP)] if importlib.util.find_spec("heyoka") else []
-    for name, step, allowed in runs:
+    for name, step, allowed in (("midpoint", 1e-3, MIDPOINT_GAP), ("taylor", None, TAYLOR_GAP)):
+        if name == "taylor" and importlib.util.find_spec("heyoka") is None:
+            continue
         data = simulate("spheroid", name, step_size=step, samples=41, observe="attitude", guard=False)
-        gap = float(np.max(np.abs(data["axis"].values - exact["axis"].values)))
+        gap = float(abs(data["axis"] - exact["axis"]).max())
         result = f"{gap:.1e} rad from the truth on spheroid (allowed {allowed:g})"
         findings.append(Finding(name, result, gap <= allowed, wrong))
     return [*findings, Finding("self-check", f"{time.perf_counter() - began:.1f} s")]
@@ -182,8 +180,8 @@ SCENE = "goldstein"
 PERIODS = 0.02  # of a nutation: the length of a run that compiles
 
 
-def _run(task: tuple[str, str]) -> str:
-    """Make the run of a variant alone or in an ensemble, or those of the truth; returns why it could not be done."""
+def _run(name: str) -> str:
+    """Compile what a variant runs alone and in an ensemble, or the truth without a name; returns why it could not."""
     from symtop.core.lazy_kernel import LAZY
     from symtop.methods.framework.registry import integrator
     from symtop.model.scenes import scene
@@ -191,34 +189,31 @@ def _run(task: tuple[str, str]) -> str:
     from symtop.run.reference.truth import reference
     from symtop.run.simulation import simulate
 
-    (kind, name), period = task, scene(SCENE).nutation_period
+    span = PERIODS * scene(SCENE).nutation_period
     try:
-        if kind == "truth":
+        if not name:
             for kernel in LAZY:
                 kernel.compile()
-            run = simulate(SCENE, "strang", step_size=period / 100.0, horizon=period, samples=3)
+            run = simulate(SCENE, "strang", step_size=span / 2, horizon=50 * span, samples=3)
             reference(SCENE, run["time"].values)
             return ""
-        variant, span = integrator(name), PERIODS * period
-        (chart,) = variant.charts()
+        variant = integrator(name)
         setting = variant.setting(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance)).kwargs()
-        options: dict[str, Any] = {**setting, "observe": "attitude" if chart == "angles" else chart}
-        if kind == "alone":
-            simulate(SCENE, name, **options, horizon=span, samples=2)
-        else:
-            ensemble([SCENE] * 2, name, **options, horizon=span, samples=2, threads=1, quiet=True)
+        observe = "attitude" if variant.charts() == ("angles",) else variant.charts()[0]
+        options: dict[str, Any] = {**setting, "observe": observe, "horizon": span, "samples": 2}
+        simulate(SCENE, name, **options)
+        ensemble([SCENE] * 2, name, **options, threads=1, quiet=True)
     except Exception as error:  # noqa: BLE001  (one that fails must not keep the others from being compiled)
-        return f"{name or kind}: {words_of(error)}"
+        return f"{name or 'truth'}: {words_of(error)}"
     return ""
 
 
-def tasks() -> list[tuple[str, str]]:
-    """Every run that compiles something: its kind, and the variant ``method[chart]``."""
+def variants() -> list[str]:
+    """Every variant, ``method[chart]``, that compiles something."""
     from symtop.methods.framework.registry import integrators
 
     compiled = [method for method in integrators().values() if method.implementation in {"compiled", "heyoka"}]
-    names = [f"{method.name}[{chart}]" for method in compiled for chart in method.charts()]
-    return [("truth", ""), *(("alone", name) for name in names), *(("together", name) for name in names)]
+    return [f"{method.name}[{chart}]" for method in compiled for chart in method.charts()]
 
 
 def kernels() -> int:
@@ -232,10 +227,10 @@ def compile_all(jobs: int | None = None) -> tuple[int, list[str]]:
 
     from symtop.core.parallel import context, cores
 
-    before, todo = kernels(), tasks()
+    before, names = kernels(), ["", *variants()]
     with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context()) as pool:
-        runs = pool.map(_run, todo)
-        with beating(tqdm(runs, "compiling", len(todo), unit="run", disable=None, leave=False)) as bar:
+        runs = pool.map(_run, names)
+        with beating(tqdm(runs, "compiling", len(names), unit="run", disable=None, leave=False)) as bar:
             reasons = list(filter(None, bar))
     return kernels() - before, reasons
 

@@ -105,17 +105,15 @@ def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path
 
 
 def test_every_compiled_method_is_run_in_each_of_its_charts():
-    todo = doctor.tasks()
-    for kind in ("alone", "together"):
-        names = [name for what, name in todo if what == kind]
-        assert len(names) == len(set(names))
-        for method in symtop.integrators().values():
-            variants = {f"{method.name}[{chart}]" for chart in method.charts()}
-            assert variants <= set(names) if method.implementation != "python" else not variants & set(names)
+    names = doctor.variants()
+    assert len(names) == len(set(names))
+    for method in symtop.integrators().values():
+        variants = {f"{method.name}[{chart}]" for chart in method.charts()}
+        assert variants <= set(names) if method.implementation != "python" else not variants & set(names)
 
 
 def test_a_run_that_fails_is_named(monkeypatch):
-    monkeypatch.setattr(doctor, "tasks", lambda: [("alone", "strang[axis]"), ("alone", "no-such-method[axis]")])
+    monkeypatch.setattr(doctor, "variants", lambda: ["strang[axis]", "no-such-method[axis]"])
     _, failed = doctor.compile_all(jobs=1)
     assert [why.partition(":")[0] for why in failed] == ["no-such-method[axis]"]
 
@@ -123,7 +121,7 @@ def test_a_run_that_fails_is_named(monkeypatch):
 @pytest.mark.slow
 def test_kernels_are_on_disk_afterwards(monkeypatch, tmp_path):
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
-    monkeypatch.setattr(doctor, "tasks", lambda: [("alone", "strang[axis]")])
+    monkeypatch.setattr(doctor, "variants", lambda: ["strang[axis]"])
     count, _ = doctor.compile_all(jobs=1)
     assert count == doctor.kernels() >= 1
     assert doctor.compile_all(jobs=1)[0] == 0
