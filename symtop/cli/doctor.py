@@ -225,10 +225,10 @@ def compile_all(jobs: int | None = None) -> tuple[int, list[str]]:
     """Compile what is not on disk; returns how many kernels came to the cache, and which runs could not be done."""
     from tqdm import tqdm
 
-    from symtop.core.parallel import context, cores
+    from symtop.core.parallel import OneThreadEach, cores
 
     before, names = kernels(), ["", *variants()]
-    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context()) as pool:
+    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), OneThreadEach()) as pool:
         runs = pool.map(_run, names)
         with beating(tqdm(runs, "compiling", len(names), unit="run", disable=None, leave=False)) as bar:
             reasons = list(filter(None, bar))

@@ -84,11 +84,8 @@ def error_row(
 
     `budget` is that of `simulate`.
     """
-    control: dict[str, Any] = method.setting(setting).kwargs()
-    run = integrate(
-        scene, method, **control, horizon=horizon, samples=enough_samples(scene, horizon),
-        observe=observe, budget=budget,
-    )  # fmt: skip
+    control: dict[str, Any] = {"horizon": horizon, "samples": enough_samples(scene, horizon), "observe": observe}
+    run = integrate(scene, method, budget=budget, **control | method.setting(setting).kwargs())
     truth = reference(scene, run.time, precision="closed-form")
     shown, failed = errors_against(scene, run, truth), run.outcome != "ok"
     row: dict[str, float | str] = {name: getattr(run, name) for name in COUNTS}

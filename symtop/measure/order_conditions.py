@@ -160,38 +160,28 @@ def vanishing(length: int) -> Array:
     They are the brackets with more than one V beyond the number of T: by degrees in the momenta, a bracket takes one
     away, T has two of them and V none.
     """
-    parts = [_of(length, letters) for letters in range(length + 1)]
-    whole: Array = np.concatenate(parts, axis=1)
-    return whole
-
-
-def _brackets(length: int, letters: int) -> Array:
-    """Columns that span the vanishing combinations with so many V."""
-    if length < 4 or not 0 <= letters <= length:
-        return np.zeros((2**length, 0))
-    columns = [_spread(column, 0) for column in _of(length - 1, letters).T]
-    columns += [_spread(column, 1) for column in _of(length - 1, letters - 1).T]
-    if letters > length - letters + 1:
-        columns += [_nested(word, length) for word in range(2**length) if word.bit_count() == letters]
-    return np.stack(columns, axis=1) if columns else np.zeros((2**length, 0))
+    return np.concatenate([_vanishing(length, letters) for letters in range(length + 1)], axis=1)
 
 
 @functools.cache
-def _of(length: int, letters: int) -> Array:
-    """The same, orthonormal."""
-    spanning = _brackets(length, letters)
-    if not spanning.size:
-        return spanning
-    left, sizes, _ = np.linalg.svd(spanning, full_matrices=False)
-    basis: Array = left[:, sizes > RANK]
-    return basis
+def _vanishing(length: int, letters: int) -> Array:
+    """The same with so many V."""
+    columns: list[Array] = []
+    if length >= 4 and 0 <= letters <= length:
+        columns += [_spread(column, 0) for column in _vanishing(length - 1, letters).T]
+        columns += [_spread(column, 1) for column in _vanishing(length - 1, letters - 1).T]
+        if letters > length - letters + 1:
+            columns += [_nested(word, length) for word in range(2**length) if word.bit_count() == letters]
+    if not columns:
+        return np.zeros((2**length, 0))
+    left, sizes, _ = np.linalg.svd(np.stack(columns, axis=1), full_matrices=False)
+    return left[:, sizes > RANK]
 
 
 def _spread(column: Array, letter: int) -> Array:
     """[X, column] for the letter X."""
     one = np.eye(2)[letter]
-    bracket: Array = np.multiply.outer(one, column).ravel() - np.multiply.outer(column, one).ravel()
-    return bracket
+    return np.asarray(np.multiply.outer(one, column).ravel() - np.multiply.outer(column, one).ravel())
 
 
 def _nested(word: int, length: int) -> Array:

@@ -101,10 +101,9 @@ class StepMap:
 
     def at(self, start: Angles) -> Array:
         """Y of a start itself."""
-        if self.chart != "angles":
-            state = charts.space_state(self.chart, self.top, start)
-            return np.concatenate([state[:-3], state[-3:] / self.unit])
-        return self.point(start)
+        if self.chart == "angles":
+            return self.point(start)
+        return self.scaled(charts.space_state(self.chart, self.top, start), 0.0, 0.0)
 
     def point(self, start: Angles) -> Array:
         """z of a start."""

@@ -157,7 +157,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             self.close_workers()
             self.size = min(size, self.jobs)
             self._workers = ProcessPool(
-                self.size, initializer=begin_worker, initargs=(os.getpid(),), context=parallel.context()
+                self.size, initializer=begin_worker, initargs=(os.getpid(),), context=parallel.OneThreadEach()
             )
 
     def submit(self, function: Callable[..., Any], *args: Any, limit: float | None = None) -> "Future[Any]":

@@ -13,7 +13,6 @@ from symtop.measure.conservation import trend
 from symtop.measure.order import order, power_law
 from symtop.measure.settings import ladder
 from symtop.measure.timing import Timing, timings
-from symtop.run.reference.truth import reference
 from symtop.runner import store
 from symtop.runner.study import Case
 
@@ -113,15 +112,6 @@ def test_ladders_end_at_the_largest_number_of_steps_and_the_least_tolerance():
         assert 8.0 / steps[-1] <= 1.001e4
     tolerances = ladder(symtop.integrator("rk45"), where, 8.0, 6)
     assert tolerances[-1] >= symtop.integrator("rk45").least_tolerance
-
-
-def test_two_starts_of_one_top_do_not_share_a_cached_reference():
-    top = symtop.SymmetricTop(2.0, 1.0, 3.0)
-    ends = [
-        float(reference(symtop.Scene("x", top, symtop.Angles(theta=theta, psi_dot=5.0), 1.0), [1.0])["theta"][0])
-        for theta in (0.7, 0.8)
-    ]
-    assert ends[0] != pytest.approx(ends[1], abs=1e-3)
 
 
 def test_combining_refuses_cases_with_different_coordinates():

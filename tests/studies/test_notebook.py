@@ -226,7 +226,7 @@ def test_the_films_body_axes_are_those_of_the_charts(tmp_path):
     q = charts.quaternion_from_angles(*np.random.default_rng(1).uniform(0.2, 2.8, (3, 5)))
     frames = solid.columns_of(q)
     assert np.max(np.abs(frames[:, 2] - charts.axis_from_quaternion(q))) < 1e-15
-    assert np.max(np.abs(frames[:, 0] - charts.transverse_from_quaternion(q))) < 1e-15
+    assert np.max(np.abs(frames[:, 0] - solid.transverse_from_quaternion(q))) < 1e-15
     assert np.max(np.abs(np.cross(frames[:, 0], frames[:, 1]) - frames[:, 2])) < 1e-15
     solid.Film(q, q[::-1], "five attitudes", pixels=120).savefig(tmp_path / "film.gif")
     with Image.open(tmp_path / "film.gif") as film:
