@@ -279,6 +279,7 @@ class View:
 
 
 READING_SECONDS = 2e-5  # of NumPy beyond what the compiled function takes
+_NONE, _NO_ROOM = np.empty(0), np.empty((2, 0))
 
 
 def _read(
@@ -311,9 +312,6 @@ _reader = LazyKernel(
 def _compilable(*arrays: Array) -> bool:
     """Are these what a compiled function takes: doubles in a row, which may be written to?"""
     return all(array.dtype == np.float64 and array.flags.carray for array in arrays)
-
-
-_NONE, _NO_ROOM = np.empty(0), np.empty((2, 0))
 
 
 def axes(chart: str, states: Array) -> Array:

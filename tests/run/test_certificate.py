@@ -142,17 +142,6 @@ def test_the_discrete_map_as_a_witness_knows_its_own_error_and_is_no_echo(monkey
     assert made.doubt == made.map_apart
 
 
-def test_words_of_a_certificate():
-    assert str(Certificate(1e6, 30, 0.25, math.nan, math.nan, math.nan)) == (
-        "40 digits at 30 times up to t = 1e+06, largest error 0.25 of its bound"
-    )
-    assert str(Certificate(1e6, 30, 0.25, 100.0, 0.0, math.nan)).endswith(
-        "; discrete map up to t = 100, no further apart than its own error"
-    )
-    integrated = str(Certificate(1e6, 30, 0.25, 100.0, 0.0, 8e-16))
-    assert integrated.endswith("; long double integration up to t = 100, 8e-16 rad apart")
-
-
 def test_a_damaged_certificate_is_made_again(cache):
     made = symtop.reference("spheroid", [1.0], certify="digits").attrs["certificate"]
     (path,) = cache.glob("reference/*.nc")
