@@ -139,16 +139,6 @@ def test_an_ensemble_costs_little_around_its_steps():
 # ---- lanes -----------------------------------------------------------------------------------------------------------
 
 
-def test_every_kind_of_method_has_the_limit_that_is_set_for_it():
-    limits = {"strang": "7", "srkn-14-6": "7", "rk4": "7", "midpoint": "6", "trapezoidal": "6", "gauss-2": "3",
-              "rkmk-se3-4": "5"}  # fmt: skip
-    assert {name: lanes.limit_of(name) for name in limits} == limits
-    assert {lanes.kind_of(name) for name in ("series", "exact-discrete")} == {lanes.WIDE}
-    assert (
-        lanes.limit_of("series") == lanes.limit_of("galerkin-simpson") == lanes.limit_of("simpson-linear") == "not set"
-    )
-
-
 def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
     """A member that is given up would be timed alone; the closed form says how far the others are off."""
     solver, numbers, steps = lanes.solver_of(*lanes.RIVAL), lanes.members(), 45

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import symtop
 from benchmarks import measured
 from benchmarks.peers import measure, study, summary, together
 from symtop.core import netcdf
@@ -81,18 +80,6 @@ def _peers_into(folder):
     found = runner.findings_of(study.STUDY, data, folder, style.save, failures=["drake was skipped."], cases=2)
     found["provenance"] = {**found["provenance"], "processor": "an abacus"}
     store.write_json(folder / "peers.json", found | {"measured": study.measured(data)})
-
-
-def test_the_report_shows_the_peers_with_date_machine_and_versions(tmp_path):
-    _peers_into(tmp_path)
-    text = page.write(tmp_path).read_text()
-    for words in (study.STUDY.title, "200 to 200 times as long as the fastest kernel alone", "drake was skipped.",
-                  "Measured on 2001-02-03", "an abacus", "scipy 1", "make peers"):  # fmt: skip
-        assert words in text
-        assert words in (tmp_path / "report.md").read_text()
-    (tmp_path / "figures" / "peers-fronts.png").unlink()
-    with pytest.raises(symtop.SymtopError, match="make peers"):
-        page.write(tmp_path)
 
 
 def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_path, quick_results):
