@@ -1,5 +1,6 @@
 """What the measured peers say: both ratios, winners and losers by name, in a section that outlives the studies."""
 
+import itertools
 import re
 import shutil
 import subprocess
@@ -128,18 +129,10 @@ def test_the_stored_measurement_is_whole_and_its_inner_loops_did_the_work():
     error, bound, end = (data[name].values[good] for name in ("axis", "axis_bound", "end_error"))
     assert np.all(end <= 3.0 * error + bound)  # CVODE's first step depends on the first time that is asked for
     assert {"spheroid", "goldstein"} <= set(data["scene"].values.tolist())
-    for scene in ("spheroid", "goldstein"):
-        for target in summary.JUDGED:
-            for call in summary.NAMES:
-                for name in (
-                    "symtop",
-                    "scipy[axis], numba",
-                    "scipy[angles], Python",
-                    "cvode",
-                    "rebound",
-                    "arkode-sprk",
-                ):
-                    assert summary.best_of(data, call, scene, summary.groups(data)[name], target) is not None
+    names = ("symtop", "scipy[axis], numba", "scipy[angles], Python", "cvode", "rebound", "arkode-sprk")
+    for asked in itertools.product(summary.NAMES, ("spheroid", "goldstein"), names, summary.JUDGED):
+        call, scene, name, target = asked
+        assert summary.best_of(data, call, scene, summary.groups(data)[name], target) is not None, asked
 
 
 # ---- many tops at once -----------------------------------------------------------------------------------------------

@@ -52,18 +52,9 @@ ANY = [
     xr.Dataset(), xr.DataArray([1.0]), symtop.SymtopError("x"), TOP, START,
 ]  # fmt: skip
 RUN = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.5, samples=11)
-NOT_DATA = [
-    None,
-    3,
-    "x",
-    [],
-    {},
-    object(),
-    {"time": [0.0]},
-    {"time": "x", "theta": [1.0]},
-    xr.Dataset(),
-    {"axis": [[0, 0, 1.0]]},
-]
+NOT_HORIZONS = [value for value in NOT_POSITIVE if value is not None]
+NOT_DATA = [None, 3, "x", [], {}, object(), {"time": [0.0]}, {"time": "x", "theta": [1.0]}]
+NOT_DATA += [xr.Dataset(), {"axis": [[0, 0, 1.0]]}]
 NO_NUMBER = [value for value in NOT_POSITIVE if not isinstance(value, np.ndarray | list)]
 SMALL = symtop.population(3, seed=1)
 
@@ -82,12 +73,7 @@ MORE = {
     "recommend": (
         symtop.recommend,
         {"scene": "spheroid", "accuracy": 1e-2, "horizon": 0.1},
-        {
-            "scene": UNKNOWN,
-            "accuracy": NOT_POSITIVE,
-            "quantity": UNKNOWN,
-            "horizon": [value for value in NOT_POSITIVE if value is not None],
-        },
+        {"scene": UNKNOWN, "accuracy": NOT_POSITIVE, "quantity": UNKNOWN, "horizon": NOT_HORIZONS},
     ),
     "population": (
         symtop.population, {"n": 3, "seed": 1}, {"n": NOT_WHOLE, "seed": [None, "x", -1, 1.5, math.nan, [], 1j]}
@@ -96,12 +82,8 @@ MORE = {
         symtop.ensemble,
         {"members": SMALL, "integrator": "strang", "step_size": 0.05, "horizon": 0.2, "samples": 3, "quiet": True},
         {
-            "members": NOT_DATA[:4],
-            "integrator": UNKNOWN,
-            "step_size": NO_NUMBER,
-            "horizon": NO_NUMBER[1:],
-            "samples": [*NOT_WHOLE, 1],
-            "observe": [value for value in UNKNOWN if value is not None],
+            "members": NOT_DATA[:4], "integrator": UNKNOWN, "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:],
+            "samples": [*NOT_WHOLE, 1], "observe": [value for value in UNKNOWN if value is not None],
             "threads": [value for value in NOT_WHOLE if value is not None],
         },
     ),
@@ -123,11 +105,8 @@ MORE = {
         symtop.judge,
         {"target": lambda f, t, y, h: y, "quick": True},
         {
-            "form": [value for value in UNKNOWN[1:] if value],
-            "chart": UNKNOWN,
-            "scene": UNKNOWN,
-            "order": NOT_WHOLE[1:],
-            "energy": UNKNOWN[1:],
+            "form": [value for value in UNKNOWN[1:] if value], "chart": UNKNOWN, "scene": UNKNOWN,
+            "order": NOT_WHOLE[1:], "energy": UNKNOWN[1:],
         },
     ),
 }  # fmt: skip
