@@ -86,8 +86,8 @@ FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
 }
 # maps between the variables that are stepped and those that are shown, once a run
 SHOWN: dict[Callable[..., Any], tuple[Callable[..., Any], Callable[..., Any]]] = {
-    space.march_axis: (space.enter_axis, space.present_axis),
-    space.march_attitude: (space.enter_attitude, space.present_attitude),
+    space.march_axis: (space.AXIS.enter, space.AXIS.present),
+    space.march_attitude: (space.ATTITUDE.enter, space.ATTITUDE.present),
     exact_discrete.march_axis: (exact_discrete.enter, exact_discrete.present_axis),
     exact_discrete.march_attitude: (exact_discrete.enter, exact_discrete.present_attitude),
     series.march_attitude(DEFAULT_ORDER): (lambda _par, _rule, state, _h: state, series.present),

@@ -13,8 +13,7 @@ from symtop.methods.framework.angles import on_angles
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lagrangian.discrete_lagrangian import forces, march, node_sums, opening
-from symtop.methods.lagrangian.quadrature import Quadrature
+from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, forces, march, node_sums, opening
 from tests.conftest import random_scenes
 
 DISCRETE = ("midpoint", "trapezoidal", "stormer-verlet")

@@ -9,7 +9,7 @@ from symtop.measure.conservation import trend
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
 from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.lagrangian import unreduced as kernel
-from symtop.methods.lagrangian.quadrature import RULES, Quadrature
+from symtop.methods.lagrangian.discrete_lagrangian import RULES, Quadrature
 from symtop.methods.lagrangian.unreduced import march, unreduced, with_momenta
 from tests.conftest import random_scenes
 from tests.methods.test_integrators import fitted

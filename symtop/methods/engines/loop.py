@@ -24,7 +24,6 @@ compensated sum gives the second one exactly. The step is h rounded to single pr
 multiples of h: a relative 6e-8 in time.
 """
 
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -34,12 +33,12 @@ from symtop.core.jit import register_jitable
 from symtop.methods.framework.loop import Loop, as_stepped, kernel_loop
 from symtop.methods.framework.preparation import Body, Preparation
 from symtop.methods.framework.space import (
-    axis_parts,
+    attitude_at,
+    axis_at,
     finite_outcome,
-    momentum_parts,
+    momentum_at,
     observe_attitude,
     observe_axis,
-    quaternion_parts,
 )
 from symtop.methods.vectors import cross, dot, plus, product, scaled
 
@@ -55,25 +54,14 @@ class EngineTop(NamedTuple):
     one: float = 1.0
 
 
-def _prepared(place_parts: Callable[..., Any], size: int, *, rates: bool) -> Preparation:
+def _prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Preparation:
     """A start as (e, L) or (q, L), or with `rates` w for L: the angular momentum of a body whose moments are one."""
 
     def prepare(top, at):  # type: ignore[no-untyped-def]
         body: Any = Body(1.0, 1.0, 0.0) if rates else Body(top.I1, top.I3, top.mgl)
-        v = momentum_parts(math, body, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
-        return EngineTop(top.I1, top.I3, top.mgl, 0.0, 0.5, 1.0), (*place_parts(at), *v)
+        return EngineTop(top.I1, top.I3, top.mgl, 0.0, 0.5, 1.0), (*place_at(at), *momentum_at(body, at))
 
     return Preparation(prepare, size)
-
-
-@register_jitable
-def _axis_of_start(at: Any) -> Any:
-    return axis_parts(math, at.theta, at.phi)
-
-
-@register_jitable
-def _quaternion_of_start(at: Any) -> Any:
-    return quaternion_parts(math, at.theta, at.phi, at.psi)
 
 
 @register_jitable
@@ -95,9 +83,15 @@ def torque(par: Any, e: Any) -> Any:
 
 
 @register_jitable
+def moment(par: Any, e: Any, w: Any) -> Any:
+    """tau - w x I_s w."""
+    return plus(torque(par, e), -par.one, cross(w, momentum(par, e, w)))
+
+
+@register_jitable
 def acceleration(par: Any, e: Any, w: Any) -> Any:
     """Euler's equations: I_s^-1 (tau - w x I_s w)."""
-    return velocity(par, e, plus(torque(par, e), -par.one, cross(w, momentum(par, e, w))))
+    return velocity(par, e, moment(par, e, w))
 
 
 @register_jitable
@@ -147,8 +141,7 @@ def axis(q: Any) -> Any:
 
 
 @register_jitable
-def double(x: Any) -> Any:
-    """A number in double precision."""
+def _double(x: Any) -> Any:
     return np.float64(x)
 
 
@@ -178,12 +171,10 @@ def _after(before: Any, dstate: Any, i: int) -> Any:
 
 
 def _observe_rates_on_axis(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
-    """The momenta after the step."""
     return _momenta(par, _after(before, dstate, 0), _after(before, dstate, 3))
 
 
 def _observe_rates_on_attitude(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
-    """The momenta after the step."""
     return _momenta(par, axis((before[0] + dstate[0], *_after(before, dstate, 1))), _after(before, dstate, 4))
 
 
@@ -208,23 +199,13 @@ class Carried(NamedTuple):
 
 
 VELOCITY = {
-    "axis": Carried(_prepared(_axis_of_start, 6, rates=True), _observe_rates_on_axis, _present_rates_on_axis),
-    "attitude": Carried(
-        _prepared(_quaternion_of_start, 7, rates=True), _observe_rates_on_attitude, _present_rates_on_attitude
-    ),
+    "axis": Carried(_prepared(axis_at, 6, rates=True), _observe_rates_on_axis, _present_rates_on_axis),
+    "attitude": Carried(_prepared(attitude_at, 7, rates=True), _observe_rates_on_attitude, _present_rates_on_attitude),
 }
 ANGULAR_MOMENTUM = {
-    "axis": Carried(_prepared(_axis_of_start, 6, rates=False), observe_axis),
-    "attitude": Carried(_prepared(_quaternion_of_start, 7, rates=False), observe_attitude),
+    "axis": Carried(_prepared(axis_at, 6, rates=False), observe_axis),
+    "attitude": Carried(_prepared(attitude_at, 7, rates=False), observe_attitude),
 }
-
-
-@register_jitable
-def _rounded(number: Any, par: Any) -> Any:
-    """The numbers of the top in the precision of the map."""
-    return EngineTop(
-        number(par.I1), number(par.I3), number(par.mgl), number(par.zero), number(par.half), number(par.one)
-    )
 
 
 def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = nothing) -> Loop:
@@ -249,7 +230,7 @@ def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., 
 
 def attitude_loop(
     step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = nothing,
-    number: Callable[..., Any] = double,
+    number: Callable[..., Any] = _double,
 ) -> Loop:  # fmt: skip
     """The loop on the attitude around a map, in the precision of `number`."""
     register_jitable(step)
@@ -258,14 +239,17 @@ def attitude_loop(
         return reused(par, axis((state[0], state[1], state[2], state[3])), (state[4], state[5], state[6]))
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        top, cut = _rounded(number, par), Substeps(rule.parts, number(rule.share))
+        top = EngineTop(
+            number(par.I1), number(par.I3), number(par.mgl), number(par.zero), number(par.half), number(par.one)
+        )
+        cut = Substeps(rule.parts, number(rule.share))
         q = number(state[0]), number(state[1]), number(state[2]), number(state[3])
         v = number(state[4]), number(state[5]), number(state[6])
         p, v, carry = step(top, cut, axis(q), v, carry, number(h))
         q = normalised(top, product(p, q))
         dstate = (
-            double(q[0]) - state[0], double(q[1]) - state[1], double(q[2]) - state[2], double(q[3]) - state[3],
-            double(v[0]) - state[4], double(v[1]) - state[5], double(v[2]) - state[6],
+            _double(q[0]) - state[0], _double(q[1]) - state[1], _double(q[2]) - state[2], _double(q[3]) - state[3],
+            _double(v[0]) - state[4], _double(v[1]) - state[5], _double(v[2]) - state[6],
         )  # fmt: skip
         total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5] + dstate[6]
         return dstate, carry, 1, finite_outcome(total)

@@ -2,11 +2,10 @@
 
     loop(numbers, tolerance, times, budget, seen, place, states, momenta) -> (seen, steps, effort, outcome)
 
-goes on from `place`, or begins at the start in `numbers` (`symtop.model.top.flat`) if `seen` is negative, and fills
-`states` and `momenta` (p_phi, p_psi) at `times` until the last of them, a failure or `budget` units of effort, which
-may be passed by one step. It returns the samples that it has filled since the start, and the steps and the effort of
-this call. `place` holds all that its next step depends on, the time that was reached among it, so that a run in several
-calls has the bits of one call.
+goes on from `place`, all that its next step depends on, or begins at the start in `numbers` (`symtop.model.top.flat`)
+if `seen` is negative. It fills `states` and `momenta` (p_phi, p_psi) at `times` until the last of them, a failure or
+`budget` units of effort, which one step may pass, and returns the samples filled since the start, and the steps and the
+effort of this call. A run in several calls has the bits of one call.
 """
 
 from collections.abc import Callable

@@ -54,7 +54,6 @@ def chart_outcome(theta: float) -> int:
 
 
 def _in_chart(at: Any) -> Any:
-    """Is theta no pole, where phi and psi have no meaning of their own?"""
     return (at.theta > 0.0) & (at.theta < np.pi)
 
 
@@ -66,15 +65,13 @@ require_chart = Requirement(_in_chart, _outside)
 
 
 def _on_angles(top: Any, at: Any) -> Any:
-    """Kernel parameters and state of a start; p_theta0 = dL/dtheta' is the discrete Legendre transform's start."""
+    """p_theta0 = dL/dtheta' is the discrete Legendre transform's start."""
     momenta = conserved(top, at)
     par = ReducedTop(top.I1, top.I3, top.mgl, momenta.p_psi, momenta.north, momenta.south)
     return par, (at.theta, top.I1 * at.theta_dot, at.phi, at.psi)
 
 
 on_angles = Preparation(_on_angles, 4, require_chart)
-
-
 LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws the line
 
 
@@ -98,7 +95,6 @@ def field_angles(par: Any, y: Any) -> Any:
 
 
 def _with_rates(top: Any, at: Any) -> Any:
-    """Kernel parameters and state of a start."""
     state = (at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot)
     return BareTop(top.I1, top.I3, top.mgl), state
 
@@ -122,7 +118,7 @@ def observe_angles(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> A
 @register_jitable
 def ended_angles(y: Any) -> int:
     """Is the state finite and theta a point of the chart?"""
-    # zero, or NaN where any of them is not finite: one question about theta then answers for all six, without a branch
+    # zero, or NaN where any of them is not finite: theta then answers for all six, without a branch
     nothing = 0.0 * (y[1] + y[2] + y[3] + y[4] + y[5])
     return chart_outcome(y[0] + nothing)
 

@@ -12,16 +12,7 @@ from symtop.methods.framework import loop as loops
 from symtop.methods.framework.loop import Loop, March
 from symtop.methods.framework.many import GROUP, Blocks, Many, Whole, groups, in_turn, members_of, refused
 from symtop.methods.framework.plan import LEFT_CHART, OUTCOMES, Plan, Run
-from symtop.methods.framework.preparation import (
-    Later,
-    Pack,
-    Preparation,
-    Scaled,
-    Shown,
-    as_fields,
-    as_it_is,
-    as_it_steps,
-)
+from symtop.methods.framework.preparation import Later, Preparation, Scaled, Shown, as_fields, as_it_is, as_it_steps
 from symtop.methods.framework.registry import Array, Solver
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop, flat
@@ -31,7 +22,7 @@ Present = Callable[[Any, Array, Array], Array]
 
 
 class _Whole(NamedTuple):
-    """A run in one compiled call, put together once."""
+    """The parts of a run in one compiled call."""
 
     rule: Any  # what compiled code makes the rule from
     size: int  # of a sample
@@ -56,13 +47,10 @@ class _Whole(NamedTuple):
 class FixedStep:
     """A solver around a loop: `prepare` gives a kernel its parameters and state, `rule` the method's numbers.
 
-    A rule whose numbers depend on the run is a function of the top, the start and the step.
-    `evaluations` is how many force evaluations one unit of the kernel's counted work takes; for an implicit method
-    that unit is one iteration (of Newton or of a sweep), and `each_step` evaluations come on top of every step.
-    `present(par, times, states)` makes states of the chart from the kernel's, where they differ.
-
-    Where `prepare` is a `Preparation` and `present`, if there is one, is `Shown`, a run is one compiled call; where
-    they are functions of Python, a run of few steps takes five times as long.
+    A rule whose numbers depend on the run is a function of the top, the start and the step. `evaluations` is how many
+    force evaluations a unit of the kernel's counted work takes (of an implicit method, an iteration), and `each_step`
+    come on top of every step. `present(par, times, states)` makes states of the chart from the kernel's, where they
+    differ. A run is one compiled call where `prepare` is a `Preparation` and `present`, if there is one, is `Shown`.
     """
 
     loop: Loop | Callable[..., March]
@@ -83,12 +71,12 @@ class FixedStep:
         whole, h, marks = self._whole, plan.step_size, plan.marks
         if whole is None or marks.item(-1) > loops.BLOCK:
             return self._in_stretches(top, start, plan)
-        # a field at a time, `counts`, and the class's constructor, which passes its arguments on, take a third more
+        # a run of few steps takes as long as what follows: no fields one at a time, no `counts`, no constructor
         run, rule, check, size, evaluations, each_step, counted = whole.alone
         if check is not None:
             check(start)
         samples, numbers = len(marks), flat(top, start)
-        states, momenta = np.empty((samples, size)), np.empty((2, samples))  # a row costs half of what a column does
+        states, momenta = np.empty((samples, size)), np.empty((2, samples))
         steps, work, outcome = run(numbers, rule, h, marks, states, momenta)
         spent, ended = work * evaluations + steps * each_step, OUTCOMES[outcome]
         seen = states, momenta[0], momenta[1], steps, spent, work * counted, ended, steps * h
@@ -107,9 +95,9 @@ class FixedStep:
     def many(self, numbers: Array, h: Array, marks: Whole) -> Many:
         """The runs of n members: `numbers` (n, 9) as `flat` has them, steps `h` (n,), `marks` (n, samples).
 
-        Each has the bits of a run alone, in lanes too (`blocks`). A member that fails fails alone, and so does one
-        whose start the kernel cannot step. Threads may call it at the same time; after every `GROUP` steps, or a
-        stretch of a longer member, it heeds an interrupt of theirs.
+        Each has the bits of a run alone, in lanes too, and fails alone, as does one whose start the kernel cannot step.
+        Threads may call it at the same time; after every `GROUP` steps, or a stretch of a longer member, it heeds an
+        interrupt of theirs.
         """
         # writable too: a kernel is compiled again for an array that is not, as a broadcast one
         numbers, h = np.require(numbers, requirements=("C", "W")), np.require(h, requirements=("C", "W"))
@@ -157,7 +145,7 @@ class FixedStep:
             return None
         sample, size = (as_it_steps, prepare.size) if present is None else (present.sample, present.size)
         scale = as_it_is
-        pack: Pack = (rule.pack if isinstance(rule, Scaled | Later) else None) or as_fields
+        pack = (rule.pack if isinstance(rule, Scaled | Later) else None) or as_fields
         if isinstance(rule, Scaled):
             scale, rule = rule.scale, rule.rule
         elif isinstance(rule, Later):

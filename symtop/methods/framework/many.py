@@ -1,8 +1,7 @@
 """Many runs of one fixed-step method: what they return, and which of them run side by side in blocks of lanes.
 
 Member i is a top and a start as nine plain numbers (`symtop.model.top.flat`), a step and the marks of its samples. It
-gets the bits of a run alone. Outside of blocks it is one: a call of the compiled run of one (`loop.Loop.whole`), in
-which numba lets go of Python's lock, so that threads run at the same time.
+gets the bits of a run alone, and outside of blocks is one: a call of `loop.Loop.whole`, without Python's lock.
 
 A block takes as long as its longest member and about as long as `LEAST` members alone. Members stand in it in the
 order of their numbers of steps, and a block whose members together make fewer steps than `LEAST` times the longest is
@@ -38,8 +37,7 @@ GROUP = 200_000  # steps between returns to Python, so that an interrupt is hear
 class Many(NamedTuple):
     """What the runs of n members return; the counts are those of `loop.March`.
 
-    A member whose start the kernel cannot step, on a pole in the angles chart, has left the chart before its first
-    step.
+    A member that starts on a pole of the angles chart has left the chart before its first step.
     """
 
     states: Array  # (n, samples, dimension) of the chart, NaN after a failure
@@ -59,11 +57,7 @@ def in_turn(
     run: Callable[..., tuple[int, int, int]], chosen: Whole, numbers: Array, rule: Any, h: Array, marks: Whole,
     done: Many,
 ) -> None:  # fmt: skip
-    """The chosen members one after another, by ``run(numbers, rule, h, marks, states, momenta)``.
-
-    A kernel around the loop over members would save most of what a call takes, and takes as long to compile as a
-    million members.
-    """
+    """The chosen members one after another, by ``run(numbers, rule, h, marks, states, momenta)``."""
     momenta = np.empty((2, marks.shape[1]))
     for i, plain, step in zip(chosen.tolist(), map(tuple, numbers[chosen].tolist()), h[chosen].tolist(), strict=True):
         done.steps[i], done.work[i], done.outcome[i] = run(plain, rule, step, marks[i], done.states[i], momenta)
@@ -106,8 +100,7 @@ class Blocks:
     def run(self, members: Whole, numbers: Array, rule: Any, h: Array, marks: Whole, done: Many, most: int) -> Whole:
         """Run the chosen members as `FixedStep.many` does; return those that have to be run alone.
 
-        `rule` holds the method's numbers before they are scaled. Control returns to Python after about `most` steps of
-        members.
+        `rule` is not scaled. Control returns to Python after about `most` steps of members.
         """
         lanes, steps = self.lanes, marks[:, -1]
         counts_itself = lanes.effort(rule) == 0  # the step iterates

@@ -36,7 +36,7 @@ ANGLE_GRAIN = 1e-12  # radians: a smaller correction that does not halve is roun
 
 
 class Correction(NamedTuple):
-    """What Newton proposes at x, and how it is judged."""
+    """What Newton proposes at x."""
 
     change: Any  # like x
     after: Any  # x + change

@@ -22,8 +22,8 @@ from symtop.methods.framework.plan import NOT_FINITE, OK
 from symtop.methods.framework.preparation import Preparation, Shown
 from symtop.model import charts
 
-axis_parts, quaternion_parts = register_jitable(charts.axis_parts), register_jitable(charts.quaternion_parts)
-momentum_parts = register_jitable(charts.momentum_parts)
+_axis_parts, _quaternion_parts = register_jitable(charts.axis_parts), register_jitable(charts.quaternion_parts)
+_momentum_parts = register_jitable(charts.momentum_parts)
 
 
 class SpaceTop(NamedTuple):
@@ -35,31 +35,41 @@ class SpaceTop(NamedTuple):
 
 
 @register_jitable
+def axis_at(at: Any) -> Any:
+    """e of a start."""
+    return _axis_parts(math, at.theta, at.phi)
+
+
+@register_jitable
+def attitude_at(at: Any) -> Any:
+    """q of a start."""
+    return _quaternion_parts(math, at.theta, at.phi, at.psi)
+
+
+@register_jitable
+def momentum_at(top: Any, at: Any) -> Any:
+    """L of a start."""
+    return _momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
+
+
+@register_jitable
 def _numbers(top: Any, at: Any) -> Any:
-    """Kernel parameters of a start."""
     spin = top.I3 * (at.psi_dot + at.phi_dot * math.cos(at.theta))
     return SpaceTop(top.I1, top.mgl, spin * (1.0 / top.I3 - 1.0 / top.I1))
 
 
 @register_jitable
-def _momentum(top: Any, at: Any) -> Any:
-    return momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
-
-
-@register_jitable
 def _on_axis(top: Any, at: Any) -> Any:
-    """Kernel parameters and state (e, L) of a start."""
-    return _numbers(top, at), (*axis_parts(math, at.theta, at.phi), *_momentum(top, at))
+    return _numbers(top, at), (*axis_at(at), *momentum_at(top, at))
 
 
 def _on_attitude(top: Any, at: Any) -> Any:
-    """Kernel parameters and state (q, L) of a start."""
-    return _numbers(top, at), (*quaternion_parts(math, at.theta, at.phi, at.psi), *_momentum(top, at))
+    return _numbers(top, at), (*attitude_at(at), *momentum_at(top, at))
 
 
 def _on_frame(top: Any, at: Any) -> Any:
-    """Kernel parameters and state (e, L, a) of a start, where a is the body's first axis."""
-    w, x, y, z = quaternion_parts(math, at.theta, at.phi, at.psi)
+    """a is the body's first axis."""
+    w, x, y, z = attitude_at(at)
     par, state = _on_axis(top, at)
     return par, (*state, w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
 

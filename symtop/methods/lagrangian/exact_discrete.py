@@ -71,14 +71,8 @@ from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome
-from symtop.methods.lagrangian.oscillators import (
-    Map,
-    OscillatorTop,
-    attitude_state,
-    axis_state,
-    numbers,
-    on_oscillators,
-)
+from symtop.methods.lagrangian import oscillators
+from symtop.methods.lagrangian.oscillators import Map, OscillatorTop, attitude_state, axis_state, on_oscillators
 from symtop.methods.vectors import accumulate_plainly
 
 SHARE = 0.5  # of what breaks |chi| = 1 that a step takes off: all of it would feed on the rounding that the loop sums
@@ -209,16 +203,11 @@ def _between(state: Any, after: Any, carry: Any) -> Any:
     return total, carry
 
 
-@register_jitable
-def _plus(state: Any, step: Any) -> Any:
-    for i in range(8):
-        state = set_item(state, i, state[i] + step[i])
-    return state
-
-
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     """p_phi and p_psi after the step, from J = r Im(conj(Z) W)."""
-    s = _plus(before, dstate)
+    s = before
+    for i in range(8):
+        s = set_item(s, i, s[i] + dstate[i])
     first, second = rule.r1 * (s[0] * s[5] - s[1] * s[4]), rule.r2 * (s[2] * s[7] - s[3] * s[6])
     return -2.0 * par.I1 * (first - second), -2.0 * par.I1 * (first + second)
 
@@ -261,13 +250,11 @@ def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     return (*attitude_state(par, _unwound(rule, state, k), k * h), 0.0)
 
 
-def first_six(par: Any, t: float, state: Any) -> Any:
-    """(e, L) alone."""
+def _first_six(par: Any, t: float, state: Any) -> Any:
     return state[0], state[1], state[2], state[3], state[4], state[5]
 
 
-def first_seven(par: Any, t: float, state: Any) -> Any:
-    """(q, L) alone."""
+def _first_seven(par: Any, t: float, state: Any) -> Any:
     return state[0], state[1], state[2], state[3], state[4], state[5], state[6]
 
 
@@ -286,15 +273,15 @@ march_axis, march_attitude = (
 
 def built_in() -> list[Integrator]:
     """`exact-discrete`."""
-    axis, attitude = Shown(first_six, 6), Shown(first_seven, 7)
+    charts = {"axis": (march_axis, Shown(_first_six, 6)), "attitude": (march_attitude, Shown(_first_seven, 7))}
     return [
         Integrator(
             name="exact-discrete",
             family="discrete-lagrangian",
             summary="discrete Lagrangian of two oscillators whose step is the motion itself, one force",
             solvers={
-                "axis": FixedStep(march_axis, numbers, on_oscillators, 1, implicit=False, present=axis),
-                "attitude": FixedStep(march_attitude, numbers, on_oscillators, 1, implicit=False, present=attitude),
+                chart: FixedStep(march, oscillators.numbers, on_oscillators, 1, implicit=False, present=shown)
+                for chart, (march, shown) in charts.items()
             },
             explicit=True, symplectic=True, symmetric=True,
             conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}),

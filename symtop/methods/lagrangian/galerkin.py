@@ -36,7 +36,7 @@ from typing import Any, NamedTuple
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
-from symtop.methods.framework.fixed_step import FixedStep, inside
+from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes
 from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
@@ -45,15 +45,13 @@ from symtop.methods.framework.registry import Integrator
 
 
 class Iteration(NamedTuple):
-    """When Newton stops: after a correction below `tolerance` times the step, applied to first order."""
+    """When Newton stops, as `discrete_lagrangian.Quadrature` says."""
 
     tolerance: float = 1e-8
     iterations: int = 50
 
 
 class _Node(NamedTuple):
-    """The trigonometry of one node."""
-
     d: float  # 1 / (4 I1 cos^2 x)
     a: float  # 1 / (4 I1 sin^2 x)
     tangent: float  # tan x
@@ -62,9 +60,7 @@ class _Node(NamedTuple):
 
 
 class _Pull(NamedTuple):
-    """The slope of the effective potential at a node and its derivatives."""
-
-    slope: float  # V'
+    slope: float  # V' at a node
     stiffness: float  # V''
     south: float  # dV'/dsouth
     north: float  # dV'/dnorth
@@ -96,8 +92,6 @@ class _Jet(NamedTuple):
 
 
 class _Trial(NamedTuple):
-    """What a step is made of, at one trial (thetam, theta1)."""
-
     V0: _Jet
     Vm: _Jet
     V1: _Jet
@@ -148,8 +142,6 @@ def _evaluate(par: Any, start: Any, theta_m: float, theta_1: float) -> Any:
 
 
 class _Step(NamedTuple):
-    """The two equations of one step."""
-
     par: Any
     rule: Any
     theta: float
@@ -161,7 +153,6 @@ class _Step(NamedTuple):
 
 @register_jitable
 def _steady(par: Any, h: float) -> Any:
-    """What no step changes."""
     return h, h * h / par.I1
 
 
@@ -222,8 +213,6 @@ def _predict(step: Any, carry: Any) -> Any:
 
 
 class _End(NamedTuple):
-    """What the increment is made of, once the iteration has ended."""
-
     V0: float
     Vm: float
     V1: float
@@ -244,7 +233,6 @@ def _keep(trial: Any, correction: Any) -> Any:
 
 @register_jitable
 def _close(step: Any, end: Any) -> Any:
-    """The increment, the slopes to predict with and the outcome."""
     V0, Vm, V1, plus, minus, d = end
     h = step.h
     dstate = (d, -h * (V0 + 4.0 * Vm + V1) / 6.0, 0.5 * h * (plus + minus), 0.5 * h * (plus - minus))
@@ -310,9 +298,3 @@ def built_in() -> list[Integrator]:
             reference="marsden-west-2001",
         )
     ]  # fmt: skip
-
-
-def is_galerkin(method: Integrator) -> bool:
-    """Is it this integrator, whatever its name?"""
-    solver = inside(method.solvers.get("angles"))
-    return solver is not None and solver.loop is march

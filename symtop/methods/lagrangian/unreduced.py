@@ -52,7 +52,6 @@ class _Sums(NamedTuple):
 
 @register_jitable
 def _node_sums(par: Any, rule: Any, theta: float, rate: Any, h: float) -> Any:
-    """All sums over the nodes for one trial rate."""
     before = after = stiffness = before_v = before_u = after_v = after_u = across = mixed = 0.0
     w, v, u = rate
     spread = par.I1 - par.I3
@@ -95,7 +94,6 @@ def _solve(first: Any, second: Any, third: Any, right: Any) -> Any:
 
 @register_jitable
 def _inertia(par: Any, sums: Any, h: float) -> Any:
-    """The diagonal of the momenta's part of the system."""
     return sums.across, par.I3
 
 
@@ -132,8 +130,6 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 
 class _Step(NamedTuple):
-    """The three equations of one step."""
-
     par: Any
     rule: Any
     state: Any
@@ -190,12 +186,11 @@ def unreduced_step(inertia: Any, momenta: Any, par: Any, rule: Any, state: Any, 
 
 @register_jitable
 def _momenta(par: Any, sums: Any, v: float, u: float, h: float) -> Any:
-    """p_phi1 and p_psi1."""
     return sums.across * v + sums.mixed * u, sums.mixed * v + par.I3 * u
 
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations."""
+    """One step."""
     return unreduced_step(_inertia, _momenta, par, rule, state, carry, h)
 
 
@@ -208,7 +203,6 @@ march = kernel_loop(begin, increment, observe)
 
 
 def _with_momenta(top: Any, at: Any) -> Any:
-    """Kernel parameters and state of a start: the momenta are dL/dq' there."""
     momenta = conserved(top, at)
     return BareTop(top.I1, top.I3, top.mgl), (
         at.theta, at.phi, at.psi, top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi,

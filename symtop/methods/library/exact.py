@@ -3,9 +3,9 @@
 Source: Klein and Sommerfeld, Theory of the Top, chapter 6; see `symtop.model.exact.closed_form`.
 """
 
-from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.plan import Plan, Run
 from symtop.methods.framework.registry import Integrator
-from symtop.model.exact.closed_form import ClosedForm, ClosedForms
+from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.top import Angles, SymmetricTop
 
 
@@ -13,14 +13,6 @@ def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
     """Attitude and angular momentum at the sample times."""
     states, p_phi, p_psi = ClosedForm(top, start).run(plan.times)
     return Run(states, p_phi, p_psi, 0, plan.times.size, 0, "ok", plan.horizon)
-
-
-def solve_many(numbers: Array, times: Array) -> tuple[Array, Array]:
-    """States (n, samples, 7) and momenta (n, samples, 2) of n tops, rows of nine numbers, with the bits of `solve`.
-
-    `times` is one row for all members or a row for each. A member that has no closed form in doubles is NaN.
-    """
-    return ClosedForms(numbers).run(times)
 
 
 def built_in() -> list[Integrator]:

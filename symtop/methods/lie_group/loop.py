@@ -35,21 +35,19 @@ from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it_steps
 from symtop.methods.framework.space import (
     SpaceTop,
+    attitude_at,
     axis_of,
     finite_outcome,
-    momentum_parts,
+    momentum_at,
     observe_attitude,
     on_attitude,
-    quaternion_parts,
     with_spin,
 )
 from symtop.methods.vectors import accumulate, cross, dot, plus, scaled
 
 
 def _on_body(top: Any, at: Any) -> Any:
-    """The numbers of the top and the state (q, L) of a start."""
-    momentum = momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
-    return Body(top.I1, top.I3, top.mgl), (*quaternion_parts(math, at.theta, at.phi, at.psi), *momentum)
+    return Body(top.I1, top.I3, top.mgl), (*attitude_at(at), *momentum_at(top, at))
 
 
 def _axis_shown(par: Any, t: float, y: Any) -> Any:

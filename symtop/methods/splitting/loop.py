@@ -47,7 +47,7 @@ class Composition(NamedTuple):
 
 @functools.cache
 def _opened(n: int) -> Callable[[Any], Composition]:
-    """From the numbers of a composition with n drifts, in a row, to the composition, in compiled code."""
+    """From the numbers in a row to a composition with n drifts, in compiled code."""
     m, end = n + 1, 3 * n + 2
 
     @register_jitable
@@ -121,7 +121,7 @@ def stages(rule: Any, drift: float, kick: float, bend: float, boost: float) -> A
 
 
 def closed(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float]) -> Composition:
-    """A composition whose sums are exactly 1, and what it costs."""
+    """A composition whose sums are exactly 1."""
     forces = sum(b != 0.0 for b in kick) - (kick[0] != 0.0 and kick[-1] != 0.0)
     return Composition(exact_sum(drift), exact_sum(kick), tuple(gradient), forces)
 

@@ -37,7 +37,7 @@ Sources: Touma, Wisdom, Astron. J. 107 (1994) 1189 (splitting); Bobenko, Suris, 
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -133,27 +133,8 @@ def turn_axis(state: Any, step: Any, s: float, m: float) -> Any:
 
 
 @register_jitable
-def drift_axis(rule: Any, state: Any, step: Any, half: float) -> Any:
-    """Free rotation."""
-    s, m = rotor(rule, half_square(state, step, half), half)
-    return turn_axis(state, step, s, m)
-
-
-@register_jitable
-def ended_axis(state: Any, step: Any) -> int:
-    """Is the step finite?"""
+def _ended_axis(state: Any, step: Any) -> int:
     return finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4])
-
-
-def begin_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The axis at the start."""
-    return force_axis(par, state, (0.0, 0.0, 0.0))
-
-
-def increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (e, L); the work counted is the number of kicks with a new axis."""
-    step, axis = compose(force_axis, kick_space, drift_axis, par, rule, state, carry)
-    return step, axis, rule.forces, ended_axis(state, step)
 
 
 @register_jitable
@@ -164,19 +145,14 @@ def process_axis(s: float, x: float, y: float, z: float, Lx: float, Ly: float, L
     return x / D, y / D, (z * c + d) / D, D * Lx - d * Lz * x, D * Ly - d * Lz * y, Lz
 
 
-def enter_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The start in the variables of a processed method."""
-    return state if rule.boost == 0.0 else process_axis(rule.boost, *state)
-
-
-def present_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """Back from the variables of a processed method."""
-    return state if rule.boost == 0.0 else process_axis(-rule.boost, *state)
+@register_jitable
+def _no_spin(par: Any, state: Any, t: float) -> Any:
+    return state
 
 
 @register_jitable
 def force_attitude(par: Any, state: Any, step: Any) -> Any:
-    """The present axis: what a kick needs."""
+    """The present axis."""
     return axis_of(state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3])
 
 
@@ -196,27 +172,8 @@ def turn_attitude(state: Any, step: Any, s: float, m: float) -> Any:
 
 
 @register_jitable
-def drift_attitude(rule: Any, state: Any, step: Any, half: float) -> Any:
-    """Free rotation, without the spin about the body's axis."""
-    s, m = rotor(rule, half_square(state, step, half), half)
-    return turn_attitude(state, step, s, m)
-
-
-@register_jitable
-def ended_attitude(state: Any, step: Any) -> int:
-    """Is the step finite?"""
+def _ended_attitude(state: Any, step: Any) -> int:
     return finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5])
-
-
-def begin_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The axis at the start."""
-    return force_attitude(par, state, (0.0, 0.0, 0.0, 0.0))
-
-
-def increment_attitude(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (q, L); the work counted is the number of kicks with a new axis."""
-    step, axis = compose(force_attitude, kick_space, drift_attitude, par, rule, state, carry)
-    return step, axis, rule.forces, ended_attitude(state, step)
 
 
 @register_jitable
@@ -230,35 +187,50 @@ def process_attitude(s: float, w: float, x: float, y: float, z: float, Lx: float
     return up * w, down * x, down * y, up * z, D * Lx - d * Lz * ex, D * Ly - d * Lz * ey, Lz
 
 
-def enter_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The start in the variables of a processed method."""
-    return state if rule.boost == 0.0 else process_attitude(rule.boost, *state)
+class Kernel(NamedTuple):
+    """What `kernel_loop` takes of a chart, and how a rule runs in lanes."""
+
+    begin: Callable[..., Any]
+    increment: Callable[..., Any]
+    enter: Callable[..., Any]
+    present: Callable[..., Any]
+    lanes: Callable[[Composition], Lanes]
 
 
-def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """The spin since the start, and back from the variables of a processed method."""
-    if rule.boost != 0.0:
-        state = process_attitude(-rule.boost, *state)
-    return with_spin(par, state, k * h)
-
-
-def _in_lanes(force: Any, turned: Any, ended: Any, dimension: int) -> Callable[[Composition], Lanes]:
-    """What runs a rule in lanes: one kernel for each rotation."""
+def _kernel(force: Any, turned: Any, ended: Any, process: Any, spun: Any, dimension: int) -> Kernel:
+    """The functions of a chart; `process` is the flow of G, `spun` adds the spin to a sample."""
+    zeros = (0.0,) * dimension
     exact, cayley = (
         composed(force, kick_space, drift, ended, top=SpaceTop, dimension=dimension, carry=3, still=1)
         for drift in without_branch(turned)
     )
-    return lambda rule: exact if rule.turn == EXACT else cayley
+
+    @register_jitable
+    def drift(rule, state, step, half):  # type: ignore[no-untyped-def]
+        s, m = rotor(rule, half_square(state, step, half), half)
+        return turned(state, step, s, m)
+
+    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
+        return force(par, state, zeros)
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        """The work counted is the number of kicks with a new axis."""
+        step, axis = compose(force, kick_space, drift, par, rule, state, carry)
+        return step, axis, rule.forces, ended(state, step)
+
+    def enter(par, rule, state, h):  # type: ignore[no-untyped-def]
+        return state if rule.boost == 0.0 else process(rule.boost, *state)
+
+    def present(par, rule, state, k, h):  # type: ignore[no-untyped-def]
+        return spun(par, state if rule.boost == 0.0 else process(-rule.boost, *state), k * h)
+
+    return Kernel(begin, increment, enter, present, lambda rule: exact if rule.turn == EXACT else cayley)
 
 
-march_axis = kernel_loop(
-    begin_axis, increment_axis, observe_axis, enter_axis, present_axis,
-    lanes=_in_lanes(force_axis, turn_axis, ended_axis, 6),
-)  # fmt: skip
-march_attitude = kernel_loop(
-    begin_attitude, increment_attitude, observe_attitude, enter_attitude, present_attitude,
-    lanes=_in_lanes(force_attitude, turn_attitude, ended_attitude, 7),
-)  # fmt: skip
+AXIS = _kernel(force_axis, turn_axis, _ended_axis, process_axis, _no_spin, 6)
+ATTITUDE = _kernel(force_attitude, turn_attitude, _ended_attitude, process_attitude, with_spin, 7)
+march_axis = kernel_loop(*AXIS[:2], observe_axis, *AXIS[2:4], lanes=AXIS.lanes)
+march_attitude = kernel_loop(*ATTITUDE[:2], observe_attitude, *ATTITUDE[2:4], lanes=ATTITUDE.lanes)
 
 
 def strang_energy(seen: View, momenta: Momenta, h: float) -> Array:

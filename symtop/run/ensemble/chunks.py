@@ -295,7 +295,7 @@ class Job:
             done, ended = solver.many(self.numbers, self.tolerance, plan.times, plan.counts, self.budget)
             return _Runs(done.states, done.momenta, done.steps, done.work, 0 * done.work, done.outcome, ended)
         if solver is exact.solve:
-            states, momenta = exact.solve_many(self.numbers, np.nan_to_num(plan.times))
+            states, momenta = ClosedForms(self.numbers).run(np.nan_to_num(plan.times))
             none = np.zeros(len(self.numbers), dtype=np.int64)
             return _Runs(states, momenta, none, plan.counts, none, none, self.horizon)
         return self._in_turn(plan)
