@@ -79,7 +79,7 @@ FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
     kahan.march_axis: ("kahan", ""),
     kahan.march_frame: ("kahan", "FRAME"),
     runge_kutta.march: ("lie_group", "RUNGE_KUTTA"),
-    variational.march: ("lie_group", "VARIATIONAL"),
+    **dict.fromkeys(variational.MARCH.values(), ("lie_group", "VARIATIONAL")),
     energy_momentum.march: ("lie_group", "ENERGY_MOMENTUM"),
     generalised_alpha.march: ("lie_group", "ALPHA"),
     collective_gauss.march: ("lie_group", "COLLECTIVE"),
@@ -140,7 +140,8 @@ class Twin:
         self._march.restype = ctypes.c_long
         pointer = ctypes.c_void_p
         self._march.argtypes = [pointer, pointer, pointer, ctypes.c_double, ctypes.c_long, pointer]
-        self._par, self._rule = np.array(numbers(kernel.par)), np.array(numbers(kernel.rule))
+        rule = kernel.rule if kernel.march is not collective_gauss.march else (*kernel.rule[:2], kernel.rule.shares)
+        self._par, self._rule = np.array(numbers(kernel.par)), np.array(numbers(rule))
         start = kernel.state if self._enter is None else self._enter(kernel.par, kernel.rule, kernel.state, kernel.h)
         self._start = np.array(start)
 

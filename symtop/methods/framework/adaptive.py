@@ -16,7 +16,6 @@ import numpy as np
 from symtop.core.parallel import heed
 from symtop.methods.framework.many import Many, Whole, refused
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUT_OF_BUDGET, OUTCOMES, Array, Plan, Run
-from symtop.methods.framework.preparation import Requirement
 from symtop.model.top import Angles, SymmetricTop, flat
 
 Loop = Callable[..., tuple[int, int, int, int]]
@@ -33,7 +32,7 @@ class Adaptive:
     most: float  # units of effort of a run without a budget
     block: int  # units between returns to Python, so that an interrupt is heard within a second
     unit: Callable[[float], int] = lambda _: 1  # force evaluations of a unit of effort, of a tolerance
-    check: Requirement | None = None  # what a start must meet
+    check: Callable[[Angles], None] | None = None  # as `Preparation` has it
 
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         """Start to horizon."""

@@ -18,10 +18,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, Array
-from symtop.methods.framework.preparation import Preparation, Requirement, Shown, conserved
+from symtop.methods.framework.preparation import Preparation, Shown, conserved
 
 
 class ReducedTop(NamedTuple):
@@ -53,15 +54,15 @@ def chart_outcome(theta: float) -> int:
     return NOT_FINITE
 
 
-def _in_chart(at: Any) -> Any:
-    return (at.theta > 0.0) & (at.theta < np.pi)
+def in_chart(theta: Any) -> Any:
+    """Is theta, a number or an array, no pole, where phi and psi have no meaning of their own?"""
+    return (theta > 0.0) & (theta < np.pi)
 
 
-def _outside(at: Any) -> str:
-    return f"theta must lie inside (0, pi) for an integrator in the angles chart, not {at.theta!r}"
-
-
-require_chart = Requirement(_in_chart, _outside)
+def require_chart(at: Any) -> None:
+    """Refuse a start on a pole: raises SymtopError."""
+    if not in_chart(at.theta):
+        raise SymtopError(f"theta must lie inside (0, pi) for an integrator in the angles chart, not {at.theta!r}")
 
 
 def _on_angles(top: Any, at: Any) -> Any:

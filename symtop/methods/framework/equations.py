@@ -35,9 +35,7 @@ class Formulation(NamedTuple):
     ended: Callable[[Any], int]  # outcome of a state: OK, or how the chart was left
     observe: Callable[..., Any]  # (par, rule, before, dstate, h) -> p_phi and p_psi after a step
     prepare: Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]  # parameters and state of a start
-    present: (
-        Callable[[Any, Array, Array], Array] | None
-    )  # (par, times, states) -> states of the user's chart, if others
+    present: Callable[[Any, Array, Array], Array] | None  # (par, times, states) -> states as shown, if others
     momenta: Callable[[Any, Array], tuple[Array, Array]]  # (par, states) -> p_phi and p_psi of samples
 
 

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.core.parallel import heed
+from symtop.methods.framework.angles import in_chart
 from symtop.methods.framework.lanes import Lanes, W
-from symtop.methods.framework.preparation import Requirement, Start
 from symtop.model.top import Angles, SymmetricTop
 
 Array = NDArray[np.float64]
@@ -70,12 +70,9 @@ def members_of(numbers: Array) -> Iterator[tuple[SymmetricTop, Angles]]:
         yield SymmetricTop(*row[:3]), Angles(*row[3:])
 
 
-def refused(check: Requirement | None, numbers: Array) -> NDArray[np.bool_]:
-    """Which members have a start that a kernel with this requirement cannot step."""
-    if check is None:
-        return np.zeros(len(numbers), dtype=bool)
-    holds: NDArray[np.bool_] = check.holds(Start(*numbers[:, 3:].T))
-    return ~holds
+def refused(check: Callable[..., None] | None, numbers: Array) -> NDArray[np.bool_]:
+    """Which members have a start that a kernel with this check, of `Preparation`, cannot step."""
+    return np.zeros(len(numbers), dtype=bool) if check is None else ~np.asarray(in_chart(numbers[:, 3]))
 
 
 def groups(chosen: Whole, steps: Whole, most: int) -> list[Whole]:

@@ -12,12 +12,11 @@ steps of it, above all a NamedTuple that is handed to compiled code.
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.core.errors import SymtopError
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.model import top as model
 from symtop.model.top import Angles, SymmetricTop, flat
@@ -49,25 +48,12 @@ class Start(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Requirement:
-    """What a start must meet so that a kernel can step it: `holds(at)`, of numbers or of arrays; `refusal(at)` if not."""
-
-    holds: Callable[[Any], Any]
-    refusal: Callable[[Any], str]
-
-    def __call__(self, at: Any) -> None:
-        """Raise SymtopError for a start that does not meet it."""
-        if not self.holds(at):
-            raise SymtopError(self.refusal(at))
-
-
-@dataclass(frozen=True)
 class Preparation:
-    """What a kernel steps: `numbers(top, at)` compiles, `check(at)` refuses a start that the kernel cannot step."""
+    """What a kernel steps: `numbers(top, at)` compiles, `check` refuses a start that the kernel cannot step."""
 
     numbers: Callable[..., tuple[Any, Numbers]]
     size: int  # of the state
-    check: Requirement | None = None
+    check: Callable[[Any], None] | None = None  # raises SymtopError
 
     def __post_init__(self) -> None:
         register_jitable(self.numbers)  # at once: what a kernel is made of must not hang on what has run
@@ -146,7 +132,7 @@ class Shown:
 
     def __call__(self, par: Any, times: Array, states: Array) -> Array:
         """States of the chart, shape (samples, size), of states of the kernel."""
-        out, kind = np.empty((len(times), self.size)), type(par)
+        out, kind = np.empty((len(times), self.size)), cast("Any", type(par))
         shown = _on_samples(self.sample, kind)
         shown(tuple(par), np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states), out)
         return out

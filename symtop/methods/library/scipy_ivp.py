@@ -1,6 +1,6 @@
 """SciPy's solvers on the top's equations in any chart, as a user of SciPy would call them.
 
-Nothing is reduced (see `formulations`), so that every conserved quantity is free to drift; the tolerance is used for
+Nothing is reduced (see `equations`), so that every conserved quantity is free to drift; the tolerance is used for
 both rtol and atol; no Jacobian is given. None of the four is symplectic or symmetric, and nothing is conserved but
 p_phi in the space frame, where it is a component of the state.
 
@@ -13,8 +13,8 @@ Radau and LSODA are made for stiff equations, which the top's are not: they are 
 call of the right-hand side is counted, also those of difference quotients for a Jacobian, which SciPy's own `nfev` of
 Radau leaves out.
 
-The language of the right-hand side is a factor of its own. In the registry it is plain Python on floats, three times
-faster than the same on NumPy scalars; `scipy_method(name, compiled=True)` is the same solver around a right-hand side
+The language of the right-hand side is a factor of its own. In the registry it is plain Python on floats, faster than
+the same on NumPy scalars; `scipy_method(name, compiled=True)` is the same solver around a right-hand side
 that numba has compiled, from the same source. The loop around it is SciPy's and is Python in both (LSODA's is Fortran).
 """
 
@@ -71,15 +71,13 @@ class CompiledRightHandSide(RightHandSide):
 @functools.cache
 def compiled_field(chart: str) -> Any:
     """f(a, b, c, y) -> y' of a chart, compiled; a, b, c are the three parameters of its equations."""
-    field, parameters = FORMULATIONS[chart].field, PARAMETERS[chart]
+    field = FORMULATIONS[chart].field
+    parameters: type = BareTop if chart == "angles" else SpaceTop
 
     def compiled(a, b, c, y):  # type: ignore[no-untyped-def]
         return np.array(field(parameters(a, b, c), y))
 
     return compile_kernel(compiled)
-
-
-PARAMETERS: dict[str, type] = {"angles": BareTop, "axis": SpaceTop, "attitude": SpaceTop}
 
 
 def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solver:
@@ -138,8 +136,7 @@ def integrated(rates: Callable[..., Any], start: Sequence[float], times: Array, 
     done = solve_ivp(rates, span, start, method=method, rtol=tolerance, atol=tolerance, t_eval=times)
     if not done.success:
         raise SymtopError(f"{method} cannot integrate to t = {times[-1]:g}: {done.message}")
-    states: Array = done.y
-    return states
+    return done.y  # type: ignore[no-any-return]
 
 
 _METHODS = {  # summary, order, reference, explicit

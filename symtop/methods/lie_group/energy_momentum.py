@@ -25,9 +25,17 @@ Sources: Simo, Wong, Int. J. Numer. Methods Eng. 31 (1991) 19; Gonzalez, J. Nonl
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, inertia, iterated, lie_loop
+from symtop.methods.lie_group.loop import (
+    SPUN,
+    cayley,
+    gravity,
+    in_both_charts,
+    inertia,
+    iterated,
+    iterated_alone,
+    lie_loop,
+)
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
 MOST = 30  # iterations of a step; 3 or 4 are the rule
@@ -81,25 +89,6 @@ def _corrected(par: Any, e: Any, a: Any, quarter: float, u: Any) -> Any:
     return u, size <= ENOUGH * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2]))
 
 
-@register_jitable
-def _rotated(par: Any, e: Any, h: float, u: Any) -> Any:
-    """The rotation of u, and the change of L."""
-    m, v = cayley(u)
-    return m, v, scaled(h, gravity(par, _mean(e, u)))
-
-
-def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
-    """One step; the work counted is the number of Newton iterations."""
-    quarter, a = 0.25 * h * h, scaled(0.5 * h, L)
-    u = _guess(par, e, a, quarter)
-    for k in range(MOST):
-        u, ended = _corrected(par, e, a, quarter, u)
-        if ended:
-            m, v, dL = _rotated(par, e, h, u)
-            return m, v, dL, k + 1, OK
-    return 0.0, u, u, MOST, NOT_CONVERGED
-
-
 def _start(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
     a = scaled(0.5 * h, L)
     return (*e, *a), _guess(par, e, a, 0.25 * h * h)
@@ -110,11 +99,14 @@ def _again(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> An
 
 
 def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
-    return (*_rotated(par, opened[:3], h, u), carry)
+    """The rotation of u, and the change of L."""
+    m, v = cayley(u)
+    return m, v, scaled(h, gravity(par, _mean(opened[:3], u))), carry
 
 
-_LANES = iterated(_start, _again, _close, MOST, opened=6, unknowns=3)
-march = lie_loop(turn, lanes=lambda _: _LANES)
+PARTS = _start, _again, _close, MOST
+_LANES = iterated(*PARTS, opened=6, unknowns=3)
+march = lie_loop(iterated_alone(*PARTS), lanes=lambda _: _LANES)
 
 
 def built_in() -> list[Integrator]:

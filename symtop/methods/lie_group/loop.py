@@ -31,7 +31,7 @@ from symtop.core.simd import wide_vectors
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
 from symtop.methods.framework.loop import Loop, kernel_loop, no_carry
-from symtop.methods.framework.plan import OK
+from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it_steps
 from symtop.methods.framework.space import (
     SpaceTop,
@@ -51,12 +51,10 @@ def _on_body(top: Any, at: Any) -> Any:
 
 
 def _axis_shown(par: Any, t: float, y: Any) -> Any:
-    """(e, L) of (q, L)."""
     return (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6])
 
 
 def _spin_shown(par: Any, t: float, y: Any) -> Any:
-    """(q, L) with the spin of the time t."""
     return with_spin(par, y, t)
 
 
@@ -201,11 +199,6 @@ def give_up(block: Any, j: int, when: bool) -> None:
     block[FLAG * W + j] = 1.0 if when else block[FLAG * W + j]
 
 
-def _read(numbers: Any) -> Any:
-    """What `observe` and `present` see of the rule, who ask for nothing."""
-    return 0.0
-
-
 def stepped(
     part: Callable[..., None], lay: Callable[..., None], fields: int, each: int, *,
     carried: Carried, carry: int = 1, begin: Callable[..., Any] = no_carry, room: int = 0,
@@ -235,18 +228,36 @@ def stepped(
         return fields + each * len(rule.shares)
 
     show = shown_in(carried)
-    return Lanes(step, lay, _read, size, carried.top, SIZE, carry, effort, lambda _: room, begin, show)
+    return Lanes(step, lay, lambda _: 0.0, size, carried.top, SIZE, carry, effort, lambda _: room, begin, show)
 
 
 @register_jitable
-def no_numbers(rule: Any) -> Any:
-    """Of a rule that is nothing but shares."""
+def _no_numbers(rule: Any) -> Any:
     return (0.0,)
+
+
+def iterated_alone(
+    start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int
+) -> Callable[..., Any]:
+    """The map of `lie_loop` made of the parts that `iterated` takes; the work counted is the number of passes."""
+    for function in (start, again, close):
+        register_jitable(function)
+
+    def turn(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
+        opened, x = start(par, rule, e, L, carry, h)
+        work, ended, lost = 0, False, False
+        while not (ended or lost) and work < most:
+            x, ended, lost = again(par, rule, carry, h, opened, x)
+            work += 1
+        m, v, dL, carry = close(par, rule, carry, h, opened, x)
+        return m, v, dL, work, OK if ended and not lost else NOT_CONVERGED
+
+    return turn
 
 
 def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
-    opened: int, unknowns: int, numbers: Callable[..., Any] = no_numbers, count: int = 1,
+    opened: int, unknowns: int, numbers: Callable[..., Any] = _no_numbers, count: int = 1,
     begin: Callable[..., Any] = no_carry, carry: int = 1,
 ) -> Lanes:  # fmt: skip
     """An iterated map of a body in lanes, from the parts of which its `turn` is made.

@@ -106,8 +106,7 @@ TOP: Any = UNSPUN.top
 NUMBERS = (0.0,) * len(TOP._fields)
 
 
-def lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
-    """The weights times the step, share by share."""
+def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
     i = 0
     for share in rule.shares:
         for weight in rule.weights:
@@ -186,12 +185,7 @@ def _of_shape(counts: tuple[int, ...], bent: bool) -> Lanes:
             give_up(block, j, max(far, too_far) != 0.0)
 
     each = sum(counts) * stages
-    return stepped(part, lay, 0, each, carried=UNSPUN, effort=lambda rule: len(rule.counts) * len(rule.shares))
-
-
-def in_lanes(rule: Any) -> Lanes:
-    """The lanes of a table."""
-    return _of_shape(tuple(int(count) for count in rule.counts), rule.bent != 0.0)
+    return stepped(part, _lay, 0, each, carried=UNSPUN, effort=lambda rule: len(rule.counts) * len(rule.shares))
 
 
 class LieTable(NamedTuple):
@@ -205,7 +199,6 @@ class LieTable(NamedTuple):
 
 @register_jitable
 def _store(slopes: Any, i: int, w: Any, f: Any) -> None:
-    """Write an element of the algebra into row i."""
     for k in range(3):
         slopes[i, k], slopes[i, 3 + k] = w[k], f[k]
 
@@ -222,8 +215,7 @@ def turn(par: Any, rule: Any, e: Any, L: Any, slopes: Any, h: float) -> Any:
     _store(slopes, 0, scaled(1.0 / par.I1, L), f0)
     made = 0.0, NOUGHT, e, NOUGHT
     for i in range(1, stages + 1):
-        made = 0.0, NOUGHT, e, NOUGHT
-        w, f = NOUGHT, NOUGHT
+        made, w, f = (0.0, NOUGHT, e, NOUGHT), NOUGHT, NOUGHT
         for _ in range(int(rule.counts[i - 1])):
             w, f = NOUGHT, NOUGHT
             for j in range(i):
@@ -240,7 +232,7 @@ def turn(par: Any, rule: Any, e: Any, L: Any, slopes: Any, h: float) -> Any:
     return made[0], made[1], made[3], stages, OK
 
 
-march = lie_loop(turn, begin, in_lanes)
+march = lie_loop(turn, begin, lambda rule: _of_shape(tuple(map(int, rule.counts)), rule.bent != 0.0))
 
 
 def lie_runge_kutta(

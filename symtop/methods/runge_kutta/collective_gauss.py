@@ -23,29 +23,20 @@ Nonlinearity 27 (2014) 1525 (collective integrators).
 """
 
 import functools
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Later
-from symtop.methods.framework.registry import Array, Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import UNSPUN, in_both_charts, lie_loop
-from symtop.methods.runge_kutta.gauss import ROUND_OFF, SWEEPS, gauss_rule, stage_weights
+from symtop.methods.runge_kutta.gauss import ROUND_OFF, SWEEPS, gauss_rule, packed, stage_weights
 from symtop.methods.vectors import product
 
 STAGES = (1, 2, 3)
 ORIGIN = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-
-
-class Collective(NamedTuple):
-    """The table of a Gauss method, and the parts that a step is composed of."""
-
-    mu: Array  # (s, s), mu + mu^T = 1 exactly
-    b: Array  # (s,)
-    shares: tuple[float, ...] = (1.0,)
 
 
 @register_jitable
@@ -126,25 +117,9 @@ def turn(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
 march = lie_loop(turn, begin)
 
 
-def _table(stages: int) -> Collective:
-    rule = gauss_rule(stages)
-    return Collective(rule.mu, rule.b)
-
-
-@register_jitable
-def _opened(rows: Any) -> Collective:
-    s = rows.shape[1]
-    return Collective(rows[:s], rows[s], (1.0,))
-
-
-def _packed(rule: Collective) -> tuple[Callable[[Any], Collective], Array]:
-    """How a rule travels into compiled code, as `gauss.packed`."""
-    return _opened, np.vstack([rule.mu, rule.b])
-
-
 def collective_gauss(stages: int) -> Integrator:
     """The collective Gauss method with so many stages, named after its order."""
-    rule = Later(functools.partial(_table, stages), _packed)
+    rule = Later(functools.partial(gauss_rule, stages), packed)
     return Integrator(
         name=f"collective-gauss-{2 * stages}",
         family="lie-group",

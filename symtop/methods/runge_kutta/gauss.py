@@ -368,16 +368,17 @@ class GaussRule(NamedTuple):
     mu: Array  # (s, s), mu + mu^T = 1 exactly
     b: Array  # (s,)
     predict: Array  # (s, s): the last step's L_j, continued to the next step's L_i
+    shares: tuple[float, ...] = (1.0,)  # the parts of a step of `collective_gauss`, as `lie_group.loop` asks for them
 
 
 @register_jitable
 def _opened(rows: Any) -> GaussRule:
     s = rows.shape[1]
-    return GaussRule(rows[:s], rows[s], rows[s + 1 :])
+    return GaussRule(rows[:s], rows[s], rows[s + 1 :], (1.0,))
 
 
 def packed(rule: GaussRule) -> tuple[Callable[[Any], GaussRule], Array]:
-    """How a rule travels into compiled code: as one array, which a call looks at in a third of the time of three."""
+    """How a rule travels into compiled code: as one array, which a call takes sooner than three."""
     return _opened, np.vstack([rule.mu, rule.b, rule.predict])
 
 

@@ -70,7 +70,7 @@ Read = Callable[[SymmetricTop, Array, Array], tuple[Array, Array, Array]]  # (to
 
 
 class Arithmetic(NamedTuple):
-    """A floating-point type that heyoka offers."""
+    """A floating-point type of heyoka."""
 
     kind: Any  # converts a decimal string
     epsilon: float
@@ -187,8 +187,7 @@ def solver(chart: str, precision: str, read: Read | None = None) -> Solver:
 def _padded(values: Any, size: int) -> Array:
     """Values as doubles, and NaN for the times that were not reached."""
     if len(values) == size and values.dtype == np.float64:
-        whole: Array = values  # of a run's own: no copy
-        return whole
+        return values  # type: ignore[no-any-return]  # of a run's own: no copy
     padded = np.full((size, *values.shape[1:]), np.nan)
     padded[: len(values)] = values
     return padded
@@ -211,9 +210,20 @@ def built_in() -> list[Integrator]:
     wide = ["longdouble"] if np.finfo(np.longdouble).eps < EPSILON else []
     quad = ["quad"] if hasattr(hy, "real128") else []
     return [
-        _entry(precision, {chart: solver(chart, precision) for chart in ("axis", "attitude")})
+        Integrator(
+            name="taylor" if precision == "double" else f"taylor-{precision}",
+            family="taylor",
+            summary=_SUMMARIES[precision],
+            solvers={chart: solver(chart, precision) for chart in ("axis", "attitude")},
+            control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
+            least_tolerance=arithmetic(precision).epsilon / 1000.0,
+            default_tolerance=arithmetic(precision).epsilon / 100.0,
+            reference="biscani-izzo-2021",
+            precision=precision,
+            speed=0.002 if precision == "quad" else 1.0,
+        )
         for precision in ("double", *wide, *quad)
-    ]
+    ]  # fmt: skip
 
 
 def missing() -> dict[str, str]:
@@ -221,21 +231,4 @@ def missing() -> dict[str, str]:
     if importlib.util.find_spec("heyoka") is not None:
         return {}
     reason = "needs the package heyoka, which has wheels for Linux only (elsewhere: conda-forge)"
-    names = ["taylor", *(f"taylor-{precision}" for precision in _SUMMARIES if precision != "double")]
-    return {name: f"{name} {reason}" for name in names}
-
-
-def _entry(precision: str, solvers: dict[str, Solver]) -> Integrator:
-    epsilon = arithmetic(precision).epsilon
-    return Integrator(
-        name="taylor" if precision == "double" else f"taylor-{precision}",
-        family="taylor",
-        summary=_SUMMARIES[precision],
-        solvers=solvers,
-        control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
-        least_tolerance=epsilon / 1000.0,
-        default_tolerance=epsilon / 100.0,
-        reference="biscani-izzo-2021",
-        precision=precision,
-        speed=0.002 if precision == "quad" else 1.0,
-    )  # fmt: skip
+    return {name: f"{name} {reason}" for name in ("taylor", "taylor-longdouble", "taylor-quad")}

@@ -184,8 +184,7 @@ def axis_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..., A
 
         return types.UniTuple(types.float64, 7)(state, a, m), emit
 
-    compiled: Callable[..., Any] = intrinsic(series)
-    return compiled
+    return intrinsic(series)  # type: ignore[no-any-return]
 
 
 def _first_halves(v: Vectors, q: Any, w: Any, a: Any, P: Any) -> tuple[Any, Any]:
@@ -251,8 +250,7 @@ def attitude_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..
 
         return types.UniTuple(types.float64, 8)(state, a, m), emit
 
-    compiled: Callable[..., Any] = intrinsic(series)
-    return compiled
+    return intrinsic(series)  # type: ignore[no-any-return]
 
 
 def present(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
@@ -312,16 +310,6 @@ SERIES = 200_000_000  # of one run: about half a minute
 ACCEPTED, SAFETY, GROW, EARLIER = 4.0, 0.95, 4.0, 0.25
 
 
-class Chart(NamedTuple):
-    """What a chart's series and samples are."""
-
-    numbers: Callable[..., Any]
-    series: Callable[[int], Callable[..., Any]]
-    sample: Callable[..., Any]  # (par, state, t)
-    axis: Callable[..., Any]  # of the first components of a state
-    size: int
-
-
 @register_jitable
 def _as_summed(par: Any, state: Any, t: float) -> Any:
     return state
@@ -337,9 +325,9 @@ def _of_quaternion(state: Any) -> Any:
     return axis_of(state[0], state[1], state[2], state[3])
 
 
-CHARTS = {
-    "axis": Chart(on_axis.numbers, axis_sum, _as_summed, _first_three, 6),
-    "attitude": Chart(on_attitude.numbers, attitude_sum, with_spin, _of_quaternion, 7),
+CHARTS: dict[str, tuple[Any, ...]] = {  # preparation, series, sample(par, state, t), axis of a state
+    "axis": (on_axis, axis_sum, _as_summed, _first_three),
+    "attitude": (on_attitude, attitude_sum, with_spin, _of_quaternion),
 }
 
 
@@ -350,14 +338,14 @@ def order_for(tolerance: float) -> int:
 
 @functools.cache
 def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int, int]]:  # noqa: C901
-    """The loop of one order in one chart, compiled when it is first used.
+    """The loop of one order in one chart as `adaptive` takes it, compiled; it counts the series of its steps.
 
-    It is a loop as `adaptive` takes it, from the place (state, its low half, time, its low half, step), and counts
-    the series of its steps.
+    The place is (state, its low half, time, its low half, step).
     """
-    prepare, series_of, sample, axis, size = CHARTS[chart]
-    series = series_of(order)
+    preparation, series_of, sample, axis = CHARTS[chart]
+    prepare, size, series = preparation.numbers, preparation.size, series_of(order)
 
+    @register_jitable
     def terms(state, body, h):  # type: ignore[no-untyped-def]
         out = series(state, h / body.I1, h * body.mgl)
         dstate = state
@@ -365,8 +353,6 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
             dstate = set_item(dstate, i, out[i])
         last = max(math.sqrt(out[size - 1]), EARLIER * math.sqrt(out[size]))
         return set_item(dstate, size - 1, 0.0), last
-
-    register_jitable(terms)
 
     def run(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]  # noqa: C901
         body = Body(*numbers[:3])
@@ -417,18 +403,16 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
         place[2 * size], place[2 * size + 1], place[2 * size + 2] = t, rest, h
         return seen, steps, effort, outcome
 
-    compiled: Callable[..., tuple[int, int, int, int]] = compile_kernel(run)
-    return compiled
+    return compile_kernel(run)  # type: ignore[no-any-return]
 
 
 def solver(chart: str) -> Adaptive:
     """A solver of the registry in one chart."""
-    size = CHARTS[chart].size
-
-    def loop(tolerance: float) -> Callable[..., tuple[int, int, int, int]]:
-        return march_adaptive(chart, order_for(tolerance))
-
-    return Adaptive(loop, size, 2 * size + 3, 2 * size, SERIES, BLOCK, order_for)
+    size = CHARTS[chart][0].size
+    return Adaptive(
+        lambda tolerance: march_adaptive(chart, order_for(tolerance)),
+        size, 2 * size + 3, 2 * size, SERIES, BLOCK, order_for,
+    )  # fmt: skip
 
 
 DEFAULT_ORDER = 16
