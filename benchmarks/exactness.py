@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 
 import symtop
-from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop, inside, kernel_loop
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian import exact_discrete
 from symtop.methods.lagrangian.oscillators import numbers as exact_map

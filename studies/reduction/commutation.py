@@ -22,7 +22,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian import galerkin

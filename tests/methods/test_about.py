@@ -6,7 +6,7 @@ import pytest
 from scipy import integrate
 
 import symtop
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import bibliography, paragraphs
 
 NAMES = tuple(symtop.integrators())

@@ -9,7 +9,7 @@ import pytest
 import symtop
 from benchmarks import exactness
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian.oscillators import Map, momentum, numbers as exact_map, on_oscillators
 from symtop.model import charts

@@ -10,7 +10,7 @@ from symtop_studies.stability.linear_limits import linear_limits
 import symtop
 from symtop.measure.conservation import growth, residuals, trend
 from symtop.measure.step_map import one_step as map_of, symplectic_defect
-from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.registry import integrator
 from symtop.methods.framework.space import SpaceTop, field_axis, frame_to_attitude, on_axis, on_frame
 from symtop.methods.runge_kutta.gauss import STAGES, gauss_rule, march_axis, march_frame

@@ -10,8 +10,7 @@ from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
 from symtop.methods.framework.angles import on_angles
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, forces, march, node_sums, opening
 from tests.conftest import random_scenes

@@ -7,10 +7,9 @@ import pytest
 
 import symtop
 from symtop.measure.timing import timings
-from symtop.methods.framework import lanes, loop as loops, many
-from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.lanes import W
-from symtop.methods.framework.many import ALIKE, LEAST, Many, divided, in_turn, members_of, turns
+from symtop.methods.framework import lanes, loop as loops
+from symtop.methods.framework.lanes import ALIKE, LEAST, Many, W, divided, in_turn, members_of, turns
+from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
 from symtop.methods.framework.space import on_axis
@@ -170,7 +169,7 @@ def test_runs_of_a_few_steps_at_a_time_are_the_same(monkeypatch):
     solver = SOLVERS["takahashi-imada[attitude]"]
     whole = solver.many(*given)
     monkeypatch.setattr(loops, "BLOCK", 250)  # back to Python eight steps of a block at a time
-    monkeypatch.setattr(many, "BATCH", 2 * W)
+    monkeypatch.setattr(lanes, "BATCH", 2 * W)
     for one, other in zip(whole, solver.many(*given), strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -184,7 +183,7 @@ def test_a_long_run_in_which_lanes_are_given_up_between_samples():
 
 @pytest.mark.parametrize("count", [1, 8, 31, 32, 1000, 100_003])
 def test_what_lanes_step_begins_with_a_line_of_the_cache(count):
-    room = many.aligned(count)
+    room = lanes.aligned(count)
     assert room.shape == (count,)
     assert room.ctypes.data % 64 == 0
     assert room.flags.c_contiguous

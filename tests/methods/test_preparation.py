@@ -10,10 +10,10 @@ import pytest
 
 import symtop
 from symtop.core.jit import compile_kernel
-from symtop.methods.framework import fixed_step, loop as loops
+from symtop.methods.framework import loop, loop as loops
 from symtop.methods.framework.angles import on_angles, require_chart, with_rates
-from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.many import refused
+from symtop.methods.framework.lanes import refused
+from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.space import on_attitude, on_axis, on_frame
@@ -133,7 +133,7 @@ def test_long_runs_return_to_python(monkeypatch):
     plan = Plan.steps(0.01, [0, 50, 100])
     whole = solver(scene.top, scene.start, plan)
     monkeypatch.setattr(loops, "BLOCK", 7)
-    monkeypatch.setattr(fixed_step, "flat", None)  # what a run in one call begins with
+    monkeypatch.setattr(loop, "flat", None)  # what a run in one call begins with
     np.testing.assert_array_equal(solver(scene.top, scene.start, plan).states, whole.states)
 
 

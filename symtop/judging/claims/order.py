@@ -34,7 +34,7 @@ from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order_verdict
 from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
-from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import Array, sentence
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.framework.registry import Integrator

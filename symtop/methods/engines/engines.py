@@ -72,8 +72,7 @@ from symtop.methods.engines.loop import (
     turned,
     velocity,
 )
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import Loop, kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.registry import ENGINE, Integrator
 from symtop.methods.framework.space import finite_outcome, observe_attitude
 from symtop.methods.vectors import cross, dot, plus, product, scaled

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symtop.core.parallel import heed
-from symtop.methods.framework.many import Many, Whole, refused
+from symtop.methods.framework.lanes import Many, Whole, refused
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUT_OF_BUDGET, OUTCOMES, Array, Plan, Run
 from symtop.model.top import Angles, SymmetricTop, flat
 

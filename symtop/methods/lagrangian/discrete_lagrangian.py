@@ -37,9 +37,8 @@ from symtop.core.errors import SymtopError, row
 from symtop.core.jit import fused, register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
-from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, inside, kernel_loop
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.registry import Array, Integrator

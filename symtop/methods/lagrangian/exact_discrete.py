@@ -65,9 +65,8 @@ import numpy as np
 
 from symtop.core.jit import fused, register_jitable, set_item
 from symtop.core.jit_functions import two_product
-from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import one_loop
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome

@@ -27,8 +27,7 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import BareTop, chart_outcome, require_chart
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.framework.newton import Correction, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.preparation import Preparation, Shown, conserved

@@ -28,9 +28,8 @@ from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.core.simd import wide_vectors
-from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
-from symtop.methods.framework.loop import Loop, kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it_steps
 from symtop.methods.framework.space import (

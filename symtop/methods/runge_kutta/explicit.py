@@ -31,9 +31,8 @@ from symtop.core.jit import register_jitable, set_item
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.angles import BareTop
 from symtop.methods.framework.equations import FORMULATIONS, Formulation
-from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, W, column, put
-from symtop.methods.framework.loop import Loop, kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop

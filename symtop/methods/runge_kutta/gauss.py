@@ -54,9 +54,8 @@ import numpy as np
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.multiprecision import context
 from symtop.core.simd import wide_vectors
-from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
-from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Array, Integrator

@@ -24,8 +24,7 @@ from typing import Any
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, kernel_loop, no_carry
 from symtop.methods.framework.plan import OUTCOMES, Run
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator

@@ -17,8 +17,7 @@ from collections.abc import Callable, Sequence
 
 from symtop.core.errors import SymtopError, finite, one_of, row
 from symtop.methods.framework.angles import on_angles
-from symtop.methods.framework.fixed_step import FixedStep, Prepare
-from symtop.methods.framework.loop import Loop
+from symtop.methods.framework.loop import FixedStep, Loop, Prepare
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.framework.registry import Integrator, ModifiedEnergy
 from symtop.methods.framework.space import on_attitude, on_axis

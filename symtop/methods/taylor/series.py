@@ -63,9 +63,8 @@ from symtop.core.jit import compile_kernel, register_jitable, set_item
 from symtop.core.numbers import EPSILON
 from symtop.core.simd import Components, Vectors
 from symtop.methods.framework.adaptive import Adaptive
-from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, one_loop
-from symtop.methods.framework.loop import Loop, kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import Body, Scaled, Start
 from symtop.methods.framework.registry import Integrator

@@ -27,9 +27,8 @@ from symtop.core.parallel import heed
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.lanes import W, column, put
-from symtop.methods.framework.many import Many, members_of
+from symtop.methods.framework.lanes import Many, W, column, members_of, put
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUTCOMES, Plan
 from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator

@@ -3,8 +3,7 @@
 import dataclasses
 
 import symtop
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.framework.space import observe_axis, on_axis
 from symtop.methods.splitting import space as family
 from symtop.methods.splitting.coefficients import STRANG
