@@ -125,8 +125,7 @@ def _rescaled_then_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
 
 @register_jitable
 def _torque_then_rescaled(par: Any, e: Any, w: Any, h: Any) -> Any:
-    """The gyroscopic term is added as a change of w: in single precision what replaces w by I_s^-1 (I_s w) rounds it
-    the same way in every step."""
+    """|L| kept by a change of w: in single precision I_s^-1 (I_s w) would round w the same way in every step."""
     w = _pulled(par, e, w, h)
     L = momentum(par, e, w)
     N = plus(L, -h, cross(w, L))
@@ -256,10 +255,7 @@ def explicit_euler(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> A
 
 
 def adams_bashforth(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
-    """Body rates by two steps of Adams and Bashforth, the attitude by a series of Magnus to third order.
-
-    `carry` is the acceleration of the body rates at the start of the step before, turned with the body.
-    """
+    """Rates by Adams and Bashforth, the attitude by Magnus; `carry` is the last acceleration, turned with the body."""
     now = acceleration(par, e, w)
     p = exponential(par, plus(plus(w, 0.5 * h, now), h * h / 12.0, cross(now, w)), h)
     w = plus(plus(w, 1.5 * h, now), -0.5 * h, carry)

@@ -49,8 +49,8 @@ class Adaptive:
     ) -> tuple[Many, Array]:
         """The runs of n members one after another, and the times that they reached, (n,).
 
-        `numbers` (n, 9), `tolerance` (n,), `times` (n, samples), of which the first `counts` (n,) of a member are
-        asked for. Each has the bits of a run alone, and a member that fails fails alone. Work is in force evaluations.
+        `numbers` (n, 9), `tolerance` (n,), `times` (n, samples), of which the first `counts` (n,) are asked for. Each
+        member has the bits of a run alone and fails alone. Work is in force evaluations.
         """
         done, reached = Many.begun(len(numbers), times.shape[1], self.size), np.zeros(len(numbers))
         out, times = refused(self.check, numbers), np.ascontiguousarray(times)

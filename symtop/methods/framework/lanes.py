@@ -177,10 +177,10 @@ def showing(sample: Callable[..., Any]) -> Callable[..., None]:
 
 
 def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # noqa: C901  (one loop, read in one piece)
-    """The compiled run of the members that `prepare` prepared, block after block; `write` is as `Lanes.show`.
+    """The compiled run of what `prepare` prepared, block after block; `write` is as `Lanes.show`.
 
     ``march(at, most, ...)`` begins with block `at[0]`, after step `at[1]` of it (-1: before it is filled), and returns
-    when all blocks are done or about `most` steps of members were made; called again it goes on from there.
+    when all blocks are done or about `most` steps of members were made.
     """
     step, read, kind = lanes.step, lanes.read, lanes.top
     size, flag = lanes.dimension, lanes.flag
@@ -276,10 +276,7 @@ def one_loop(
     advance: Callable[..., Any], rule: Any, *, top: Any, dimension: int, carry: int,
     add: Callable[..., Any] = accumulate,
 ) -> Lanes:  # fmt: skip
-    """``advance(par, rule, state, carry)`` is the increment, the next carry and an outcome; `rule` its NamedTuple.
-
-    `add` is how increments are summed, as in `loop.kernel_loop`.
-    """
+    """``advance(par, rule, state, carry)`` is the increment, the next carry and an outcome; `add` sums."""
     tops, fields = len(top._fields), len(rule._fields)
     zeros, given = (0.0,) * dimension, (0.0,) * fields
     step_at, flag, carry_at = 2 * dimension, 3 * dimension, 3 * dimension + 2
@@ -316,10 +313,7 @@ GROUP = 200_000  # steps between returns to Python, so that an interrupt is hear
 
 
 class Many(NamedTuple):
-    """What the runs of n members return; the counts are those of `loop.March`.
-
-    A member that starts on a pole of the angles chart has left the chart before its first step.
-    """
+    """What the runs of n members return; one that starts on a pole of the angles chart makes no step."""
 
     states: Array  # (n, samples, dimension) of the chart, NaN after a failure
     momenta: Array  # (n, samples, 2): p_phi and p_psi recomputed from the increments
@@ -376,10 +370,7 @@ class Blocks:
     march: Any
 
     def run(self, members: Whole, numbers: Array, rule: Any, h: Array, marks: Whole, done: Many, most: int) -> Whole:
-        """Run the chosen members as `FixedStep.many` does; return those that have to be run alone.
-
-        `rule` is not scaled. Control returns to Python after about `most` steps of members.
-        """
+        """Run the chosen members, about `most` steps between returns to Python; return those to be run alone."""
         lanes, steps = self.lanes, marks[:, -1]
         counts_itself = lanes.effort(rule) == 0  # the step iterates
         chosen, left = divided(members, steps, turns(numbers, h) if counts_itself else None)
@@ -403,11 +394,7 @@ class Blocks:
 
 
 def aligned(count: int) -> Array:
-    """Room for so many numbers, from a multiple of 64 bytes on.
-
-    A vector of eight that begins elsewhere lies in two lines of the cache, and is read and written twice: a step of
-    strang takes 1.2 times as long.
-    """
+    """Room for so many numbers, from a multiple of 64 bytes on: no vector of eight lies in two lines of the cache."""
     room = np.empty(count + 7)
     first = -(room.ctypes.data // 8) % 8
     return room[first : first + count]
@@ -423,10 +410,7 @@ def turns(numbers: Array, h: Array) -> Array:
 
 
 def divided(members: Whole, steps: Whole, turns: Array | None = None) -> tuple[Whole, Whole]:
-    """The members whose steps fill blocks of `W` well, in the order in which they do, and the others.
-
-    With `turns`, members whose steps are `ALIKE` stand in the order of these.
-    """
+    """The members whose steps fill blocks well, in order (of `turns` where steps are `ALIKE`), and the others."""
     if not len(members):
         return members, members
     made = steps[members]

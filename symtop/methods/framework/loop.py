@@ -102,12 +102,11 @@ def as_stepped(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
 class Loop:
     """The loop around one kernel family, compiled when it is first used: ``loop(par, rule, state, h, marks)``.
 
-    A run records the state after ``marks[j]`` steps for each j (increasing whole numbers; a mark at 0 records the
-    start). `begun` and `advance` do the same in stretches, and the bits do not depend on where a stretch ends.
-    ``whole(kind, prepare, scale, sample)`` is a run in one compiled call, from the plain numbers of
-    `symtop.methods.framework.preparation` to filled arrays: ``run(numbers, rule, h, marks, states, momenta)``, with
-    momenta (2, samples), returns steps, work and outcome. `lanes` is what the family has for a rule to run many
-    members in lanes, if it has it, and ``blocks(lanes, ...)`` the kernels of that, from the same parts.
+    A run records the state after ``marks[j]`` steps for each j (increasing; 0 is the start). `begun` and `advance` do
+    the same in stretches, and the bits do not depend on where a stretch ends. ``whole(kind, prepare, scale, sample)``
+    is a run in one compiled call, from plain numbers (`preparation`) to filled arrays: ``run(numbers, rule, h, marks,
+    states, momenta)``, with momenta (2, samples), returns steps, work and outcome. `lanes` is what the family has for a
+    rule to run many members in lanes, or None, and ``blocks(lanes, ...)`` the kernels of that, from the same parts.
     """
 
     begin: Callable[..., Any]
@@ -307,7 +306,7 @@ class FixedStep:
 
         Each has the bits of a run alone, in lanes too, and fails alone, as does one whose start the kernel cannot step.
         Threads may call it at the same time; after every `GROUP` steps, or a stretch of a longer member, it heeds an
-        interrupt of theirs.
+        interrupt.
         """
         # writable too: a kernel is compiled again for an array that is not, as a broadcast one
         numbers, h = np.require(numbers, requirements=("C", "W")), np.require(h, requirements=("C", "W"))

@@ -96,8 +96,8 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
         keep(trial, correction) -> end               what the increment is made of, a NamedTuple of floats
         close(problem, end) -> (dstate, newest, outcome)
 
-    The next carry is `newest`, so many numbers, and this carry without as many at its end. `rule` is a constant of the
-    kernel: a branch that hangs on it alone is none.
+    The next carry is `newest`, so many numbers, before the rest of this one. `rule` is a constant of the kernel: a
+    branch that hangs on it alone is none.
     """
     like = (0.0,) * max(dimension, carry, steady, opened, unknowns, len(end._fields), len(top._fields))
     numbers, constant, states, carries = like[: len(top._fields)], like[:steady], like[:dimension], like[:carry]

@@ -77,10 +77,7 @@ def _on_numbers(scale: Callable[..., Any], opened: Callable[[Any], Any]) -> Any:
 
 @dataclass(frozen=True)
 class Scaled:
-    """A rule whose numbers hang on the run: those of `scale(rule, top, start, h)`, which compiles.
-
-    `pack` is how the rule travels into compiled code: by default as its fields.
-    """
+    """A rule whose numbers hang on the run, ``scale(rule, top, start, h)``, compiled; `pack` is `as_fields` if None."""
 
     rule: Any  # a NamedTuple
     scale: Callable[..., Any]

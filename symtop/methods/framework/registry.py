@@ -345,8 +345,8 @@ def engines() -> dict[str, Integrator]:
 def integrator(name: "str | Integrator") -> Integrator:
     """The integrator or variant of that name: ``rk4[axis]``, or ``rk4-axis``, works in no other chart.
 
-    An Integrator is returned as is. Raises SymtopError for an unknown name, with the nearest ones, and for a chart that
-    the method does not have.
+    An Integrator is returned as is. Raises SymtopError for an unknown name and for a chart that the method does not
+    have.
     """
     if isinstance(name, Integrator):
         return name
@@ -386,10 +386,7 @@ def citation_keys(method: Integrator) -> list[str]:
 
 
 def citation(name: "str | Integrator") -> str:
-    """BibTeX of the source of an integrator, by its name.
-
-    Raises SymtopError for an unknown name, or if the integrator names no source that is known here.
-    """
+    """BibTeX of the source of an integrator. SymtopError for an unknown name and where no source is known."""
     method = integrator(name)
     named = citation_keys(method)
     if not named:

@@ -114,10 +114,7 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 @register_jitable
 def _sum(high: float, low: float, more: float, late: float) -> Any:
-    """(high + low) + (more + late): what to add to `high`, what it becomes, and all that is left.
-
-    `late` is not waited for: it joins what is left, and with it the next step.
-    """
+    """(high + low) + more: what to add to `high`, what it becomes, and what is left, with `late`."""
     addend = more + low
     total = high + addend
     virtual = total - high

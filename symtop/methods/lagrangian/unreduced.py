@@ -76,10 +76,7 @@ def _node_sums(par: Any, rule: Any, theta: float, rate: Any, h: float) -> Any:
 
 @register_jitable
 def _solve(first: Any, second: Any, third: Any, right: Any) -> Any:
-    """Solve a 3 x 3 system by elimination from the last row up.
-
-    No row exchange: the pivots are I3, the inertia about the vertical with psi eliminated, and nearly I1, all positive.
-    """
+    """Elimination from the last row up; the pivots are positive: I3, the inertia with psi eliminated, and nearly I1."""
     upper, lower = second[2] / third[2], first[2] / third[2]
     pivot = second[1] - upper * third[1]
     middle = first[1] - lower * third[1]
@@ -148,11 +145,10 @@ def _from_the_start(step: Any) -> Any:
 
 @register_jitable
 def _correct(step: Any, sums: Any, rate: Any) -> Any:
-    """Newton's correction, judged against the rates themselves.
+    """Newton's correction, judged against the rates themselves, to stagnation.
 
-    To stagnation, and p1 comes from the very sums whose residual was seen to vanish. Stopping as the reduced kernel
-    does, after a correction of 1e-8, saves 0.6 evaluations of 3.6 and lets p_phi of `goldstein` walk off linearly,
-    2e-12 in 1e6 steps at h = 0.01 against 3e-13.
+    p1 comes from the very sums whose residual was seen to vanish. Stopped as in the reduced kernel, after a correction
+    of 1e-8, p_phi of `goldstein` walks off linearly, 2e-12 in 1e6 steps at h = 0.01 against 3e-13.
     """
     w, v, u = rate
     dw, dv, du = _correction(step.inertia, step.par, sums, rate, step.state[3:], step.h)
@@ -164,8 +160,8 @@ def _correct(step: Any, sums: Any, rate: Any) -> Any:
 def unreduced_step(inertia: Any, momenta: Any, par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations.
 
-    `inertia(par, sums, h)` is the diagonal of the system for (p_phi0, p_psi0), `momenta(par, sums, v, u, h)` what
-    p_phi1 and p_psi1 are: with friction both have a term of their own.
+    `inertia(par, sums, h)` is the diagonal of the system for (p_phi0, p_psi0), `momenta(par, sums, v, u, h)` both at
+    the end: friction adds a term to each.
     """
     # the rates are smooth in time: the parabola through their last three values predicts the next ones
     near, far, farther = carry

@@ -83,8 +83,8 @@ def compiled_field(chart: str) -> Any:
 def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solver:
     """A solver of the registry around a method of ``scipy.integrate`` or a class like it; `compiled`: the field.
 
-    This is the loop of ``solve_ivp`` with ``t_eval``, to the same bits, kept open so that a run that fails
-    returns what it had and a run that would never end is stopped.
+    It is the loop of ``solve_ivp`` with ``t_eval``, to the same bits, kept open: a run that fails returns what it had,
+    and one that would never end is stopped.
     """
     form = FORMULATIONS[chart]
     most = EVALUATIONS.get(method if isinstance(method, str) else "", EVALUATIONS["Radau"])
@@ -126,10 +126,7 @@ def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solve
 
 
 def integrated(rates: Callable[..., Any], start: Sequence[float], times: Array, method: str, tolerance: float) -> Array:
-    """Any equations by ``solve_ivp`` at the given times, the first 0: shape (variables, times).
-
-    `tolerance` is both the relative and the absolute one. Raises SymtopError if the solver does not reach the end.
-    """
+    """Equations by ``solve_ivp`` (rtol = atol) at times from 0 on: (variables, times). SymtopError if it fails."""
     from scipy.integrate import solve_ivp  # 0.6 s to import
 
     span = (0.0, float(times[-1]))

@@ -190,10 +190,7 @@ march = lie_loop(turn, begin, lambda _: _LANES)
 
 
 def generalised_alpha(name: str, spectral_radius: float, *, summary: str = "") -> Integrator:
-    """The method of one spectral radius, between 0 (what is not resolved is annihilated) and 1 (kept).
-
-    Raises SymtopError for any other.
-    """
+    """The method of a spectral radius from 0 (annihilates what is not resolved) to 1; SymtopError beyond."""
     r = finite("spectral_radius", spectral_radius)
     if not 0.0 <= r <= 1.0:
         raise SymtopError(f"spectral_radius must be between 0 and 1, not {r!r}")

@@ -177,10 +177,7 @@ def _twice(work: Any, dimension: int, stages: int) -> None:
 
 @register_jitable
 def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> Any:
-    """Solve a step in the array of `symtop.methods.runge_kutta.gauss.working_space`: iterations, and did they converge.
-
-    `_iterate` stands here once, because all of it is inlined: three times, compilation takes seconds longer.
-    """
+    """Solve a step in the array of `working_space`: iterations, and did they converge. `_iterate` is inlined: once."""
     effort, rung, first, mgl, grown = 0, RUNGS, 0, par.mgl, False
     _twice(work, len(state), stages)
     for i in range(stages):
@@ -201,155 +198,6 @@ def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> An
             for i in range(stages):
                 for m in range(3):
                     work[i, m] = 0.0
-
-
-Row = tuple[float, ...]
-
-
-def _after(first: Any, then: Any) -> Any:
-    """Both, one after the other."""
-
-    @register_jitable
-    def both(block, table):  # type: ignore[no-untyped-def]
-        wide_vectors()
-        first(block, table)
-        then(block, table)
-
-    return both
-
-
-def swept(  # noqa: C901  (the loops of one step, read in one piece)
-    field: Callable[..., Any], weights: Callable[..., Any], unit: Callable[..., Any], bound: Callable[..., Any],
-    mu: tuple[Row, ...], predict: tuple[Row, ...], *,
-    top: Any, dimension: int, still: int, most: int, round_off: float,
-) -> Lanes:  # fmt: skip
-    """A Gauss method in lanes: `mu` and `predict` as `gauss.GaussRule` has them.
-
-    ``weights(rule, h, out)`` fills in the h b_i, ``unit(par, state)`` is 1/|L|, and a correction above
-    ``bound(sweeps)`` that does not fall has lost its way. Component `still` of a state never moves.
-    """
-    stages, zeros, numbers = len(mu), (0.0,) * dimension, (0.0,) * len(top._fields)
-    tops, flag, work, carry_at = len(numbers), 3 * dimension, 3 * dimension + 1, 3 * dimension + 2
-    carry = stages * dimension + 1  # the L_i and the unit
-    unit_at = carry_at + carry - 1
-    gap_at, pull_at, last_at, live_at = range(unit_at + 1, unit_at + 5)
-    nodes, carried = (0.0,) * stages, (0.0,) * carry
-
-    def ahead(m: int) -> Any:
-        at = carry_at + m
-
-        @register_jitable
-        def continued(block, table):  # type: ignore[no-untyped-def]
-            wide_vectors()
-            for j in range(W):
-                last = nodes
-                for q in range(stages):
-                    last = set_item(last, q, block[(at + q * dimension) * W + j])
-                for i in range(stages):
-                    total = 0.0
-                    for q in range(stages):
-                        total += predict[i][q] * last[q]
-                    block[(at + i * dimension) * W + j] = total
-
-        return continued
-
-    def stage(i: int) -> Any:
-        row, own = mu[i], carry_at + i * dimension
-
-        @register_jitable
-        def renewed(block, table):  # type: ignore[no-untyped-def]
-            wide_vectors()
-            for j in range(W):
-                state, place = column(block, 0, j, zeros), zeros
-                for q in range(stages):
-                    for m in range(dimension):
-                        if m != still:
-                            step = row[q] * block[(carry_at + q * dimension + m) * W + j]
-                            place = set_item(place, m, place[m] + step)
-                for m in range(dimension):
-                    place = set_item(place, m, state[m] + place[m])
-                slope = field(top(*column(table, 0, j, numbers)), place)
-                weight, live = table[(tops + i) * W + j], block[live_at * W + j] != 0.0
-                gap = 0.0 if i == 0 else block[gap_at * W + j]
-                pull = 0.0 if i == 0 else block[pull_at * W + j]
-                for m in range(dimension):
-                    if m != still:
-                        old, value = block[(own + m) * W + j], weight * slope[m]
-                        change = abs(value - old)
-                        if 3 <= m < 6:
-                            pull = max(pull, change)
-                        else:
-                            gap = max(gap, change)
-                        block[(own + m) * W + j] = value if live else old
-                block[gap_at * W + j] = gap
-                block[pull_at * W + j] = pull
-
-        return renewed
-
-    moving = [m for m in range(dimension) if m != still]
-    extrapolate, sweep = ahead(moving[0]), stage(0)
-    for m in moving[1:]:
-        extrapolate = _after(extrapolate, ahead(m))
-    for i in range(1, stages):
-        sweep = _after(sweep, stage(i))
-
-    @register_jitable
-    def judge(block, j, largest):  # type: ignore[no-untyped-def]
-        correction = max(block[gap_at * W + j], block[pull_at * W + j] * block[unit_at * W + j])
-        live, falls = block[live_at * W + j], 0.0 < correction < block[last_at * W + j]
-        goes_on = falls or (correction >= round_off and correction <= largest)
-        good = goes_on or correction < round_off
-        block[work * W + j] += live
-        block[last_at * W + j] = correction
-        block[flag * W + j] = block[flag * W + j] if good or live == 0.0 else 1.0
-        block[live_at * W + j] = live if goes_on else 0.0
-
-    @register_jitable
-    def finish(block, j):  # type: ignore[no-untyped-def]
-        step = zeros
-        for i in range(stages):
-            for m in range(dimension):
-                step = set_item(step, m, step[m] + block[(carry_at + i * dimension + m) * W + j])
-        healthy = np.isfinite(step[0]) and block[live_at * W + j] == 0.0
-        moved, low = accumulate(column(block, 0, j, zeros), column(block, dimension, j, zeros), step)
-        put(block, 0, j, moved)
-        put(block, dimension, j, low)
-        put(block, 2 * dimension, j, step)
-        block[flag * W + j] = block[flag * W + j] if healthy else 1.0
-
-    def step(block, table):  # type: ignore[no-untyped-def]
-        wide_vectors()
-        extrapolate(block, table)
-        for j in range(W):
-            block[last_at * W + j] = np.inf
-            block[live_at * W + j] = 1.0 - block[flag * W + j]
-        effort = 0
-        while effort < most:
-            sweep(block, table)
-            effort += 1
-            largest = bound(effort)
-            for j in range(W):
-                judge(block, j, largest)
-            if none_left(block, live_at):
-                break
-        for j in range(W):
-            finish(block, j)
-
-    def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
-        weights(rule, h, numbers)
-
-    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        shares, slope, values = np.empty(stages), field(par, state), carried
-        weights(rule, h, shares)
-        for i in range(stages):
-            for m in range(dimension):
-                values = set_item(values, i * dimension + m, shares[i] * slope[m])
-        return set_item(values, carry - 1, unit(par, state))
-
-    def read(numbers):  # type: ignore[no-untyped-def]
-        return 0.0
-
-    return Lanes(step, lay, read, lambda _: stages, top, dimension, carry, room=lambda _: 4, begin=begin)
 
 
 STAGES = (1, 2, 3, 4, 5, 6)
@@ -471,9 +319,8 @@ def farthest(sweeps: int) -> float:
 def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C901  (one loop, read in one piece)
     """Increment of one step, sweeps and iterations of Newton that it took, and the outcome.
 
-    Sums run over the stages outside and the components inside: 1.3 times faster than the other way round. All of it is
-    one function, for an array that is handed to another one is counted once more. The largest correction is kept for L
-    and for the unit vectors, not for each component, for which there are not registers enough.
+    All of it is one function, for an array that is handed to another one is counted once more. The largest correction
+    is kept for L and for the unit vectors, not for each component, for which there are not registers enough.
     """
     stages, dimension = len(work) // 7, len(state)
     nothing = state
@@ -535,6 +382,149 @@ def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C90
     return step, effort, outcome if np.isfinite(step[0]) else NOT_CONVERGED
 
 
+Row = tuple[float, ...]
+
+
+def _after(first: Any, then: Any) -> Any:
+    """Both, one after the other."""
+
+    @register_jitable
+    def both(block, table):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        first(block, table)
+        then(block, table)
+
+    return both
+
+
+def _swept(  # noqa: C901  (the loops of one step, read in one piece)
+    field: Callable[..., Any], mu: tuple[Row, ...], predict: tuple[Row, ...], dimension: int
+) -> Lanes:
+    """A Gauss method in lanes: `mu` and `predict` as `GaussRule` has them."""
+    stages, zeros, numbers = len(mu), (0.0,) * dimension, (0.0,) * len(SpaceTop._fields)
+    tops, flag, work, carry_at = len(numbers), 3 * dimension, 3 * dimension + 1, 3 * dimension + 2
+    carry = stages * dimension + 1  # the L_i and the unit
+    unit_at = carry_at + carry - 1
+    gap_at, pull_at, last_at, live_at = range(unit_at + 1, unit_at + 5)
+    nodes, carried = (0.0,) * stages, (0.0,) * carry
+
+    def ahead(m: int) -> Any:
+        at = carry_at + m
+
+        @register_jitable
+        def continued(block, table):  # type: ignore[no-untyped-def]
+            wide_vectors()
+            for j in range(W):
+                last = nodes
+                for q in range(stages):
+                    last = set_item(last, q, block[(at + q * dimension) * W + j])
+                for i in range(stages):
+                    total = 0.0
+                    for q in range(stages):
+                        total += predict[i][q] * last[q]
+                    block[(at + i * dimension) * W + j] = total
+
+        return continued
+
+    def stage(i: int) -> Any:
+        row, own = mu[i], carry_at + i * dimension
+
+        @register_jitable
+        def renewed(block, table):  # type: ignore[no-untyped-def]
+            wide_vectors()
+            for j in range(W):
+                state, place = column(block, 0, j, zeros), zeros
+                for q in range(stages):
+                    for m in range(dimension):
+                        if m != STILL:
+                            step = row[q] * block[(carry_at + q * dimension + m) * W + j]
+                            place = set_item(place, m, place[m] + step)
+                for m in range(dimension):
+                    place = set_item(place, m, state[m] + place[m])
+                slope = field(SpaceTop(*column(table, 0, j, numbers)), place)
+                weight, live = table[(tops + i) * W + j], block[live_at * W + j] != 0.0
+                gap = 0.0 if i == 0 else block[gap_at * W + j]
+                pull = 0.0 if i == 0 else block[pull_at * W + j]
+                for m in range(dimension):
+                    if m != STILL:
+                        old, value = block[(own + m) * W + j], weight * slope[m]
+                        change = abs(value - old)
+                        if 3 <= m < 6:
+                            pull = max(pull, change)
+                        else:
+                            gap = max(gap, change)
+                        block[(own + m) * W + j] = value if live else old
+                block[gap_at * W + j] = gap
+                block[pull_at * W + j] = pull
+
+        return renewed
+
+    moving = [m for m in range(dimension) if m != STILL]
+    extrapolate, sweep = ahead(moving[0]), stage(0)
+    for m in moving[1:]:
+        extrapolate = _after(extrapolate, ahead(m))
+    for i in range(1, stages):
+        sweep = _after(sweep, stage(i))
+
+    @register_jitable
+    def judge(block, j, largest):  # type: ignore[no-untyped-def]
+        correction = max(block[gap_at * W + j], block[pull_at * W + j] * block[unit_at * W + j])
+        live, falls = block[live_at * W + j], 0.0 < correction < block[last_at * W + j]
+        goes_on = falls or (correction >= ROUND_OFF and correction <= largest)
+        good = goes_on or correction < ROUND_OFF
+        block[work * W + j] += live
+        block[last_at * W + j] = correction
+        block[flag * W + j] = block[flag * W + j] if good or live == 0.0 else 1.0
+        block[live_at * W + j] = live if goes_on else 0.0
+
+    @register_jitable
+    def finish(block, j):  # type: ignore[no-untyped-def]
+        step = zeros
+        for i in range(stages):
+            for m in range(dimension):
+                step = set_item(step, m, step[m] + block[(carry_at + i * dimension + m) * W + j])
+        healthy = np.isfinite(step[0]) and block[live_at * W + j] == 0.0
+        moved, low = accumulate(column(block, 0, j, zeros), column(block, dimension, j, zeros), step)
+        put(block, 0, j, moved)
+        put(block, dimension, j, low)
+        put(block, 2 * dimension, j, step)
+        block[flag * W + j] = block[flag * W + j] if healthy else 1.0
+
+    def step(block, table):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        extrapolate(block, table)
+        for j in range(W):
+            block[last_at * W + j] = np.inf
+            block[live_at * W + j] = 1.0 - block[flag * W + j]
+        effort = 0
+        while effort < SWEEPS:
+            sweep(block, table)
+            effort += 1
+            largest = farthest(effort)
+            for j in range(W):
+                judge(block, j, largest)
+            if none_left(block, live_at):
+                break
+        for j in range(W):
+            finish(block, j)
+
+    def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
+        stage_weights(rule, h, numbers)
+
+    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
+        shares, slope, values = np.empty(stages), field(par, state), carried
+        stage_weights(rule, h, shares)
+        for i in range(stages):
+            for m in range(dimension):
+                values = set_item(values, i * dimension + m, shares[i] * slope[m])
+        return set_item(values, carry - 1, momentum_unit(par, state))
+
+    def read(numbers):  # type: ignore[no-untyped-def]
+        return 0.0
+
+    return Lanes(step, lay, read, lambda _: stages, SpaceTop, dimension, carry, room=lambda _: 4, begin=begin)
+
+
 def _loop(field: Any, dimension: int) -> Loop:
     """The loop on states that move by `field`, with L in the components 3 to 5; it counts sweeps and iterations."""
 
@@ -547,10 +537,7 @@ def _loop(field: Any, dimension: int) -> Loop:
 
     @functools.cache
     def of_rows(mu: Any, predict: Any) -> Lanes:
-        return swept(
-            field, stage_weights, momentum_unit, farthest, mu, predict,
-            top=SpaceTop, dimension=dimension, still=STILL, most=SWEEPS, round_off=ROUND_OFF,
-        )  # fmt: skip
+        return _swept(field, mu, predict, dimension)
 
     def in_lanes(rule: GaussRule) -> Lanes | None:
         if len(rule.b) > IN_LANES[dimension]:

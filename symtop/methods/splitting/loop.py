@@ -70,7 +70,7 @@ def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]
     """How a composition travels into compiled code: what opens an array of numbers, and the array.
 
     A call looks at every number of a tuple, and at an array as a whole. Short tables are tuples inside, longer ones are
-    rows of the array, so that one kernel is compiled for all of them: their steps take as long as with tuples, to 1 %.
+    rows of the array, so that one kernel is compiled for all of them.
     """
     drift, kick, gradient = rule[:3]
     opened = _opened(len(drift)) if len(drift) <= SHORT else _of_any_length
@@ -96,10 +96,7 @@ class Stages(NamedTuple):
 
 @register_jitable
 def close(values: Any, total: float) -> Any:
-    """`coefficients.exact_sum` of a row in a kernel: what is missing from `total` goes to the middle.
-
-    The sum of Knuth's two-sums and of what they round off is that of `math.fsum` but for 1e-16 of the surplus itself.
-    """
+    """`exact_sum` of a row in a kernel, by Knuth's two-sums: as `math.fsum` but for 1e-16 of the surplus itself."""
     high, low, n = -total, 0.0, len(values)
     for i in range(n):
         moved = high + values[i]

@@ -82,10 +82,7 @@ def mean_square_momentum(top: Any, at: Any) -> float:
 
 @shared
 def tangent_scale(top: Any, start: Any, h: float) -> float:
-    """tan(x)/x with x = h Lm/2 I1: a Cayley drift with tau = (h/2 I1) times this turns |L| = Lm by the exact angle.
-
-    Lm is the root of the mean of |L|^2 over a nutation, which is known in closed form.
-    """
+    """tan(x)/x, x = h Lm/2 I1: a Cayley drift with tau = (h/2 I1) times this is exact at Lm, Lm^2 = mean |L|^2."""
     x = 0.5 * h * math.sqrt(mean_square_momentum(top, start)) / top.I1
     return math.tan(x) / x if x > 0.0 else 1.0
 

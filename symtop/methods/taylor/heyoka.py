@@ -106,10 +106,7 @@ def _idle(chart: str, precision: str, tolerance: float) -> list[Any]:
 
 @functools.lru_cache(maxsize=256)
 def start_numbers(chart: str, precision: str, top: SymmetricTop, at: Angles) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """State and parameters of a start, correctly rounded to the working precision from its exact doubles.
-
-    Momenta that were rounded to double first would move theta(8) by 5e-15 in the first scene.
-    """
+    """State and parameters of a start, correctly rounded; in double theta(8) would move by 5e-15."""
     kind, mp = arithmetic(precision).kind, context(START_DIGITS)
     theta, phi, psi, *rates = (mp.mpf(getattr(at, name)) for name in at.__slots__)
     if chart == "angles":
@@ -138,10 +135,7 @@ class Flight(NamedTuple):
 def propagate(
     chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array, most: int = 0
 ) -> Flight:
-    """heyoka's states at increasing times, in the working precision; the one place where heyoka is run.
-
-    After `most` steps (0: never) it stops, and the states end at the last time that was reached.
-    """
+    """heyoka's states, in the working precision, at increasing times, or those reached in `most` steps."""
     idle, kind = _idle(chart, precision, tolerance), arithmetic(precision).kind
     try:
         integrator = idle.pop()  # in one instruction: another thread may be here, too
@@ -160,10 +154,7 @@ def propagate(
 
 
 def solver(chart: str, precision: str, read: Read | None = None) -> Solver:
-    """A solver of the registry in one chart and one arithmetic; samples are rounded to double.
-
-    In angles, `read` makes states of the chart and both momenta of the states that were integrated.
-    """
+    """A solver of one chart and precision, samples in double; in angles, `read` makes states and momenta."""
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         most = max(1, int(min(plan.most(MOST_STEPS[precision]), sys.maxsize)))  # infinity is a budget, too
