@@ -2,11 +2,9 @@
 
 People choose an engine and get its integrator. Each of these is the map that an engine takes a free body with a torque
 through, written down again from its source and run against it (`make engines`); the top is a body whose centre is
-fixed, in a torque mgl k x e. Only the map is here: no contacts, no joints, no damping, no limit of speed.
-
-Comparisons of methods leave this family out (`registry.methods`); the claims table judges it and a study of its own
-runs it. An engine that works in single precision has its map in both, as ``jolt`` and ``jolt-float32``: the first shows
-the method, the second what rounding makes of it, and of a limit h -> 0 it claims nothing.
+fixed, in a torque mgl k x e. Contacts, joints, damping and limits of speed are left out. An engine that works in single
+precision has its map in both, as ``jolt`` and ``jolt-float32``: the first shows the method, the second what rounding
+makes of it, and of a limit h -> 0 it claims nothing.
 
 *Kicks.* The angular velocity changes first, then the body turns by it: the semi-implicit family. They differ in what
 becomes of the gyroscopic term w x I_s w, which is why two engines disagree on a top and agree on a ball. All take tau
@@ -18,11 +16,11 @@ at the start of the step, and one evaluation of it. With L = I_s w and [v] x = v
     rescaled    N = L - h w x L,  w = I_s^-1 N |L|/|N|                        turns L but keeps its length
     projected   (I_s - h [L]) w' = L                                          implicit in w, explicit in L
 
-In body axes the third row of J is (0, 0, I3), so that the spin is kept and two equations are left,
-I1 x + h (I1 - I3) w3 e x x = r; the projected form is solved below in closed form too. All are of order 1, but for the
-first, which leaves out a term of the equations: it follows the spherical top with I3 := I1, started with the same w, at
-any step. What `rescaled` keeps is |L|, not L: in a fast top the axis wanders away from L by (1 - I3/I1)^2 w3^2 h/2 a
-second, relatively, until the body lies flat. Where N = 0, in a body at rest, it stays zero, as in the engines.
+In body axes the third row of J is (0, 0, I3), so that the spin is kept and two equations are left, I1 x + h (I1 - I3)
+w3 e x x = r; the projected form has a closed form too. All are of order 1, but for the first, which leaves out a term
+of the equations: it follows the spherical top with I3 := I1, started with the same w, at any step. What `rescaled`
+keeps is |L|, not L: in a fast top the axis wanders away from L by (1 - I3/I1)^2 w3^2 h/2 a second, relatively, until
+the body lies flat. Where N = 0, in a body at rest, it stays zero, as in the engines.
 
 *Half kicks*, as in molecular dynamics, where L is what is carried: L += h tau/2 before and after a rotation of order 2,
 not the exact one of a free body (`strang` takes that). With w(q, L) = R(q) I^-1 R(q)^T L and n(q) = q/|q|:

@@ -1,8 +1,7 @@
 """Many tops at once: a loop over lanes around the kernels of a family, which LLVM turns into vector instructions.
 
-A *block* is `W` members, each with a top, a start, a step and marks of its own; all of them make step k together, each
-in its lane. The functions of a kernel are inlined into the loop over lanes as they stand and do in each lane what they
-do alone, operation by operation, so that a member has the bits of `simulate`.
+A *block* is `W` members, each with a top, a start, a step and marks of its own; all make step k together, each in its
+lane. The functions of a kernel are inlined into the loop over lanes as they stand: a member has the bits of `simulate`.
 
 What a block steps is one array, `block`; number r of lane j is ``block[r W + j]``. With d numbers in a state:
 
@@ -17,7 +16,7 @@ What its members are made of is a second array, `table`, that a step only reads:
 then those of the rule that the family's `lay` writes.
 
 A lane is given up when its step does what lanes cannot: an outcome that is not OK, or a branch that only the kernel for
-one has. It is then run alone from its start, by the compiled run that `simulate` uses; its neighbours do not notice.
+one has. It is then run alone from its start; its neighbours do not notice.
 
 How a family joins: it hands a `Lanes` to `loop.kernel_loop`. Its `step` makes one step of all lanes, as one loop or
 several over ``range(W)``; in each, `column` makes the tuple that a kernel takes and `put` writes what it returns. LLVM

@@ -11,18 +11,14 @@ and two more where what is stepped is not what is shown (a processed method, a m
     enter(par, rule, state, h) -> state                    the start as the kernel steps it, once a run
     present(par, rule, state, k, h) -> state               a sample as the user sees it, once a sample
 
-`par` are the numbers of the top, `rule` the numbers of the method, `work` its force evaluations or solver
-iterations. A kernel returns the *increment* of the state; the loop adds it with Knuth's two-sum and carries
-the rounding error to the next step, which costs nothing (the loop is bound by the latency of the
-kernel) and lowers the growth of round-off about 60-fold. Time is k h with h = T/N exactly, never accumulated.
+`par` are the numbers of the top, `rule` those of the method, `work` force evaluations or solver iterations. A kernel
+returns the *increment* of the state; the loop adds it with Knuth's two-sum and carries the rounding error to the next
+step. That costs nothing, for the loop is bound by the latency of the kernel. Time is k h, never accumulated.
 
 A run that nobody interrupts is one compiled call from plain numbers to samples (`Loop.whole`), the preparation of the
-kernel included: a run of one step takes a fifth of the time.
-
-A loop can stop after any step and go on from there, now or in another process, to the same bits: a `Position` is all
-that the next step depends on. Runs too long to wait for are made of such stretches (`symtop.run.long_run`).
-Reference: Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge-Kutta methods,
-BIT 48 (2008) 231.
+kernel included. A loop can stop after any step and go on, in another process too, to the same bits: a `Position` is all
+that the next step depends on (`symtop.run.long_run`).
+Source: Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231 (Brouwer's law).
 """
 
 import functools

@@ -9,15 +9,13 @@ A kernel supplies three functions of `problem`, a tuple of whatever they need; x
     restart(problem) -> x                     another first guess, taken once, after half of the evaluations
 
 The iteration ends where ``size <= enough``, or where a correction of at most `grain` did not even halve: that is
-rounding, which Newton cannot lower. The last correction is *not* applied: the caller has the trial at x and may follow
-it to first order, which saves one evaluation a step. A predicted x is good to many digits, but in a large step it may
-lie outside the basin of the root; hence `restart`. The functions are arguments and everything is inlined, so that a
-step takes as long as with the loop written out in each kernel.
+rounding. The last correction is *not* applied: the caller has the trial at x and may follow it to first order, which
+saves one evaluation a step. A predicted x may lie outside the basin of the root in a large step; hence `restart`. All
+is inlined.
 
 In lanes the iteration runs over a block until no lane is live. A lane that has ended keeps its x and evaluates the same
-numbers again, so that all that follows from them may be written at every pass, and only x is chosen. A step takes as
-many passes as its slowest lane, two where the lanes by themselves take 1.1 to 1.8. A lane that is live after half of
-the evaluations is given up (`lanes`): there `newton` begins again with another guess.
+numbers again, so that all that follows from them may be written at every pass, and only x is chosen. A lane that is
+live after half of the evaluations is given up (`lanes`): there `newton` begins again with another guess.
 """
 
 from collections.abc import Callable

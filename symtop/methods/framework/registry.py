@@ -1,15 +1,12 @@
 """The registry: an integrator is a record of claims and a solver for each chart it works in.
 
-Traits are data. They are *claims* until measured; `None` means that nobody has claimed anything. A record is
-made by a family (`discrete_lagrangian`, `composition`, ...) from a table of numbers, or by hand around any
-function ``solve(top, start, plan) -> Run``. Nothing is decided by an integrator's name: what a measurement needs to
-know of a method is a field of its record.
+Traits are *claims* until measured; `None` means that nobody has claimed anything. A record is made by a family
+(`discrete_lagrangian`, `composition`, ...) from a table of numbers, or by hand around any function
+``solve(top, start, plan) -> Run``. Nothing is decided by an integrator's name.
 
-A method in one of its charts is a *variant*, ``rk4[axis]``: method and chart are two factors, and a comparison of
-``rk4[angles]`` with ``strang[axis]`` changes both. `variants` lists them; `integrator` knows them by name.
-
-The maps of physics engines, family ``engine``, are registered, judged and run by name as every integrator is. They are
-what people are given, not what one would choose: `methods`, and so `variants` and every comparison, leaves them out.
+A method in one of its charts is a *variant*, ``rk4[axis]``. `variants` lists them; `integrator` knows them by name. The
+maps of physics engines, family ``engine``, are run and judged by name as every integrator is; they are what people are
+given, not what one would choose: `methods`, and so `variants` and every comparison, leaves them out.
 """
 
 import functools

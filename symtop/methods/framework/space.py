@@ -5,8 +5,7 @@
 The attitude has a third form, the frame (e, L, a). A unit vector a across the axis is carried by a' = L x a / I1; the
 body turns past it about e at the constant rate `twist`, which is applied exactly when a sample is taken. Every equation
 and every constant of this form is linear or quadratic, whereas p_psi = L.e(q) is cubic in (q, L), where no Runge-Kutta
-method keeps it; and what is integrated turns with the axis, not with the spin, so that the attitude is as accurate as
-the axis: 8 (order 4) to 30 times (order 8) better than with a fixed in the body.
+method keeps it; and what is integrated turns with the axis, not with the spin.
 
 p_phi = L_z and p_psi = L.e are not parameters of these charts: they are read off the state, and whatever a kernel does
 to them shows.

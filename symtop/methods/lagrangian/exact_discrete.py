@@ -3,13 +3,12 @@
 In the chart of `oscillators`, with Z_n = exp(-i n delta) chi(n h) and s = |Z|^2,
 
     Z_{n+1} + Z_{n-1} = 2 A Z_n/(1 + B s_n)        A = sqrt((P - e1)(P - e2)(P - e3)/D^3),  B = -sigma/D,  D = P - b
-    P = wp(h) (`symtop.model.exact.elliptic`)         delta = sigma J int_0^h dt/(wp(t) - b) = sigma J R_J(P - e_i,
-    D)/3
+    P = wp(h) (`symtop.model.exact.elliptic`),  delta = sigma J int_0^h dt/(wp(t) - b) = sigma J R_J(P - e_i, D)/3
 
 for each of the two oscillators: McMillan's map in a plane. Why: chi(t+h) (wp(t) - wp(h)) has poles of order 2 at most
 and the multipliers of chi, so that it is alpha chi + beta chi'; added at h and -h, beta drops out.
 
-*Discrete Lagrangian.* With r = sqrt(D), which is 1/h and smaller terms,
+*Discrete Lagrangian.* With r = sqrt(D), about 1/h,
 
     L_d(Z0, Z1) = r (|Z1 - Z0|^2/2 - (V(Z0) + V(Z1))/2),        V(Z) = s - (A/B) log(1 + B s)
     p_0 = -D1 L_d = r (Z1 - A Z0/(1 + B s0)),                   p_1 = D2 L_d = r (A Z1/(1 + B s1) - Z0)
@@ -40,8 +39,7 @@ large. Next to a separatrix P - wp is a small difference at large steps; there a
 *Rounding.* On the orbit 1 + B s = (P - wp)/D with one wp for both oscillators: one division a step. Each step brings
 the p of the longer of Z_1, Z_2 nearer to the second condition above, and its length to the one that |chi| = 1 asks for
 once that is off by `IDLE`. That keeps J; without it two oscillators whose energies are rounded apart leave each other
-near an unstable pole (`sleeping-unstable`, ten nutations: 1e-4, and 5e-11 with it). Phases n delta are taken off by
-exact products at samples.
+near an unstable pole (`sleeping-unstable`, ten nutations: 1e-4, and 5e-11 with it). Phases are exact products.
 
 *Sums.* A state is Z and W = Z_{n+1} - Z_n = p/r + f Z, f Z the half kick: a step is one drift W and one kick 2 f Z. Z,
 W and the kick are carried as two doubles each; f is one. A kick along Z, whatever its strength, and a drift along W
@@ -53,9 +51,8 @@ of Z is: put off, it would grow by sqrt |2 f| a step, and end a run with two ste
 
 Sources: Kuznetsov, Petrera, Ragnisco, nlin/0403028 (Baecklund transformations of the Lagrange top discretise its flow);
 Suris, The Problem of Integrable Discretization (discrete Garnier system); Marsden and West, Acta Numerica 10 (2001)
-357. The constants in this form, and L_d, are derived here. Bobenko and Suris, Commun. Math. Phys. 204 (1999) 147, give
-the top a discrete Lagrangian that is integrable, with deformed constants; one whose orbits are those of the top was
-not found in these sources, which does not say that it is nowhere.
+357. The constants in this form, and L_d, are derived here; the integrable discrete Lagrangian of Bobenko and Suris,
+Commun. Math. Phys. 204 (1999) 147, has deformed constants.
 """
 
 import math

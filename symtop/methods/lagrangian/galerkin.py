@@ -23,11 +23,11 @@ is Newton on (thetam, theta1). Its Jacobian is analytic: with g_i = dV_i/d(south
 
     (B0 + Bm + B1) de/dthetam = 4 g_m,      (B0 + Bm + B1) de/dtheta1 = -2 g_1.
 
-Order 4, symmetric, symplectic, p_phi and p_psi conserved exactly; 1.4 times the cost of the midpoint rule at equal
-iterations. It is not `simpson-linear`, whose path is a straight line and whose order is 2, and only for a constant mass
-is it Lobatto IIIA-IIIB of order 4: that pair makes the momenta linear in time, this method the rates. On the top, whose
-inertia depends on theta, the two differ by O(h^4), and Lobatto IIIA-IIIB is what comes of reducing first. Source:
-Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357, on Galerkin methods.
+Order 4, symmetric, symplectic, p_phi and p_psi conserved exactly. It is not `simpson-linear`, whose path is a straight
+line and whose order is 2, and only for a constant mass is it Lobatto IIIA-IIIB of order 4: that pair makes the momenta
+linear in time, this method the rates. On the top, whose inertia depends on theta, the two differ by O(h^4), and Lobatto
+IIIA-IIIB is what comes of reducing first. Source: Marsden and West, Discrete mechanics and variational integrators,
+Acta Numerica 10 (2001) 357, on Galerkin methods.
 """
 
 import functools

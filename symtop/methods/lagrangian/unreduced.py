@@ -10,12 +10,10 @@ the step is p0 = -D1 L_d, solved by Newton with an analytic 3 x 3 Jacobian, and 
     p_theta0 = I1 w - h sum w_i (1-a_i) f_i,    p_phi0 = sum w_i l_i,    p_psi0 = sum w_i m_i
     p_theta1 = I1 w + h sum w_i a_i f_i,        p_phi1 = sum w_i l_i,    p_psi1 = sum w_i m_i
 
-All three momenta are variables of the state: each step forms them anew from the increments that it adds, so that
-p_phi and p_psi are conserved only as far as the equations were solved and are free to drift. Order 2, symplectic,
-symmetric if the rule is. It is the witness that the reduced kernel assumed nothing: in exact arithmetic both are
-one map. It is not a method to use: a step takes two to three times as long (its solver iterates more
-often: the study `reduction` measures both), with an error of rounding per step that no compensated
-sum can undo (p1 is formed at full size, not as an increment), and p_phi - p_psi cos(theta) cancels near a pole.
+All three momenta are variables of the state: p_phi and p_psi are conserved only as far as the equations were solved.
+Order 2, symplectic, symmetric if the rule is. It shows that the reduced kernel assumed nothing: in exact arithmetic
+both are one map. It is not a method to use: its solver iterates more often (the study `reduction` measures both), p1 is
+formed at full size, so that no compensated sum undoes its rounding, and p_phi - p_psi cos(theta) cancels near a pole.
 Source: Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357.
 """
 

@@ -10,12 +10,9 @@ p_phi in the space frame, where it is a component of the state.
     lsoda    Adams (order 1-12) or BDF (1-5), chosen on the way   Petzold, SIAM J. Sci. Stat. Comput. 4 (1983) 136
 
 Radau and LSODA are made for stiff equations, which the top's are not: they are here because people use them. Every
-call of the right-hand side is counted, also those of difference quotients for a Jacobian, which SciPy's own `nfev` of
-Radau leaves out.
-
-The language of the right-hand side is a factor of its own. In the registry it is plain Python on floats, faster than
-the same on NumPy scalars; `scipy_method(name, compiled=True)` is the same solver around a right-hand side
-that numba has compiled, from the same source. The loop around it is SciPy's and is Python in both (LSODA's is Fortran).
+call of the right-hand side is counted, also those of difference quotients for a Jacobian, unlike SciPy's `nfev` of
+Radau. In the registry the right-hand side is plain Python on floats; ``scipy_method(name, compiled=True)`` is the same
+solver around one that numba has compiled, from the same source. The loop around it is SciPy's (LSODA's is Fortran).
 """
 
 import functools

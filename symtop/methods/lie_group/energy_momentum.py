@@ -17,8 +17,7 @@ denominator: Moser and Veselov's keeps a bracket in its place (`lie_variational`
 
 *Discrete gradients* on (e, L) are no methods of their own. The energy is quadratic in L and linear in e, for which
 Gonzalez's midpoint gradient, the mean gradient and that of Itoh and Abe are all (mgl k, (L_0 + L_1)/2 I1); with the
-structure matrix at the midpoint each is the implicit midpoint rule, `gauss-2`. The average vector field, the mean of
-the whole right side instead of the gradient, loses the energy here, because the bracket is not constant.
+structure matrix at the midpoint each is the implicit midpoint rule, `gauss-2`.
 Sources: Simo, Wong, Int. J. Numer. Methods Eng. 31 (1991) 19; Gonzalez, J. Nonlinear Sci. 6 (1996) 449.
 """
 

@@ -16,10 +16,9 @@ p - 1 in place of p keeps increments free of cancellation. What |q| lacks is add
 
 In lanes the shares stand outside and the lanes inside. A family writes what stands between, as one loop over the lanes
 or several (`stepped`), or as the parts of an iteration (`iterated`). The table holds the numbers of the top, those of
-the rule and, share by share, what a share is made of: one kernel for compositions of any length, and for both charts,
-which differ in what is shown of a sample. An iteration runs until no lane is live; a lane that has ended keeps its x. A
-lane that is live after half of the passes that a run alone may make is given up, and so is one whose equation cannot be
-solved: alone, it goes on or fails.
+the rule and those of each share: one kernel for compositions of any length, and for both charts. An iteration runs
+until no lane is live. A lane that is live after half of the passes that a run alone may make is given up, and so is one
+whose equation cannot be solved.
 """
 
 import math

@@ -17,7 +17,7 @@ energy is of degree four in (g, r) and stays bounded. So this is `gauss` with wh
 what it has, the energy. The spin of the body is a constant rate and is added at samples.
 
 The stages are swept as those of `gauss` are, with the same tables, from the slope at the start of the step and until
-the correction no longer falls: 7 to 12 sweeps at 120 to 400 steps a nutation. Sweeps that do not converge end the run.
+the correction no longer falls. Sweeps that do not converge end the run.
 Sources: Ohsawa, SIGMA 15 (2019) 083 (arXiv:1907.07819), for the map T*C^2 -> se(3)*; McLachlan, Modin, Verdier,
 Nonlinearity 27 (2014) 1525 (collective integrators).
 """

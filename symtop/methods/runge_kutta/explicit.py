@@ -8,8 +8,7 @@ are autonomous, so that c = sum_j a_ij serves only to check what a user gives.
 
 `rk4` is Kutta's classical method: order 4, four evaluations of f a step. No explicit Runge-Kutta method is symplectic
 or symmetric: the errors of energy and of every constant that is not linear in the state grow linearly with time. L_z =
-p_phi is linear in (e, L) and in (q, L) and stays; in angles nothing does. Not to be confused with `rk45`, which chooses
-its steps, nor with Gauss methods, which are implicit and keep what rk4 loses.
+p_phi is linear in (e, L) and in (q, L) and stays; in angles nothing does.
 
 In lanes a step is one loop over the lanes. Its stages and the sums of slopes are written out, term by term in the order
 of the kernel for one: slopes stay in registers as far as these reach. The table holds h a, row by row, and h b. A

@@ -16,11 +16,10 @@ Murua, Numer. Algorithms 76 (2017) 861); the weights h b_i sum to h; the driver 
 the iteration runs until its correction no longer falls, never to a tolerance, whose remainder would have a sign.
 
 *Sweeps.* The iteration is the plain one, y_i = y + sum_j mu_ij L_j with the newest L_j, started from the polynomial of
-the last step: 4 to 14 sweeps at 60 to 240 steps a nutation. Solving each stage's own equation in closed form (a Cayley
-transform) halves the sweeps of large steps, is no faster and loses 20 times more to rounding. Sweeps converge up to
-steps of 0.15 nutations (s = 1) to 0.48 (s = 6) in the scene `spheroid`: a limit of the sweep, not of the method. Where
-its corrections leave the line to rounding within 100 sweeps, Newton's iteration takes over, and the choice hangs on
-this step alone. A step that Newton does not solve either ends the run as `not_converged`.
+the last step: 4 to 14 sweeps at 60 to 240 steps a nutation. They converge up to steps of 0.15 nutations (s = 1) to 0.48
+(s = 6) in the scene `spheroid`: a limit of the sweep, not of the method. Where its corrections leave the line to
+rounding within 100 sweeps, Newton's iteration takes over, and the choice hangs on this step alone. A step that Newton
+does not solve either ends the run as `not_converged`.
 
 *Newton.* L' is linear in e alone, so that the increments of e give those of L exactly; what remains are 3 s equations
 for the x_i, the increments of e, quadratic in them. With w_i = h b_i, nu = mu diag(w) mu and e_i, L_i at the stage,
@@ -28,15 +27,14 @@ for the x_i, the increments of e, quadratic in them. With w_i = h b_i, nu = mu d
     dx_i - (w_i/I1) sum_k (mu_ik L_i x dx_k + mgl nu_ik ((z.e_i) dx_k - z (e_i.dx_k))) = w_i L_i x e_i/I1 - x_i
 
 is solved by elimination with pivots, 18 x 18 at most. The increments of a follow with L_i given: the same equations
-without mgl, now linear. Newton starts from e_i = e, since the polynomial of the step before says nothing about a step
-so large. Where this does not converge in 12 iterations, the solution is followed from a tenth of the step to all of it,
-each time 1.09 times further. Of steps h omega = 2, 5 and 10 from 1000 states of each of 11 scenes every one is solved,
-the first way 100 %, 94 % and 74 % of them. What stays unsolved has a path that turns back before the whole step: slow
-tops that swing widely, at steps of a nutation and more.
+without mgl, now linear. Newton starts from e_i = e. Where this does not converge in 12 iterations, the solution is
+followed from a tenth of the step to all of it, each time 1.09 times further. Of steps h omega = 2, 5 and 10 from 1000
+states of each of 11 scenes every one is solved, the first way 100 %, 94 % and 74 % of them. What stays unsolved has a
+path that turns back before the whole step: slow tops that swing widely, at steps of a nutation and more.
 
-*Lanes.* A lane whose sweeps have ended keeps its L_i by selection. One whose corrections do not fall to rounding is
-given up: alone, Newton takes over. Stages stand outside and lanes inside, each stage a loop of its own with the numbers
-of its row as constants, for a place in `block` that hangs on a variable is no vector.
+*Lanes.* A lane whose sweeps have ended keeps its L_i by selection; one whose corrections do not fall to rounding is
+given up. Each stage is a loop of its own with the numbers of its row as constants, for a place in `block` that hangs on
+a variable is no vector.
 
 No step is too large for stability. The methods are A-stable, |R(iy)| = 1; and at a steady precession, where the reduced
 energy is least, small nutations cannot grow at any step, because the energy is kept. What a large step loses is the

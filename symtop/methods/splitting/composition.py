@@ -6,9 +6,7 @@ A composition alternates kicks b_0 .. b_n with drifts a_1 .. a_n (`loop`). The c
     axis, attitude  the exact free symmetric top; gravity kicks, singular nowhere (`space`)
 
 Every method here is explicit, symplectic and symmetric, and keeps p_phi and p_psi. `stormer-verlet` and its
-compositions live in the angles chart, all others in the space frame; one drift with its kick takes four fifths of a
-Stormer-Verlet step there. On the violent `spheroid`, `takahashi-imada` is the cheapest way to an attitude error of
-1e-7, `srkn-14-6` to 1e-9 and `sofroniou-spaletta-10` to 1e-11.
+compositions live in the angles chart, all others in the space frame.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters II.5 and V.3.
 """
 

@@ -8,8 +8,8 @@ A force is evaluated only where it is kicked with, and the one at the end of a s
 kick-first table with n drifts costs n forces and a drift-first one n - 1, but n drifts: its last drift and the first of
 the next step are not merged.
 
-The kernels see no h: `stages` multiplies the tables out before a run, each row closed to the product that its sum
-stands for. A sum that is wrong by one rounding is a clock that runs fast by 1e-16 in every step.
+The kernels see no h: `stages` multiplies the tables out before a run, each row closed to the product of its sum, or the
+clock would run fast by 1e-16 in every step.
 
 In lanes, kick, drift and force of a stage are one loop over the lanes; the last kick and the sums are another. A kick
 or a force that a table leaves out is carried out with the coefficient 0, which changes no bit. The coefficients lie in

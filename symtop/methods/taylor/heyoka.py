@@ -4,15 +4,12 @@
     attitude:  q' = (L q / I1 + (1/I3 - 1/I1) p_psi q k)/2,  L' as above with e = q k q*    seven variables
     angles:    the Euler-Lagrange equations, with poles (see `euler_lagrange`)               six variables
 
-All constants, |e| = 1, L.e = p_psi, L_z = p_phi and the energy, are linear or quadratic in (e, L). The axis chart is
-three times cheaper than the attitude chart and is used whenever nobody asks for the spin angle. The order follows
-from the tolerance (about 20 in double); the step from the size of the series' last terms. Asking for a
-hundredth of the rounding unit removes the truncation bias that makes energy drift linearly at tolerance eps.
+The order follows from the tolerance (about 20 in double), the step from the size of the series' last terms. Asking for
+a hundredth of the rounding unit removes the truncation bias that makes energy drift linearly at tolerance eps.
 `taylor` works in double, `taylor-longdouble` and `taylor-quad` with mantissas of 64 and 113 bits: they show what the
 method does without rounding, and `symtop.reference` is made by the same function. A Taylor step of order n computes n
-derivatives of the state; `force_evaluations` counts them.
-The registry has the two charts without poles. In angles the method would be the first choice for whoever observes the
-nutation or the attitude, and it is neither the fastest there nor safe: the study of charts makes a record for itself.
+derivatives of the state; `force_evaluations` counts them. The registry has the two charts without poles; the study of
+charts makes a record in angles for itself.
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
 """
 
