@@ -32,21 +32,10 @@ from numpy.typing import NDArray
 
 from symtop.core.jit import compile_kernel, register_jitable, set_item
 from symtop.core.parallel import heed
-from symtop.methods.framework import lanes as many
+from symtop.methods.framework import lanes as many, preparation
 from symtop.methods.framework.lanes import Blocks, Lanes, Many, Whole
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan, Run
-from symtop.methods.framework.preparation import (
-    Body,
-    Later,
-    Preparation,
-    Scaled,
-    Shown,
-    Start,
-    as_fields,
-    as_it_is,
-    as_it_steps,
-    conserved,
-)
+from symtop.methods.framework.preparation import Body, Preparation, Shown, Start, as_it_steps, conserved
 from symtop.methods.framework.registry import Solver
 from symtop.methods.vectors import accumulate, accumulate_plainly
 from symtop.model import charts
@@ -349,11 +338,11 @@ class FixedStep:
         if present is not None and not isinstance(present, Shown):
             return None
         sample, size = (as_it_steps, prepare.size) if present is None else (present.sample, present.size)
-        scale = as_it_is
-        pack = (rule.pack if isinstance(rule, Scaled | Later) else None) or as_fields
-        if isinstance(rule, Scaled):
+        scale = preparation.as_it_is
+        pack = getattr(rule, "pack", None) or preparation.as_fields
+        if isinstance(rule, preparation.Scaled):
             scale, rule = rule.scale, rule.rule
-        elif isinstance(rule, Later):
+        elif isinstance(rule, preparation.Later):
             rule = rule.make()
         if not isinstance(rule, tuple) or not rule:  # a function of Python, or numbers in an array
             return None

@@ -34,19 +34,19 @@ class SpaceTop(NamedTuple):
 
 
 @register_jitable
-def axis_at(at: Any) -> Any:
+def e_at(at: Any) -> Any:
     """e of a start."""
     return _axis_parts(math, at.theta, at.phi)
 
 
 @register_jitable
-def attitude_at(at: Any) -> Any:
+def q_at(at: Any) -> Any:
     """q of a start."""
     return _quaternion_parts(math, at.theta, at.phi, at.psi)
 
 
 @register_jitable
-def momentum_at(top: Any, at: Any) -> Any:
+def L_at(top: Any, at: Any) -> Any:
     """L of a start."""
     return _momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
 
@@ -59,16 +59,16 @@ def _numbers(top: Any, at: Any) -> Any:
 
 @register_jitable
 def _on_axis(top: Any, at: Any) -> Any:
-    return _numbers(top, at), (*axis_at(at), *momentum_at(top, at))
+    return _numbers(top, at), (*e_at(at), *L_at(top, at))
 
 
 def _on_attitude(top: Any, at: Any) -> Any:
-    return _numbers(top, at), (*attitude_at(at), *momentum_at(top, at))
+    return _numbers(top, at), (*q_at(at), *L_at(top, at))
 
 
 def _on_frame(top: Any, at: Any) -> Any:
     """a is the body's first axis."""
-    w, x, y, z = attitude_at(at)
+    w, x, y, z = q_at(at)
     par, state = _on_axis(top, at)
     return par, (*state, w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
 

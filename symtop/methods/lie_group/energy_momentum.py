@@ -25,16 +25,7 @@ from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.loop import (
-    SPUN,
-    cayley,
-    gravity,
-    in_both_charts,
-    inertia,
-    iterated,
-    iterated_alone,
-    lie_loop,
-)
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, inertia, iterated_loop
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
 MOST = 30  # iterations of a step; 3 or 4 are the rule
@@ -103,9 +94,7 @@ def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> An
     return m, v, scaled(h, gravity(par, _mean(opened[:3], u))), carry
 
 
-PARTS = _start, _again, _close, MOST
-_LANES = iterated(*PARTS, opened=6, unknowns=3)
-march = lie_loop(iterated_alone(*PARTS), lanes=lambda _: _LANES)
+march = iterated_loop(_start, _again, _close, MOST, opened=6, unknowns=3)
 
 
 def built_in() -> list[Integrator]:

@@ -31,21 +31,14 @@ from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, rea
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it_steps
-from symtop.methods.framework.space import (
-    SpaceTop,
-    attitude_at,
-    axis_of,
-    finite_outcome,
-    momentum_at,
-    observe_attitude,
-    on_attitude,
-    with_spin,
-)
+from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, observe_attitude, on_attitude, with_spin
 from symtop.methods.vectors import accumulate, cross, dot, plus, scaled
+
+_attitude_numbers = on_attitude.numbers
 
 
 def _on_body(top: Any, at: Any) -> Any:
-    return Body(top.I1, top.I3, top.mgl), (*attitude_at(at), *momentum_at(top, at))
+    return Body(top.I1, top.I3, top.mgl), _attitude_numbers(top, at)[1]
 
 
 def _axis_shown(par: Any, t: float, y: Any) -> Any:
@@ -234,25 +227,6 @@ def _no_numbers(rule: Any) -> Any:
     return (0.0,)
 
 
-def iterated_alone(
-    start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int
-) -> Callable[..., Any]:
-    """The map of `lie_loop` made of the parts that `iterated` takes; the work counted is the number of passes."""
-    for function in (start, again, close):
-        register_jitable(function)
-
-    def turn(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
-        opened, x = start(par, rule, e, L, carry, h)
-        work, ended, lost = 0, False, False
-        while not (ended or lost) and work < most:
-            x, ended, lost = again(par, rule, carry, h, opened, x)
-            work += 1
-        m, v, dL, carry = close(par, rule, carry, h, opened, x)
-        return m, v, dL, work, OK if ended and not lost else NOT_CONVERGED
-
-    return turn
-
-
 def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
     opened: int, unknowns: int, numbers: Callable[..., Any] = _no_numbers, count: int = 1,
@@ -328,3 +302,22 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
 
     room = live_at + 1 - first
     return stepped(part, lay, count, 1, carried=SPUN, carry=carry, begin=begin, room=room)
+
+
+def iterated_loop(
+    start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
+    opened: int, unknowns: int,
+) -> Loop:  # fmt: skip
+    """The loop, for one and in lanes, around a map made of the parts that `iterated` takes; its work are the passes."""
+    lanes = iterated(start, again, close, most, opened=opened, unknowns=unknowns)
+
+    def turn(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
+        fixed, x = start(par, rule, e, L, carry, h)
+        work, ended, lost = 0, False, False
+        while not (ended or lost) and work < most:
+            x, ended, lost = again(par, rule, carry, h, fixed, x)
+            work += 1
+        m, v, dL, carry = close(par, rule, carry, h, fixed, x)
+        return m, v, dL, work, OK if ended and not lost else NOT_CONVERGED
+
+    return lie_loop(turn, lanes=lambda _: lanes)

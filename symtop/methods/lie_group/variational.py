@@ -33,17 +33,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
+from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.loop import (
-    SPUN,
-    cayley,
-    gravity,
-    in_both_charts,
-    iterated,
-    iterated_alone,
-    lie_loop,
-    moved,
-)
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, iterated_loop, moved
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.vectors import cross, dot, plus, scaled
 
@@ -137,7 +129,7 @@ def _rotated(par: Any, e: Any, across: Any, half: float, n: float, i: float, x: 
     return m, v, plus(kick, half, gravity(par, plus(e, 1.0, moved(m, v, e))))
 
 
-def _loop(first: Callable[..., Any], after: Callable[..., Any], rates: Callable[..., Any], unknowns: int) -> Any:
+def _loop(first: Callable[..., Any], after: Callable[..., Any], rates: Callable[..., Any], unknowns: int) -> Loop:
     """The step by one of the two equations, with so many numbers in x: for one, and in lanes."""
 
     def start(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
@@ -152,9 +144,7 @@ def _loop(first: Callable[..., Any], after: Callable[..., Any], rates: Callable[
         n, i, along = rates(par, opened[6], x)
         return (*_rotated(par, opened[:3], opened[3:6], 0.5 * h, n, i, along), carry)
 
-    parts = start, again, close, MOST
-    lanes = iterated(*parts, opened=8, unknowns=unknowns)
-    return lie_loop(iterated_alone(*parts), lanes=lambda _: lanes)
+    return iterated_loop(start, again, close, MOST, opened=8, unknowns=unknowns)
 
 
 MARCH = {MOSER_VESELOV: _loop(*RIGID_BODY, 1), EULER_POINCARE: _loop(*RETRACTION, 3)}

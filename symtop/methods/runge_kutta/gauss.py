@@ -52,20 +52,13 @@ import numpy as np
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.multiprecision import context
 from symtop.core.simd import wide_vectors
+from symtop.methods.framework import space
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Array, Integrator
-from symtop.methods.framework.space import (
-    SpaceTop,
-    field_axis,
-    field_frame,
-    frame_to_attitude,
-    observe_axis,
-    on_axis,
-    on_frame,
-)
+from symtop.methods.framework.space import SpaceTop, field_axis, field_frame, observe_axis
 from symtop.methods.vectors import accumulate
 
 ENOUGH = 1e-9  # a correction in units of |e| = 1, whose square is below rounding
@@ -557,8 +550,10 @@ def gauss(stages: int) -> Integrator:
         family="runge-kutta",
         summary=f"Gauss collocation with {stages} stage{'s' if stages > 1 else ''} on the space-frame equations",
         solvers={
-            "axis": FixedStep(march_axis, rule, on_axis, stages, implicit=True),
-            "attitude": FixedStep(march_frame, rule, on_frame, stages, implicit=True, present=frame_to_attitude),
+            "axis": FixedStep(march_axis, rule, space.on_axis, stages, implicit=True),
+            "attitude": FixedStep(
+                march_frame, rule, space.on_frame, stages, implicit=True, present=space.frame_to_attitude
+            ),
         },
         order=2 * stages,
         explicit=False,

@@ -62,22 +62,14 @@ from symtop.core.errors import SymtopError, whole
 from symtop.core.jit import compile_kernel, register_jitable, set_item
 from symtop.core.numbers import EPSILON
 from symtop.core.simd import Components, Vectors
+from symtop.methods.framework import space
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.lanes import Lanes, one_loop
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import Body, Scaled, Start
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.framework.space import (
-    SpaceTop,
-    axis_of,
-    finite_outcome,
-    observe_attitude,
-    observe_axis,
-    on_attitude,
-    on_axis,
-    with_spin,
-)
+from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, with_spin
 from symtop.methods.vectors import accumulate
 
 
@@ -299,8 +291,8 @@ def _loop(
     return loop
 
 
-march_axis = _loop(axis_sum, 6, observe_axis)
-march_attitude = _loop(attitude_sum, 7, observe_attitude, present=present)
+march_axis = _loop(axis_sum, 6, space.observe_axis)
+march_attitude = _loop(attitude_sum, 7, space.observe_attitude, present=present)
 
 
 ORDERS = (8, 12, 16, 20)
@@ -325,8 +317,8 @@ def _of_quaternion(state: Any) -> Any:
 
 
 CHARTS: dict[str, tuple[Any, ...]] = {  # preparation, series, sample(par, state, t), axis of a state
-    "axis": (on_axis, axis_sum, _as_summed, _first_three),
-    "attitude": (on_attitude, attitude_sum, with_spin, _of_quaternion),
+    "axis": (space.on_axis, axis_sum, _as_summed, _first_three),
+    "attitude": (space.on_attitude, attitude_sum, with_spin, _of_quaternion),
 }
 
 
@@ -428,8 +420,8 @@ def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
         family="taylor",
         summary=f"Taylor series on the space-frame equations, order {order}, by products of vectors",
         solvers={
-            "axis": FixedStep(march_axis(order), rule, on_axis, order, implicit=False),
-            "attitude": FixedStep(march_attitude(order), rule, on_attitude, order, implicit=False),
+            "axis": FixedStep(march_axis(order), rule, space.on_axis, order, implicit=False),
+            "attitude": FixedStep(march_attitude(order), rule, space.on_attitude, order, implicit=False),
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi"}),
         reference="biscani-izzo-2021",
