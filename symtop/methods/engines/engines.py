@@ -2,9 +2,8 @@
 
 People choose an engine and get its integrator. Each of these is the map that an engine takes a free body with a torque
 through, written down again from its source and run against it (`make engines`); the top is a body whose centre is
-fixed, in a torque mgl k x e. Contacts, joints, damping and limits of speed are left out. An engine that works in single
-precision has its map in both, as ``jolt`` and ``jolt-float32``: the first shows the method, the second what rounding
-makes of it, and of a limit h -> 0 it claims nothing.
+fixed, in a torque mgl k x e. An engine that works in single precision has its map in both, as ``jolt`` and
+``jolt-float32``: the first shows the method, the second what rounding makes of it; it claims no limit h -> 0.
 
 *A body in space axes.* An engine steps an orientation and the angular velocity w in space, some the angular momentum L.
 With I_s = I1 + (I3 - I1) e e^T, the inertia in space,
@@ -13,7 +12,7 @@ With I_s = I1 + (I3 - I1) e e^T, the inertia in space,
 
 the right sides of Euler's equations need the axis e alone. So every map whose step commutes with a turn of the body
 about its axis is one function, on the axis and on the attitude, that returns the rotation of the step as a quaternion p
-in space beside the new v, which is w or L, whichever the engine carries (rounding in p_phi or in p_psi would drift):
+in space beside the new v, which is what the engine carries, w or L:
 
     step(par, rule, e, v, carry, h) -> (p, v, carry),      e <- p e p*,  q <- p q/|p q|.
 
@@ -179,14 +178,12 @@ def _double(x: Any) -> Any:
 
 
 @register_jitable
-def single(x: Any) -> Any:
-    """A number in single precision."""
+def _single(x: Any) -> Any:
     return np.float32(x)
 
 
 @register_jitable
-def nothing(par: Any, e: Any, v: Any) -> Any:
-    """What a step reuses of the one before: nothing."""
+def _nothing(par: Any, e: Any, v: Any) -> Any:
     return 0.0
 
 
@@ -199,7 +196,6 @@ def _momenta(par: Any, e: Any, w: Any) -> Any:
 
 @register_jitable
 def _after(before: Any, dstate: Any, i: int) -> Any:
-    """Three components of the state after a step, from the i-th on."""
     return before[i] + dstate[i], before[i + 1] + dstate[i + 1], before[i + 2] + dstate[i + 2]
 
 
@@ -212,19 +208,17 @@ def _observe_rates_on_attitude(par: Any, rule: Any, before: Any, dstate: Any, h:
 
 
 def _present_rates_on_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """(e, L) of (e, w)."""
     e = state[0], state[1], state[2]
     return (*e, *momentum(par, e, (state[3], state[4], state[5])))
 
 
 def _present_rates_on_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """(q, L) of (q, w)."""
     q = state[0], state[1], state[2], state[3]
     return (*q, *momentum(par, axis(q), (state[4], state[5], state[6])))
 
 
 class Carried(NamedTuple):
-    """What a map carries beside an orientation in a chart: how it starts, is observed and is shown."""
+    """What a map carries in a chart: how it starts, is observed and is shown."""
 
     prepare: Preparation
     observe: Callable[..., Any]
@@ -241,7 +235,7 @@ ANGULAR_MOMENTUM = {
 }
 
 
-def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = nothing) -> Loop:
+def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = _nothing) -> Loop:
     """The loop on the axis around a map; `reused` is what its first step takes for the one before."""
     register_jitable(step)
 
@@ -262,7 +256,7 @@ def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., 
 
 
 def attitude_loop(
-    step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = nothing,
+    step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = _nothing,
     number: Callable[..., Any] = _double,
 ) -> Loop:  # fmt: skip
     """The loop on the attitude around a map, in the precision of `number`."""
@@ -322,13 +316,11 @@ def _rescaled(par: Any, e: Any, w: Any, h: Any) -> Any:
 
 @register_jitable
 def _explicit(par: Any, e: Any, w: Any, h: Any) -> Any:
-    """Torque and gyroscopic term at the start of the step."""
     return plus(w, h, acceleration(par, e, w))
 
 
 @register_jitable
 def _newton_step(par: Any, e: Any, w: Any, h: Any) -> Any:
-    """Both with the derivative of the gyroscopic term."""
     return plus(w, h, _implicit(par, e, w, moment(par, e, w), h))
 
 
@@ -408,9 +400,8 @@ def richardson(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: Any) -> Any:
     w = velocity(par, e, L)
     full, half = linear(par, w, h), linear(par, w, 0.5 * h)
     half = product(linear(par, velocity(par, rotated(par, half, e), L), 0.5 * h), half)
-    p = normalised(
-        par, (2.0 * half[0] - full[0], 2.0 * half[1] - full[1], 2.0 * half[2] - full[2], 2.0 * half[3] - full[3])
-    )
+    a, b, c, d = half
+    p = normalised(par, (2.0 * a - full[0], 2.0 * b - full[1], 2.0 * c - full[2], 2.0 * d - full[3]))
     return p, plus(L, 0.5 * h, torque(par, rotated(par, p, e))), carry
 
 
@@ -483,7 +474,7 @@ def adams_bashforth(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> 
 
 @register_jitable
 def _first_turn(par: Any, q: Any, L: Any, h: float) -> Any:
-    """The turn about the body's first axis, with L in body axes."""
+    """About the body's first axis, with L in body axes."""
     x = 0.5 * h * L[0] / par.I1
     c, s = np.cos(x), np.sin(x)
     C, S = c * c - s * s, 2.0 * s * c
@@ -493,7 +484,6 @@ def _first_turn(par: Any, q: Any, L: Any, h: float) -> Any:
 
 @register_jitable
 def _second_turn(par: Any, q: Any, L: Any, h: float) -> Any:
-    """The turn about the body's second axis."""
     y = 0.5 * h * L[1] / par.I1
     c, s = np.cos(y), np.sin(y)
     C, S = c * c - s * s, 2.0 * s * c
@@ -503,7 +493,6 @@ def _second_turn(par: Any, q: Any, L: Any, h: float) -> Any:
 
 @register_jitable
 def _third_turn(par: Any, q: Any, L: Any, h: float) -> Any:
-    """The turn about the axis of symmetry."""
     z = 0.5 * h * L[2] / par.I3
     c, s = np.cos(z), np.sin(z)
     C, S = c * c - s * s, 2.0 * s * c
@@ -558,7 +547,7 @@ def _entry(
 
 def _engine(
     name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "", *,
-    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = nothing, **more: Any,
+    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = _nothing, **more: Any,
 ) -> Integrator:  # fmt: skip
     """A map in double, on the axis and on the attitude."""
     loops = {
@@ -573,11 +562,10 @@ def _both(
     rule: Any = None, energy_error: str | None = None,
 ) -> list[Integrator]:  # fmt: skip
     """A map in double and in the single precision of the engine, there on the attitude as the engine steps it."""
-    rounded = {"attitude": attitude_loop(step, VELOCITY["attitude"], number=single)}
-    in_single = f"{summary}, in single precision"
+    rounded, words = attitude_loop(step, VELOCITY["attitude"], number=_single), f"{summary}, in single precision"
     return [
         _engine(name, step, order, summary, reference, keeps, rule=rule, energy_error=energy_error),
-        _entry(f"{name}-float32", rounded, None, in_single, reference, rule=rule, precision="single"),
+        _entry(f"{name}-float32", {"attitude": rounded}, None, words, reference, rule=rule, precision="single"),
     ]
 
 

@@ -89,7 +89,7 @@ NONE_OPENED = (NOTHING,) * 6
 
 
 class Sums(NamedTuple):
-    """Sums over the nodes; `start` or `end` in a name means the weight w (1-a) or w a, the share of that end."""
+    """Sums over the nodes; `start` or `end` in a name means the weight w (1-a) or w a."""
 
     high: float  # sum w cos^2(theta/2)
     low: float  # sum w sin^2(theta/2)

@@ -269,8 +269,7 @@ def built_in() -> list[Integrator]:
     charts = {"axis": (march_axis, Shown(_first_six, 6)), "attitude": (march_attitude, Shown(_first_seven, 7))}
     return [
         Integrator(
-            name="exact-discrete",
-            family="discrete-lagrangian",
+            name="exact-discrete", family="discrete-lagrangian",
             summary="discrete Lagrangian of two oscillators whose step is the motion itself, one force",
             solvers={
                 chart: FixedStep(march, oscillators.numbers, on_oscillators, 1, implicit=False, present=shown)

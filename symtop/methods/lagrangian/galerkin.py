@@ -287,12 +287,10 @@ def built_in() -> list[Integrator]:
     """The Galerkin integrator that ships with symtop."""
     return [
         Integrator(
-            name="galerkin-simpson",
-            family="discrete-lagrangian",
+            name="galerkin-simpson", family="discrete-lagrangian",
             summary="Galerkin discrete Lagrangian, parabola in time and Simpson's rule",
             solvers={"angles": FixedStep(march, Iteration(), on_angles, 2, implicit=True, each_step=1)},
-            order=4, explicit=False,
-            symplectic=True, symmetric=True,
+            order=4, explicit=False, symplectic=True, symmetric=True,
             conserves=frozenset({"p_phi", "p_psi"}),
             reference="marsden-west-2001",
         )

@@ -19,12 +19,10 @@ def built_in() -> list[Integrator]:
     """The closed form under the name `exact`."""
     return [
         Integrator(
-            name="exact",
-            family="exact",
+            name="exact", family="exact",
             summary="closed form in elliptic functions, in double; one evaluation a sample",
             solvers={"attitude": solve},
-            control=None, explicit=True,
-            symplectic=True, symmetric=True,
+            control=None, explicit=True, symplectic=True, symmetric=True,
             conserves=frozenset({"energy", "p_phi", "p_psi"}),
             reference="klein-sommerfeld-1910",
         )

@@ -36,33 +36,18 @@ EVALUATIONS = {"RK45": 6_000_000, "DOP853": 7_000_000, "LSODA": 9_000_000, "Rada
 
 
 class RightHandSide:
-    """y' = f(t, y) of a chart in plain Python on floats, and how often it was called."""
+    """y' = f(t, y) of a chart, in plain Python on floats or by its `compiled_field`, and how often it was called."""
 
-    __slots__ = ("calls", "field", "par")
+    __slots__ = ("calls", "compiled", "field", "par")
 
-    def __init__(self, field: Callable[[Any, Any], Any], par: Any) -> None:
-        self.field, self.par = field, par
+    def __init__(self, field: Callable[[Any, Any], Any], par: Any, compiled: Callable[..., Any] | None = None) -> None:
+        self.field, self.par, self.compiled = field, par, compiled
         self.calls = 0
 
     def __call__(self, _: float, y: Any) -> Any:
         """y' at any time."""
         self.calls += 1
-        return self.field(self.par, y.tolist())
-
-
-class CompiledRightHandSide(RightHandSide):
-    """The same with the `compiled_field` of a chart, which returns an array."""
-
-    __slots__ = ("compiled",)
-
-    def __init__(self, chart: str, par: Any) -> None:
-        super().__init__(FORMULATIONS[chart].field, par)
-        self.compiled = compiled_field(chart)
-
-    def __call__(self, _: float, y: Any) -> Any:
-        """y' at any time."""
-        self.calls += 1
-        return self.compiled(*self.par, y)
+        return self.field(self.par, y.tolist()) if self.compiled is None else self.compiled(*self.par, y)
 
 
 @functools.cache
@@ -90,7 +75,7 @@ def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solve
         from scipy import integrate  # 0.6 s to import
 
         par, y0 = form.prepare(top, start)
-        rhs = CompiledRightHandSide(chart, par) if compiled else RightHandSide(form.field, par)
+        rhs = RightHandSide(form.field, par, compiled_field(chart) if compiled else None)
         states = np.full((plan.times.size, len(y0)), np.nan)
         steps = seen = 0
         outcome = OK

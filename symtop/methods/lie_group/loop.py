@@ -135,29 +135,11 @@ def lie_loop(
     return kernel_loop(begin, increment, observe_attitude, lanes=lanes)
 
 
-def shown_in(carried: Carried) -> Callable[..., None]:
-    """A sample of either chart, by how many numbers it has: ``(par, t, state, out)``, for a kernel of both."""
-    axis, attitude = _AXIS, carried.present
-    sample = as_it_steps if attitude is None else attitude.sample
-    small, large = showing(axis.sample), showing(sample)
-    size = axis.size
-
-    def show(par, t, state, out):  # type: ignore[no-untyped-def]
-        if len(out) == size:
-            small(par, t, state, out)
-        else:
-            large(par, t, state, out)
-
-    return show
-
-
-def in_both_charts(
-    loop: Loop, rule: Any, carried: Carried, evaluations: int, *, implicit: bool
-) -> dict[str, FixedStep]:  # fmt: skip
-    """Solvers on the axis and on the attitude; `evaluations` is the force evaluations of one unit of work."""
+def in_both_charts(loop: Loop, rule: Any, carried: Carried, forces: int, *, implicit: bool) -> dict[str, FixedStep]:
+    """Solvers on the axis and on the attitude; a unit of work is so many force evaluations."""
     return {
-        "axis": FixedStep(loop, rule, carried.prepare, evaluations, implicit=implicit, present=_AXIS),
-        "attitude": FixedStep(loop, rule, carried.prepare, evaluations, implicit=implicit, present=carried.present),
+        chart: FixedStep(loop, rule, carried.prepare, forces, implicit=implicit, present=shown)
+        for chart, shown in (("axis", _AXIS), ("attitude", carried.present))
     }
 
 
@@ -218,7 +200,14 @@ def stepped(
     def size(rule: Any) -> int:
         return fields + each * len(rule.shares)
 
-    show = shown_in(carried)
+    small, large = showing(_AXIS.sample), showing(as_it_steps if carried.present is None else carried.present.sample)
+
+    def show(par, t, state, out):  # type: ignore[no-untyped-def]
+        if len(out) == 6:  # the axis
+            small(par, t, state, out)
+        else:
+            large(par, t, state, out)
+
     return Lanes(step, lay, lambda _: 0.0, size, carried.top, SIZE, carry, effort, lambda _: room, begin, show)
 
 

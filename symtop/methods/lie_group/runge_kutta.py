@@ -19,8 +19,7 @@ of them; p_phi = L_z and the energy drift. With F_j the algebra element at stage
 
 The last is a method for the element U that the solution is the exponential of, U' = dexp^-1_U F; of dexp^-1 two
 brackets suffice for order 4. A table is rows of weights, one row an exponential, so that one kernel steps all three.
-The engines' `rkmk4` acts with SO(3) x R^3 on body rates instead: another group, which keeps |e| and L.e for that body
-alone and turns the spin in its stages.
+The engines' `rkmk4` acts with another group, SO(3) x R^3, on body rates and turns the spin in its stages.
 
 In lanes a kernel compiles for each shape of a table: how many exponentials each stage has, and whether slopes are bent
 back (Munthe-Kaas). The weights are numbers in the table, and those that are 0 are carried out too, in the order of the
@@ -203,8 +202,7 @@ def _store(slopes: Any, i: int, w: Any, f: Any) -> None:
         slopes[i, k], slopes[i, 3 + k] = w[k], f[k]
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """Working space for the elements of the stages."""
+def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return np.empty((len(rule.counts), 6))
 
 
@@ -232,7 +230,7 @@ def turn(par: Any, rule: Any, e: Any, L: Any, slopes: Any, h: float) -> Any:
     return made[0], made[1], made[3], stages, OK
 
 
-march = lie_loop(turn, begin, lambda rule: _of_shape(tuple(map(int, rule.counts)), rule.bent != 0.0))
+march = lie_loop(turn, _begin, lambda rule: _of_shape(tuple(map(int, rule.counts)), rule.bent != 0.0))
 
 
 def lie_runge_kutta(

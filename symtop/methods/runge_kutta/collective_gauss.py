@@ -35,7 +35,6 @@ from symtop.methods.lie_group.loop import UNSPUN, in_both_charts, lie_loop
 from symtop.methods.runge_kutta.gauss import ROUND_OFF, SWEEPS, gauss_rule, packed, stage_weights
 from symtop.methods.vectors import product
 
-STAGES = (1, 2, 3)
 ORIGIN = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
@@ -60,9 +59,8 @@ def _field(par: Any, e: Any, y: Any) -> Any:
     )  # fmt: skip
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """Working space: the increments of the stages, and a column for the weights."""
-    return np.empty((len(rule.b), 9))
+def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+    return np.empty((len(rule.b), 9))  # the increments of the stages, and a column for the weights
 
 
 @register_jitable
@@ -114,7 +112,7 @@ def turn(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
     return step[0], (step[1], step[2], step[3]), dL, effort, outcome
 
 
-march = lie_loop(turn, begin)
+march = lie_loop(turn, _begin)
 
 
 def collective_gauss(stages: int) -> Integrator:
@@ -136,4 +134,4 @@ def collective_gauss(stages: int) -> Integrator:
 
 def built_in() -> list[Integrator]:
     """collective-gauss-2, -4 and -6."""
-    return [collective_gauss(stages) for stages in STAGES]
+    return [collective_gauss(stages) for stages in (1, 2, 3)]

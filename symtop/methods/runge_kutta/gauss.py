@@ -543,7 +543,6 @@ march_axis, march_frame = _loop(field_axis, 6), _loop(field_frame, 9)
 
 def gauss(stages: int) -> Integrator:
     """The Gauss method with 1 to 6 stages, named after its order; its coefficients are computed at the first run."""
-
     rule = Later(functools.partial(gauss_rule, stages), packed)
     return Integrator(
         name=f"gauss-{2 * stages}",

@@ -51,13 +51,12 @@ def scale(rule: Any, top: Any, at: Any, h: float) -> Any:
     return stages(rule, h / top.I1, h, 0.0, 0.0)
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The force at the start."""
+def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return force_angles(par, state, (0.0, 0.0, 0.0, 0.0))
 
 
-def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (theta, p_theta, phi, psi); the work counted is the number of force evaluations."""
+def _increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
+    """The work counted is the number of force evaluations."""
     step, force = compose(force_angles, kick_angles, drift_angles, par, rule, state, carry)
     return step, force, rule.forces, chart_outcome(state[0] + step[0])
 
@@ -98,7 +97,7 @@ def _ended(state: Any, step: Any) -> int:
 
 
 _LANES = composed(force_angles, kick_angles, _drift_in_lanes, _ended, top=ReducedTop, dimension=4, carry=3)
-march = kernel_loop(begin, increment, observe, lanes=lambda _: _LANES)
+march = kernel_loop(_begin, _increment, observe, lanes=lambda _: _LANES)
 
 
 def verlet_energy(seen: View, momenta: Momenta, h: float) -> Array:

@@ -3,21 +3,19 @@
     kick(b h):   L += b h mgl (-e_y, e_x, 0),  with a gradient c:  b mgl -> b mgl - 2 c h^2 mgl^2 e_z / I1
     drift(a h):  e <- R e,  q <- r q,  R the rotation about L by the angle a h |L| / I1 and r its quaternion
 
-The drift is the exact free symmetric top, so what is left of the error is gravity's: in a fast top it is 100 times
-smaller than Stormer-Verlet's. The body's own spin ``q <- q exp(twist h k/2)`` commutes with every r and leaves e alone;
-it is exact for any time and is therefore added where a sample is shown, not in the step. Both halves are flows on
-T*SU(2), so any composition is symplectic there and Lie-Poisson in (e, L); L_z is not touched by either and L.e by
-rounding alone. {V, {V, {V, T}}} = 0 (T is quadratic in L), so Runge-Kutta-Nystrom tables apply, and
-{V, {V, T}} = mgl^2 sin^2(theta) / I1 is the force gradient.
+The drift is the exact free symmetric top, so what is left of the error is gravity's. The body's own spin ``q <- q
+exp(twist h k/2)`` commutes with every r and leaves e alone; it is exact for any time and is therefore added where a
+sample is shown, not in the step. Both halves are flows on T*SU(2), so any composition is symplectic there and
+Lie-Poisson in (e, L); L_z is not touched by either and L.e by rounding alone. {V, {V, {V, T}}} = 0 (T is quadratic in
+L), so Runge-Kutta-Nystrom tables apply, and {V, {V, T}} = mgl^2 sin^2(theta) / I1 is the force gradient.
 
 With x = (a h/2 I1) |L| half the angle, s = sin(x)/|L|, w = cos(x) and m = w - 1, no increment is a difference of
 large numbers:
 
     dq = m q + s L q,       de = 2 s (w L x e + s L x (L x e))
 
-Rounding makes w^2 + s^2 L^2 = 1 + 1e-17, the same in every step of a steady motion, and |e| and |q| would drift
-(1e-11 in 1e6 steps was seen). So each drift adds to its s or m what the length lacks at that moment. The correction
-turns nothing but about L: L.e does not notice, while rescaling e itself would hand the drift over to p_psi.
+Rounding makes w^2 + s^2 L^2 = 1 + 1e-17, the same in every step of a steady motion, and |e| and |q| would drift. So
+each drift adds to its s or m what the length lacks at that moment, a turn about L that leaves L.e alone.
 
 A *Cayley* drift has s = tau/sqrt(1 + tau^2 L^2), w = 1/sqrt(1 + tau^2 L^2) instead, tau = h/2 I1: a rotation about L
 by a nearby angle that depends on |L| only, so symplectic too. Kick-drift-kick with it is an integrable map, that of the

@@ -63,9 +63,6 @@ def equations(chart: str) -> list[Any]:
     return [*zip(axis, motion, strict=True), *zip(momentum, [-mgl * y, mgl * x, 0.0 * x], strict=True)]
 
 
-Read = Callable[[SymmetricTop, Array, Array], tuple[Array, Array, Array]]  # (top, times, states)
-
-
 class Arithmetic(NamedTuple):
     """A floating-point type of heyoka."""
 
@@ -150,8 +147,8 @@ def propagate(
     return Flight(states[grid.size - times.size :], int(steps), order, outcome.name)
 
 
-def solver(chart: str, precision: str, read: Read | None = None) -> Solver:
-    """A solver of one chart and precision, samples in double; in angles, `read` makes states and momenta."""
+def solver(chart: str, precision: str, read: Callable[..., tuple[Array, Array, Array]] | None = None) -> Solver:
+    """A solver of one chart and precision, samples in double; in angles, `read(top, times, states)` adds momenta."""
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         most = max(1, int(min(plan.most(MOST_STEPS[precision]), sys.maxsize)))  # infinity is a budget, too
@@ -200,15 +197,12 @@ def built_in() -> list[Integrator]:
     return [
         Integrator(
             name="taylor" if precision == "double" else f"taylor-{precision}",
-            family="taylor",
-            summary=_SUMMARIES[precision],
+            family="taylor", summary=_SUMMARIES[precision],
             solvers={chart: solver(chart, precision) for chart in ("axis", "attitude")},
             control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
             least_tolerance=arithmetic(precision).epsilon / 1000.0,
             default_tolerance=arithmetic(precision).epsilon / 100.0,
-            reference="biscani-izzo-2021",
-            precision=precision,
-            speed=0.002 if precision == "quad" else 1.0,
+            reference="biscani-izzo-2021", precision=precision, speed=0.002 if precision == "quad" else 1.0,
         )
         for precision in ("double", *wide, *quad)
     ]  # fmt: skip

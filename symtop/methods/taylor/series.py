@@ -80,8 +80,7 @@ class Scale(NamedTuple):
     pull: float = 1.0  # m = h mgl
 
 
-def scale(rule: Any, top: Any, at: Any, h: float) -> Any:
-    """The step of one run."""
+def _scale(rule: Any, top: Any, at: Any, h: float) -> Any:
     return Scale(h / top.I1, h * top.mgl)
 
 
@@ -414,10 +413,9 @@ def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
     order = whole("order", order, ORDERS[0])
     if order not in ORDERS:
         raise SymtopError(f"order must be one of {', '.join(map(str, ORDERS))}, not {order!r}")
-    rule = Scaled(Scale(), scale)
+    rule = Scaled(Scale(), _scale)
     return Integrator(
-        name=name,
-        family="taylor",
+        name=name, family="taylor",
         summary=f"Taylor series on the space-frame equations, order {order}, by products of vectors",
         solvers={
             "axis": FixedStep(march_axis(order), rule, space.on_axis, order, implicit=False),
@@ -431,13 +429,11 @@ def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
 def built_in() -> list[Integrator]:
     """`series` and `series-adaptive`."""
     adaptive = Integrator(
-        name="series-adaptive",
-        family="taylor",
+        name="series-adaptive", family="taylor",
         summary="Taylor series on the space-frame equations with order and steps of a tolerance, compiled",
         solvers={chart: solver(chart) for chart in CHARTS},
         control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi"}),
-        least_tolerance=EPSILON / 1000.0,
-        default_tolerance=EPSILON / 10.0,
+        least_tolerance=EPSILON / 1000.0, default_tolerance=EPSILON / 10.0,
         reference="biscani-izzo-2021",
     )  # fmt: skip
     return [series("series"), adaptive]
