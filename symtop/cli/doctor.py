@@ -242,11 +242,11 @@ def compile_all(jobs: int | None = None) -> tuple[int, list[str]]:
     """Compile what is not on disk; returns how many kernels came to the cache, and which runs could not be done."""
     from tqdm import tqdm
 
-    from symtop.core.parallel import context, cores
+    from symtop.core.parallel import OneThreadEach, cores
 
     before, todo = kernels(), tasks()
     bar = tqdm(desc="compiling", total=len(todo), unit="run", disable=None, leave=False)
-    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context()) as pool, beating(bar):
+    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), OneThreadEach()) as pool, beating(bar):
         reasons = []
         for reason in pool.map(_run, todo):
             reasons.append(reason)

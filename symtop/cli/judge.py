@@ -55,7 +55,7 @@ def judge(
     my.py:solver    an instance of a solver of diffrax
     ./my.so         void step(double *y, double h, const double *par, long n)
     "./engine -x"   a program: a line of numbers in, states out
-    run.csv         a trajectory without a method: time and states (see symtop.judging.trajectory)
+    run.csv         a trajectory without a method: time and states (see symtop.judging.judge_step)
 
     Without a claim it says what the method is. The exit code is 1 if a claim is refuted.
 
@@ -65,15 +65,13 @@ def judge(
     symtop judge "./my_engine --top" --form program --quick
     symtop judge run.csv --scene spheroid --conserves p_phi
     """
-    from symtop.judging import text_report
-    from symtop.judging.findings import Finding
+    from symtop.judging import findings
     from symtop.judging.judge_step import judge as judged
-    from symtop.judging.sandbox import About
 
-    def tell(event: About | Finding) -> None:
-        if isinstance(event, About):
-            click.echo(text_report.heading(event._asdict(), scene))
-        elif line := text_report.line(event, terminal_width()):
+    def tell(event: Any) -> None:
+        if isinstance(event, findings.About):
+            click.echo(findings.heading(event, scene))
+        elif line := findings.line(event, terminal_width()):
             click.echo(line)
 
     check_outputs(output=output, card=card, badge=badge)
@@ -81,7 +79,7 @@ def judge(
     if as_json:
         click.echo(as_text([finding.plain() for finding in ledger.findings]))
     else:
-        click.echo(text_report.summary(ledger.findings, ledger.implied))
+        click.echo(findings.summary(ledger.findings, ledger.implied))
     if output is not None:
         from symtop.core import netcdf
 
@@ -128,7 +126,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
             about = {"integrator": ledger.integrator, "scene": chosen.name}
             entries += [{**about, **finding.plain()} for finding in ledger.findings]
         else:
-            say("\n".join(ledger.sentences()))
+            say("\n".join(finding.sentence(ledger.integrator) for finding in ledger.findings))
     if as_json:
         click.echo(as_text(entries))
     if refuted:

@@ -1,7 +1,6 @@
 """``symtop study``: run studies, show the state of their cases, or compute some again and compare."""
 
 import sys
-import time
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -10,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from symtop.cli.common import (
-    PLUGINS,
     as_text,
     completing,
     filled,
@@ -81,16 +79,6 @@ def study(
     if limit is not None:
         positive("limit", limit)
     folder = Path(results, *filter(None, ("quick" * grid["quick"], "only" * bool(only))))
-    whole = every and not (only or status or check or click.get_current_context().meta.get(PLUGINS))
-    if whole and not fresh and not scheduler:
-        from symtop.runner import manifest
-
-        began = time.monotonic()
-        up_to_date = manifest.all_findings(folder.resolve(), grid)
-        if up_to_date is not None:
-            took = {"computed": 0, "seconds": time.monotonic() - began}
-            _end([_summary(findings | took, folder, as_json) for findings in up_to_date], folder, as_json)
-            return
     studies = choose(names, every=every, only=only or (), quick=grid["quick"])
     if status:
         sys.exit(show_status(studies, folder, why, as_json, grid))
@@ -101,7 +89,7 @@ def study(
             if check:
                 code = check_all(pool, studies, folder, as_json, grid, everything=fresh)
             else:
-                code = run_all(pool, studies, folder, as_json, grid, fresh=fresh, limit=limit, whole=whole)
+                code = run_all(pool, studies, folder, as_json, grid, fresh=fresh, limit=limit)
     except (KeyboardInterrupt, TerminatedError) as stop:
         word, code = ("interrupted", INTERRUPTED) if isinstance(stop, KeyboardInterrupt) else ("terminated", TERMINATED)
         warn(f"{word}; what was computed is kept, and the same command goes on from there")
@@ -140,22 +128,17 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
 
 def run_all(
     pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, fresh: bool,
-    limit: float | None, whole: bool,
+    limit: float | None,
 ) -> int:  # fmt: skip
     """Bring studies up to date, each concluded while the next one is computed; 1 if cases failed."""
     from symtop.report import style
-    from symtop.runner import manifest
 
-    made_of = manifest.all_made_of(grid) if whole else ""  # before an edit of the code may change it
     save = style.sketch if grid["quick"] else style.publish  # quick figures are to look at, not to print
     options = {"fresh": fresh, "limit": limit, "save": save, "beside": len(studies) > 1, **grid}
     ended = _in_order(pool, studies, results, options)
     summaries = [_summary(findings, results, as_json) for findings in ended]
-    failed = any(summary["failures"] for summary in summaries)
-    if whole and not failed:
-        manifest.note_all(results.resolve(), [study.name for study in studies], made_of)
     _end(summaries, results, as_json)
-    return 1 if failed else 0
+    return 1 if any(summary["failures"] for summary in summaries) else 0
 
 
 def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -197,10 +180,6 @@ def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict
 def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str, Any]:
     """The summary of a study's findings, which are printed but for JSON: its first sentences, and where the rest is."""
     verdict, name = findings["verdict"], findings["study"]
-    if not isinstance(verdict, list) or not all(isinstance(sentence, str) for sentence in verdict):
-        from symtop.runner.study import sentences  # xarray: half a second
-
-        sentences(name, lambda: verdict)  # refuses what older versions have stored
     summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
     summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
     if not as_json:
@@ -229,17 +208,17 @@ def _end(summaries: Sequence[dict[str, Any]], results: Path, as_json: bool) -> N
 
 def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool, grid: dict[str, bool]) -> int:
     """Print the state of every case, and with `why` the reason; 1 if some have failed."""
-    from symtop.runner import status
+    from symtop.runner import cases
 
-    states = {study.name: status.status(study, results, why=why, **grid) for study in studies}
+    states = {study.name: cases.status(study, results, why=why, **grid) for study in studies}
     if as_json:
         click.echo(as_text(states))
     for name, rows in {} if as_json else states.items():
         counts = Counter(row["state"] for row in rows)
-        click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in status.STATES if counts[state]))
+        click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in cases.STATES if counts[state]))
         groups: dict[str, list[dict[str, Any]]] = {}  # cases that share a line
         for row in rows:
-            if row["state"] != status.DONE:
+            if row["state"] != cases.DONE:
                 reasons = filter(None, (row["state"], row["message"] or ", ".join(row.get("why", []))))
                 groups.setdefault(": ".join(reasons), []).append(row)
         for reason, group in groups.items():
@@ -247,23 +226,25 @@ def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool,
             methods, scenes = (list(dict.fromkeys(row[key] for row in group)) for key in ("integrator", "scene"))
             line = f"  {count}{reason}: {abridged(methods, MOST_NAMED)} on {abridged(scenes, MOST_NAMED)}"
             click.echo(filled(line))
-    return 1 if any(row["state"] == status.FAILED for rows in states.values() for row in rows) else 0
+    return 1 if any(row["state"] == cases.FAILED for rows in states.values() for row in rows) else 0
 
 
 def check_all(
     pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, everything: bool
 ) -> int:
     """Compute stored cases again and compare; 1 if anything is different."""
-    from symtop.runner import check
+    from symtop.runner.cases import check
 
-    checks = [check.check(study, results, pool, everything=everything, **grid) for study in studies]
+    checks = [check(study, results, pool, everything=everything, **grid) for study in studies]
     if not any(entry.stored for entry in checks):
         names = ", ".join(study.name for study in studies)
         raise SymtopError(f"no case of {names} is up to date in {results}; run it first")
     if as_json:
         click.echo(as_text([entry._asdict() for entry in checks]))
     for entry in [] if as_json else checks:
-        click.echo(f"{entry.study}: {entry.compared} of {entry.stored} cases computed again, {entry.verdict()}")
+        count = len(entry.differences)
+        verdict = f"{count} differences" if count else "the same to the last bit, times aside"
+        click.echo(f"{entry.study}: {entry.compared} of {entry.stored} cases computed again, {verdict}")
         for difference in entry.differences:
             click.echo(f"  {difference}", err=True)
     return 1 if any(entry.differences for entry in checks) else 0

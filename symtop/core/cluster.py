@@ -65,11 +65,8 @@ async def _asked(address: str) -> None:
     """Raise TimeoutError if a scheduler does not answer: a client waits for ever for one that takes the connection."""
     from distributed import rpc
 
-    async def ask() -> None:
-        async with rpc(address) as scheduler:
-            await scheduler.identity()
-
-    await asyncio.wait_for(ask(), PATIENCE)
+    async with asyncio.timeout(PATIENCE), rpc(address) as scheduler:
+        await scheduler.identity()
 
 
 def leave(client: Any) -> None:

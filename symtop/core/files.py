@@ -44,13 +44,12 @@ on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in 
 
 def cache_root() -> Path:
     """The folder for everything symtop caches: ``$SYMTOP_CACHE`` or ``symtop`` in the user's cache folder."""
-    environment = os.environ
-    return _root(*(environment.get(name) for name in ("SYMTOP_CACHE", "XDG_CACHE_HOME", "HOME", "USERPROFILE")))
+    return _root(*map(os.environ.get, ("SYMTOP_CACHE", "XDG_CACHE_HOME", "HOME", "USERPROFILE")))
 
 
 @functools.lru_cache(maxsize=16)
 def _root(chosen: str | None, caches: str | None, *_homes: str | None) -> Path:
-    """The folder in these surroundings, which `Path.home` reads as well: 60 us, and each new start asks four times."""
+    """The folder in these surroundings, of which `Path.home` reads the last; each new start asks four times."""
     return Path(chosen) if chosen else Path(caches or Path.home() / ".cache") / "symtop"
 
 
@@ -100,18 +99,6 @@ def lock_path(path: Path) -> Path:
     return path.with_name(f".{path.stem}.lock")
 
 
-def _taken(file: int, *, wait: bool) -> bool:
-    """Take the lock; False if somebody else holds it."""
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except BlockingIOError:
-        return False
-    except OSError as error:
-        if error.errno not in NO_LOCKS:
-            raise
-    return True
-
-
 @contextlib.contextmanager
 def locked(path: Path, *, wait: bool) -> Iterator[bool]:
     """Hold a file's lock, so that nobody else computes it; yields False if somebody else holds it and `wait` is false.
@@ -129,9 +116,14 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
         except OSError as error:
             raise SymtopError(f"cannot write {lock}: {error.strerror or error}") from error
         with file:
-            if not _taken(file.fileno(), wait=wait):
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            except BlockingIOError:
                 yield False
                 return
+            except OSError as error:
+                if error.errno not in NO_LOCKS:
+                    raise
             if os.fstat(file.fileno()).st_nlink == 0:  # its holder removed it while we waited
                 continue
             os.utime(file.fileno())  # since when it is held
@@ -144,12 +136,9 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
 
 def python_file(path: str | Path, name: str, wanted: str) -> Path:
     """A file by its path; SymtopError that argument `name` must be what is `wanted` if it is not there."""
-    try:
-        file = at_home(path).resolve()
-        if file.is_file():
+    with contextlib.suppress(OSError, ValueError):  # a name that is too long, or holds a null character
+        if (file := at_home(path).resolve()).is_file():
             return file
-    except (OSError, ValueError):  # a name that is too long, or holds a null character
-        pass
     raise SymtopError(f"{name} must be {wanted}, not {str(path)!r}", name)
 
 

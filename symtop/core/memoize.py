@@ -19,14 +19,11 @@ def of_one_dataset(function: Callable[Concatenate[Any, P], Answer]) -> Callable[
 
     @functools.wraps(function)
     def remembered(data: Any, /, *args: P.args, **kwargs: P.kwargs) -> Answer:
-        before, answers = _answers.get(function, (None, {}))
-        if data is not before:
-            answers = {}
-            _answers[function] = data, answers
-        key = (args, tuple(sorted(kwargs.items())))
+        if _answers.get(function, (None, {}))[0] is not data:
+            _answers[function] = data, {}
+        answers, key = _answers[function][1], (args, tuple(sorted(kwargs.items())))
         if key not in answers:
             answers[key] = function(data, *args, **kwargs)
-        answer: Answer = answers[key]
-        return answer
+        return answers[key]  # type: ignore[no-any-return]
 
     return remembered

@@ -11,7 +11,6 @@ import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from types import FrameType
 from typing import Any
 
 INTERRUPTED, TERMINATED = 130, 143  # exit codes: 128 and the number of the signal, as shells have it
@@ -28,16 +27,16 @@ class InterruptedByUser(KeyboardInterrupt):
     """Somebody has pressed Ctrl-C; only this is raised for it while `told_apart`."""
 
 
-def _end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+def _end(*_: object) -> None:
     raise TerminatedError
 
 
-def _interrupt(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+def _interrupt(*_: object) -> None:
     raise InterruptedByUser
 
 
 @contextlib.contextmanager
-def _handling(number: int, usual: Any, handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+def _handling(number: int, usual: Any, handler: Callable[..., None]) -> Iterator[None]:
     """Handle a signal in the main thread; a handler that is there already, other than the usual one, stays."""
     if threading.current_thread() is not threading.main_thread() or signal.getsignal(number) != usual:
         yield
@@ -66,10 +65,9 @@ def deferred() -> Iterator[None]:
     For calls of milliseconds: until one is over, Ctrl-C has no effect.
     """
     heard: list[int] = []
-    usual = {}
-    if threading.current_thread() is threading.main_thread():
-        usual = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-        usual = {number: handler for number, handler in usual.items() if callable(handler)}
+    here = threading.current_thread() is threading.main_thread()
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM) if here}
+    usual = {number: handler for number, handler in handlers.items() if callable(handler)}
     try:
         for number in usual:
             signal.signal(number, lambda number, _frame: heard.append(number))
@@ -93,7 +91,7 @@ def at_most(seconds: float | None, *, processor: bool = True) -> Iterator[None]:
         yield
         return
 
-    def stop(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+    def stop(*_: object) -> None:
         raise TimeoutError(f"it was not done after {seconds:g} s")
 
     number, timer = (signal.SIGVTALRM, signal.ITIMER_VIRTUAL) if processor else (signal.SIGALRM, signal.ITIMER_REAL)

@@ -104,12 +104,6 @@ def axis_from_quaternion(quaternion: Array) -> Array:
     return _vectors(right + right, back + back, w * w - x * x - y * y + z * z)
 
 
-def transverse_from_quaternion(quaternion: Array) -> Array:
-    """The first column of the rotation matrix, a body-fixed axis across the top's, shape (..., 3)."""
-    w, x, y, z = _parts(quaternion)
-    return _vectors(w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
-
-
 def theta_from_axis(axis: Array) -> Array:
     """Inclination in [0, pi], accurate at both poles and for axes that are not quite of length one."""
     return np.arctan2(np.sqrt(axis[..., 0] ** 2 + axis[..., 1] ** 2), axis[..., 2])
@@ -297,7 +291,7 @@ READING_SECONDS = 2e-5  # of NumPy beyond what the compiled function takes
 def _read(
     states: Any, p_psi: Any, cosine: Any, sine: Any, twice: float, excess: float, mgl: float, axis: Any, seen: Any
 ) -> None:
-    """Axes (n, 3), and energies and p_theta in the two rows of `seen`, of states (n, 6 or 7)."""
+    """Axes (n, 3), and energies and p_theta in the two rows of `seen` if it has room, of states (n, 6 or 7)."""
     width = states.shape[1]
     for i in range(len(states)):
         if width == 7:
@@ -306,6 +300,8 @@ def _read(
             axis[i, 0], axis[i, 1], axis[i, 2] = right + right, back + back, w * w - x * x - y * y + z * z
         else:
             axis[i, 0], axis[i, 1], axis[i, 2] = states[i, 0], states[i, 1], states[i, 2]
+        if seen.shape[1] == 0:
+            continue
         a, b, c = states[i, width - 3], states[i, width - 2], states[i, width - 1]
         seen[0, i] = (a * a + b * b + c * c) / twice + 0.5 * (p_psi[i] * p_psi[i]) * excess + mgl * axis[i, 2]
         seen[1, i] = a * cosine[i] + b * sine[i]
@@ -319,17 +315,6 @@ _reader = LazyKernel(
 )
 
 
-def _turn(states: Any, axis: Any) -> None:
-    """Axes (n, 3) of states (n, 7)."""
-    for i in range(len(states)):
-        w, x, y, z = states[i, 0], states[i, 1], states[i, 2], states[i, 3]
-        right, back = x * z + w * y, y * z - w * x
-        axis[i, 0], axis[i, 1], axis[i, 2] = right + right, back + back, w * w - x * x - y * y + z * z
-
-
-_turner = LazyKernel(_turn, "(float64[:, ::1], float64[:, ::1])", patience=1.0)
-
-
 def _compilable(*arrays: Array) -> bool:
     """Are these what a compiled function takes: doubles in a row, which may be written to?"""
     return all(array.dtype == np.float64 and array.flags.carray for array in arrays)
@@ -337,11 +322,10 @@ def _compilable(*arrays: Array) -> bool:
 
 def axes(chart: str, states: Array) -> Array:
     """Unit vectors (n, 3) along the top's axis, of states (n, dimension)."""
-    if chart != "attitude" or not _compilable(states) or not _turner.ready(READING_SECONDS / 3.0):
-        seen: Array = axis_of(chart, states)
-        return seen
-    axis = np.empty((len(states), 3))
-    _turner.compiled(states, axis)
+    if chart != "attitude" or not _compilable(states) or not _reader.ready(READING_SECONDS / 3.0):
+        return np.asarray(axis_of(chart, states))
+    axis, none = np.empty((len(states), 3)), np.empty(0)
+    _reader.compiled(states, none, none, none, 1.0, 0.0, 0.0, axis, np.empty((2, 0)))
     return axis
 
 

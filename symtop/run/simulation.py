@@ -10,7 +10,7 @@ import functools
 import math
 import warnings
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -160,17 +160,18 @@ def simulate(
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
     heard = guard if callable(guard) else _warn if boolean("guard", guard) else None
-    run = _prepared(scene, integrator, step_size, tolerance, horizon, samples, observe, budget)
-    trajectory, caution = _guarded(run, heard)
-    chosen, method, plan = run.scene, run.method, run.plan
+    chosen, method, chart, plan, dithered = _prepared(
+        scene, integrator, step_size, tolerance, horizon, samples, observe, budget
+    )
+    trajectory, caution = _guarded(chosen, method, chart, plan, heard)
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(
-        f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=run.chart,
+        f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=chart,
         implementation=method.implementation, horizon=plan.horizon, step_size=plan.step_size, tolerance=plan.tolerance,
         steps=trajectory.steps, force_evaluations=trajectory.force_evaluations,
         newton_iterations=trajectory.newton_iterations, outcome=trajectory.outcome,
         outcome_message=sentence(trajectory.outcome, trajectory.reached_time, plan.horizon),
-        reached_time=trajectory.reached_time, guard=caution, sampling="dithered" if run.dithered else "uniform",
+        reached_time=trajectory.reached_time, guard=caution, sampling="dithered" if dithered else "uniform",
         top=_json(chosen.top), start=_json(chosen.start),
     )  # fmt: skip
     return data
@@ -181,36 +182,28 @@ def integrate(
     **settings: Any,
 ) -> Trajectory:  # fmt: skip
     """The run of `simulate` as plain arrays; without a function for the sentence there is no guard."""
-    return _guarded(_prepared(scene, integrator, **settings), guard)[0]
-
-
-class _Run(NamedTuple):
-    """A run that has not begun: what a solver is called with, and whether its samples are dithered."""
-
-    scene: Scene
-    method: Integrator
-    chart: str
-    plan: Plan
-    dithered: bool
+    chosen, method, chart, plan, _ = _prepared(scene, integrator, **settings)
+    return _guarded(chosen, method, chart, plan, guard)[0]
 
 
 def _prepared(
     scene: "str | Scene", integrator: "str | Integrator", step_size: object = None, tolerance: object = None,
     horizon: object = None, samples: int = 501, observe: str | None = None, budget: object = None,
-) -> _Run:  # fmt: skip
-    """Check the arguments of `simulate`, and choose chart, steps and samples."""
+) -> tuple[Scene, Integrator, str, Plan, bool]:  # fmt: skip
+    """Check the arguments of `simulate`, choose the chart, and lay out steps and samples, which may be dithered."""
     chosen, method = find_scene(scene), find_integrator(integrator)
     end = chosen.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2, MOST_SAMPLES)
     chart = chart_of(method, chosen.observes, observe)
     limit = None if budget is None else positive("budget", budget)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, horizon=end, samples=count, budget=limit)
-    return _Run(chosen, method, chart, plan, dithered)
+    return chosen, method, chart, plan, dithered
 
 
-def _guarded(run: _Run, guard: Callable[[str], object] | None) -> tuple[Trajectory, str]:
+def _guarded(
+    scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None
+) -> tuple[Trajectory, str]:
     """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard."""
-    scene, method, chart, plan, _ = run
     caution = "off" if guard is None else warning(scene, method, chart, plan)
     if caution and guard is not None:
         guard(caution)

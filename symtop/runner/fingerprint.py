@@ -46,42 +46,23 @@ def used(study: Study, case: Case) -> list[str]:
 
 def settings_key(study: Study, case: Case) -> str:
     """Hash of what a case was asked to do, which an edit of the code does not change."""
-    return code_hash.hashed(
-        json.dumps([study.name, case.scene, case.integrator, case.group, dict(case.settings)], sort_keys=True)
-    )
+    asked = [study.name, case.scene, case.integrator, case.group, dict(case.settings)]
+    return code_hash.hashed(json.dumps(asked, sort_keys=True))
 
 
 def reasons(study: Study, case: Case) -> Reasons:
     """Everything that a case's numbers depend on: settings, scene, integrators, code, versions."""
-    return _own(study, case) | _shared(study, case.scene, used(study, case))
-
-
-def _own(study: Study, case: Case) -> Reasons:
-    processor = {"processor": code_hash.processor()} if study.is_timed(case) else {}
-    return {"settings": settings_key(study, case), **processor}
-
-
-def _shared(study: Study, place: str, names: Iterable[str]) -> Reasons:
-    """What all cases of a study on a scene with the same integrators depend on."""
     methods, catalogue = integrators(), scenes()
-    places = {name: catalogue.get(name) for name in (sorted(catalogue) if place == EVERY else [place])}
-    parts = [made_of("measure", study.measure)]
-    parts += [made_of(f"scene {name}", scene) for name, scene in places.items() if scene is not None]
-    parts += [made_of(f"integrator {name}", methods[name]) for name in names]
-    return code_hash.merged(parts) | code_hash.packages()
+    places = sorted(catalogue) if case.scene == EVERY else {case.scene} & catalogue.keys()
+    parts = [made_of("measure", study.measure), code_hash.packages(), {"settings": settings_key(study, case)}]
+    parts += [made_of(f"scene {name}", catalogue[name]) for name in places]
+    parts += [made_of(f"integrator {name}", methods[name]) for name in used(study, case)]
+    return code_hash.merged(parts) | ({"processor": code_hash.processor()} if study.is_timed(case) else {})
 
 
 def digests(study: Study, cases: Iterable[Case]) -> list[str]:
     """Hashes of everything that the numbers of cases depend on."""
-    shared: dict[tuple[str, ...], str] = {}
-
-    def of(case: Case) -> str:
-        names = tuple(used(study, case))
-        if (case.scene, *names) not in shared:
-            shared[case.scene, *names] = code_hash.digest(_shared(study, case.scene, names))
-        return code_hash.digest(_own(study, case) | {"code": shared[case.scene, *names]})
-
-    return [of(case) for case in cases]
+    return [code_hash.digest(reasons(study, case)) for case in cases]
 
 
 def drawing_digest(study: Study, script: Path, *drawing: Any) -> str:

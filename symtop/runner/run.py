@@ -8,66 +8,80 @@ room knows no style.
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError
-from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pebble import ProcessExpired
 
+from symtop.core import files, netcdf
 from symtop.core.code_hash import hashed
-from symtop.core.errors import positive
+from symtop.core.errors import label, positive, shown
 from symtop.core.progress import beating
-from symtop.runner import manifest, plugins, store
-from symtop.runner.analyse import Analysis, Save, analyse, analyse_stored, drawing_digest
+from symtop.model.scenes import scenes
+from symtop.runner import fingerprint, manifest, plugins, store
 from symtop.runner.cases import StudyCases, progress_bar
-from symtop.runner.pool import Pool
+from symtop.runner.pool import Pool, prepare
 from symtop.runner.scripts import file_of, folder, load, names
-from symtop.runner.study import Study
+from symtop.runner.study import (
+    Case,
+    Chart,
+    Combined,
+    Opening,
+    Picture,
+    Study,
+    StudyError,
+    Table,
+    each,
+    failing,
+    refusal,
+    sentences,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["folder", "load", "names", "run", "start"]
 
 Findings = dict[str, Any]
+Save = Callable[["Figure", Path], object]  # writes a picture's figure to a file
 
 
-@dataclass(frozen=True)
-class Started:
+class Started(NamedTuple):
     """A study whose cases are computed: `result` waits for its findings; are they `done`?"""
 
     result: Callable[[], Findings]
     done: Callable[[], bool] = lambda: True
 
 
-def run(study: Study, results: Path, *, quick: bool = False, full: bool = False, fresh: bool = False,
-        jobs: int | None = None, quiet: bool = False, pool: Pool | None = None,
-        limit: float | None = None, save: Save | None = None) -> Findings:  # fmt: skip
-    """Bring a study's dataset, figures and findings up to date; returns the findings.
+def run(study: Study, results: Path, *, jobs: int | None = None, pool: Pool | None = None, **options: Any) -> Findings:
+    """Bring a study's dataset, figures and findings up to date; returns the findings. The options are those of `start`.
 
-    `quick` is the coarse grid, `full` the longest one of a study that has it; `limit` is the time a case may take, in
-    seconds (the study's own by default); `save` writes figures to files, and without it none are drawn. Cases that fail
-    are named in ``failures``, recorded beside the others with their traceback, and tried again the next time.
-    Raises SymtopError if the results cannot be written or nothing could be measured.
+    Cases that fail are named in ``failures``, recorded beside the others with their traceback, and tried again the next
+    time. Raises SymtopError if the results cannot be written or nothing could be measured.
     """
     with Pool(jobs) if pool is None else contextlib.nullcontext(pool) as own:
-        return start(
-            study, results, own, quick=quick, full=full, fresh=fresh, quiet=quiet, limit=limit, save=save
-        ).result()
+        return start(study, results, own, **options).result()
 
 
 def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False,
           fresh: bool = False, quiet: bool = False, limit: float | None = None, save: Save | None = None,
           beside: bool = False) -> Started:  # fmt: skip
-    """Compute the cases of a study that are missing; what is returned waits for its findings (see `run`).
+    """Compute the cases of a study that are missing; what is returned waits for its findings.
 
-    They are made when they are asked for, or `beside` the cases of the next study, in a worker.
+    `quick` is the coarse grid, `full` the longest one of a study that has it; `limit` is the time a case may take, in
+    seconds (the study's own by default); `save` writes figures to files, and without it none are drawn. The findings
+    are made when they are asked for, or `beside` the cases of the next study, in a worker.
     """
     began = time.monotonic()
     results = results.resolve()
     seconds = study.limit if limit is None else positive("limit", limit)
     store.prepare(results, study)
     cases = StudyCases(study, results)
-    first = cases.add(study.grid(quick=quick, full=full))
+    rounds = cases.rounds(quick=quick, full=full)
+    first = next(rounds)
     drawing = drawing_digest(study, save)
     made_of = hashed(*sorted(path.name for path in first), drawing)
     if not fresh and manifest.is_current(results, study.name, made_of):
@@ -75,8 +89,8 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
         if isinstance(known, dict):
             return Started(lambda: known | {"computed": 0, "seconds": time.monotonic() - began})
     try:
-        for new in (lambda: first, lambda: cases.add(cases.second_round())):
-            cases.compute(cases.missing(new(), fresh=fresh), pool, seconds, fresh=fresh, quiet=quiet)
+        for new in chain([first], rounds):
+            cases.compute(cases.missing(new, fresh=fresh), pool, seconds, fresh=fresh, quiet=quiet)
     except BaseException:
         pool.close()  # before what its processes have left is removed
         store.tidy(results, study)
@@ -85,11 +99,9 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
     script = str(file_of(study.name))
     future = None
     if beside and pool.jobs > 1 and not local and study is load(script):
-        work = Analysis(
-            script, results, cases.cases, cases.failures, tuple(plugins.loaded()), made_of, drawing, save, quick
-        )
+        work = script, tuple(plugins.loaded()), results, cases.cases, cases.failures, made_of, drawing, save, quick
         cases.data.clear()  # the worker reads the files
-        future = pool.analyse(analyse_stored, work)
+        future = pool.analyse(analyse_stored, *work)
     computing = time.monotonic() - began
 
     def result() -> Findings:
@@ -100,7 +112,100 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
                 findings = None if future is None else future.result()
             if findings is None:
                 cases.read_all()
-                findings = analyse(cases, made_of, save, quick=quick)
+                findings = analyse(cases, made_of, save, quick)
         return findings | {"computed": cases.computed, "seconds": computing + time.monotonic() - begin}
 
     return Started(result, lambda: future is None or future.done())
+
+
+def analyse_stored(
+    script: str, files_of_plugins: tuple[str, ...], results: Path, stored: dict[Path, Case], failures: list[str],
+    made_of: str, drawing: str, save: Save | None, quick: bool,
+) -> Findings:  # fmt: skip
+    """The findings of a study from the files of its cases; `drawing` is the part of `made_of` that is code."""
+    study = prepare(script, files_of_plugins)
+    cases = StudyCases(study, results, cases=stored, failures=failures)
+    cases.read_all()
+    edited = drawing_digest(study, save) != drawing  # since the cases were computed: drawn again next time
+    return analyse(cases, "" if edited else made_of, save, quick)
+
+
+def drawing_digest(study: Study, save: Save | None) -> str:
+    """Hash of what combines, draws and judges."""
+    return fingerprint.drawing_digest(study, file_of(study.name), store.combine, save)
+
+
+def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> Findings:
+    """Combine, draw, judge and write; `made_of` is noted in the manifest."""
+    study, results, catalogue = cases.study, cases.results, scenes()
+    dataset, words = results / f"{study.name}.nc", results / f"{study.name}.json"
+    with files.locked(dataset, wait=True):
+        for file in (dataset, words):
+            netcdf.sweep(file)
+        combined = cases.combined()
+        places = [catalogue.get(case.scene) for case in cases.cases.values()]
+        units = "SI" if all(place is not None and place.units == "SI" for place in places) else ""
+        combined = netcdf.describe(combined, study.title, units=units, question=study.question)
+        netcdf.write(combined, dataset)
+        store.forget(results, study, cases.cases)
+        findings = findings_of(study, combined, results, save, failures=cases.failures, cases=len(cases.cases))
+        findings["quick"] = quick
+        store.write_json(words, findings)
+        if not cases.failures and made_of:
+            pictures = [results / "figures" / picture["file"] for picture in findings["pictures"]]
+            manifest.note(results, study.name, made_of, [dataset, words, *pictures, *cases.cases])
+    return findings
+
+
+def findings_of(
+    study: Study, data: Combined, results: Path, save: Save | None, *, failures: list[str], cases: int
+) -> Findings:
+    """Draw a dataset and say what it shows, as the report wants it."""
+    verdict = sentences(study.name, lambda: study.verdict(data))
+    tables = each(study.name, "tables", lambda: study.tables(data), Table, "a list of Table")
+    charts = each(study.name, "charts", lambda: study.charts(data), Chart, "a list of Chart")
+    return {
+        "study": study.name,
+        **{name: getattr(study, name) for name in ("title", "question", "how_to_read")},
+        "verdict": verdict,
+        "tables": [table._asdict() for table in tables],
+        "charts": [chart._asdict() for chart in charts],
+        "opening": _opening(study, data),
+        "pictures": []
+        if save is None
+        else [_save(results, study, picture, save) for picture in _pictures(study, data)],
+        "failures": failures,
+        "cases": cases,
+        "quick": False,
+        "provenance": netcdf.provenance(changes=True),
+    }
+
+
+def _opening(study: Study, data: Combined) -> dict[str, Any] | None:
+    if study.opening is None:
+        return None
+    with failing(study.name, "opening"):
+        opening = study.opening(data)
+        if not isinstance(opening, Opening):
+            raise refusal(study.name, "opening", "an Opening", opening)
+        return opening._asdict() | {"table": opening.table._asdict(), "explained": dict(opening.explained)}
+
+
+def _pictures(study: Study, data: Combined) -> Iterator[Picture]:
+    """The pictures one by one; StudyError for what is none."""
+    for picture in each(study.name, "pictures", lambda: study.pictures(data), Picture, "or yield Pictures"):
+        for key in ("name", "caption", "alt", "lead"):
+            if not isinstance(text := getattr(picture, key), str):
+                raise StudyError(f"study {study.name}: a Picture must have a {key} that is text, not {shown(text)}")
+        if not hasattr(picture.figure, "savefig"):
+            kind = type(picture.figure).__name__
+            raise StudyError(f"study {study.name}: the figure of a Picture must be one of matplotlib, not a {kind}")
+        with failing(study.name, "pictures"):
+            label("name of a picture", picture.name)
+        yield picture
+
+
+def _save(results: Path, study: Study, picture: Picture, save: Save) -> dict[str, str]:
+    file = f"{study.name}-{picture.name}.{getattr(picture.figure, 'suffix', 'png')}"  # a film is a GIF
+    save(picture.figure, results / "figures" / file)
+    return {"file": file} | {key: getattr(picture, key) for key in ("name", "caption", "alt", "lead")}

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 import symtop
 from symtop.cli.main import main
 from symtop.judging.battery import CLAIMS, judge
-from symtop.judging.claims import constants, long_run as long, order, pole
+from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.subject import Subject
 from symtop.judging.findings import NOTHING, VERDICTS, Finding, read
 from symtop.measure.conservation import behaviour
@@ -215,7 +215,7 @@ def test_a_method_is_not_explicit_because_it_says_so(name, declared, verdict):
 
 
 def test_the_angles_end_at_a_pole_and_the_space_frame_does_not():
-    angles, *others = pole.passages(symtop.integrator("rk4"))
+    angles, *others = structure.passages(symtop.integrator("rk4"))
     assert (angles.chart, angles.outcome, angles.passes) == ("angles", "left_chart", False)
     assert [one.chart for one in others] == ["axis", "attitude"]
     assert all((one.outcome, one.passes) == ("ok", True) for one in others)

@@ -14,7 +14,7 @@ from benchmarks import accuracy
 from benchmarks.accuracy import LIMITS, deviation, short
 from benchmarks.families import REGIMES, tops
 from symtop.core.errors import SymtopError
-from symtop.model.exact import closed_form, constants, elliptic, layout as at, quad_double, turning_points
+from symtop.model.exact import closed_form, constants, double_double, elliptic, layout as at, samples, turning_points
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.exact.digits import PreciseForm, precise_constants
 from symtop.model.scenes import grazing, scene, sleeping
@@ -44,7 +44,7 @@ def _double(monkeypatch):
         "square": lambda a: (a[0] * a[0], 0.0),
         "root": lambda a: (math.sqrt(max(a[0], 0.0)), 0.0),
     }
-    for module in (turning_points, elliptic, constants, quad_double.dd):
+    for module in (turning_points, elliptic, constants, double_double):
         for name, function in short.items():
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, function)
@@ -133,10 +133,10 @@ def test_compiled_and_interpreted_functions_give_the_same_bits():
         assert out.tobytes() == plain.tobytes()
         if status != constants.DONE:
             continue
-        for view, width in enumerate(closed_form.WIDTHS):
-            shape = (1, width, times.size) if view in closed_form.ROWS else (1, times.size, width)
+        for view, width in enumerate(samples.WIDTHS):
+            shape = (1, width, times.size) if view in samples.ROWS else (1, times.size, width)
             ours, theirs = np.empty(shape), np.empty(shape)
-            closed_form.all_samples([plain.tolist()], [times.tolist()], view, ours)
+            samples.all_samples([plain.tolist()], [times.tolist()], view, ours)
             closed_form._fill.compiled(out, times[None], view, theirs)
             assert ours.tobytes() == theirs.tobytes()
 
@@ -157,7 +157,7 @@ def test_values_at_the_ends_of_the_range_end_in_a_status(numbers):
     closed_form.compile_now()
     plain, out = [0.0] * at.SIZE, np.empty((1, at.SIZE))
     failed = closed_form._build.compiled(np.array([numbers]), out)
-    status = constants.motion_constants(*numbers, plain)
+    status = constants.motion_constants(numbers, plain)
     assert out[0, at.STATUS] == status
     assert failed == (status != constants.DONE)
     assert status in closed_form.REASONS
@@ -175,7 +175,7 @@ def test_a_few_forms_import_no_slow_library():
 
 
 def test_many_samples_are_worth_compiling(monkeypatch):
-    kernel = closed_form.LazyKernel(closed_form.all_samples, closed_form._fill.arguments, patience=0.2)
+    kernel = closed_form.LazyKernel(samples.all_samples, closed_form._fill.arguments, patience=0.2)
     monkeypatch.setattr(kernel, "_is_cached", lambda: False)
     assert not kernel.ready(0.1)
     monkeypatch.setattr(kernel, "compile", lambda: setattr(kernel, "compiled", True))

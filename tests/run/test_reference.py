@@ -163,7 +163,7 @@ def test_the_times_at_which_an_integration_is_read_change_no_bit():
     for precision in ("double", "longdouble", "quad"):
         times = np.array([3.0, 11.0, 20.0])
         both, alone = flown(run, times, precision), integrate(run, times, precision)[0]
-        assert (both.states[both.asked] == alone).all()
+        assert (both.states[both.chosen] == alone).all()
         assert (both.axes == charts.axis_from_quaternion(alone[:, :4])).all()
 
 

@@ -20,7 +20,7 @@ from symtop.cli.main import main
 from symtop.core import files, jit, netcdf
 from symtop.core.errors import SymtopError
 from symtop.core.signals import at_most
-from symtop.runner import execute_case as work, run as runner, store
+from symtop.runner import pool as work, run as runner, store
 from tests.commands import PROBE, contents, ended, leftovers, stop, symtop
 from tests.kills import survive
 

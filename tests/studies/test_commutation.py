@@ -128,17 +128,6 @@ def test_a_method_that_has_no_reduced_twin_is_refused_in_one_sentence():
         commutation_table(symtop.scene("spheroid"), symtop.integrator("rk45"), 1.0, (10,))
 
 
-@pytest.mark.parametrize(("gap", "judged"), [(2e-13, "within"), (3e-4, "more than")])
-def test_the_distance_of_a_kernel_from_its_unreduced_form_is_held_against_rounding(gap, judged):
-    columns = dict.fromkeys((Column.THETA_GAP, Column.PSI_GAP, Column.P_PHI_DRIFT, Column.P_PSI_DRIFT), 1e-15)
-    columns |= {Column.PHI_GAP: gap}
-    data = xr.Dataset({name: (("scene", "variant", "sample"), [[[0.0, value]]]) for name, value in columns.items()},
-                      coords={"scene": ["spheroid"], "variant": ["midpoint"]})  # fmt: skip
-    said = words.same_map(data)
-    assert f"differ by up to {gap:.1e} rad in 10000 steps, {judged} the 1e-11 rad that rounding may reach." in said
-    assert said.endswith("change by up to 1.0e-15, relative.")
-
-
 def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_one():
     dims = ("scene", "variant", "kernel", "twin_step")
     data = xr.Dataset(

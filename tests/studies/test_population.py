@@ -7,16 +7,7 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.population import (
-    costs,
-    ladder,
-    messages,
-    prices as pricing,
-    study,
-    tops as tops_module,
-    verdicts,
-    words,
-)
+from symtop_studies.population import costs, ladder, prices as pricing, study, tops as tops_module, verdicts, words
 from symtop_studies.population.costs import Share, cost_to_reach, detection, quantiles, run_lengths, slowdowns, winner
 from symtop_studies.population.prices import Pair, prices
 from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, numbers_of, strata_of
@@ -34,7 +25,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.run.guard import EXPECTED
-from symtop.runner.check import differences
+from symtop.runner.cases import differences
 
 INF, NAN = math.inf, math.nan
 
@@ -458,14 +449,6 @@ def test_a_method_made_worse_loses():
     _, won = verdicts.best(tree({"a": 2.0 * same["a"], "b": same["b"]}), Cell("short", "axis", 1e-3), "alone")
     assert won.sure
     assert (won.row, won.share, won.next_share) == (1, Share(500, 500), Share(0, 500))
-
-
-def test_what_is_not_zero_is_not_printed_as_zero_and_what_is_not_all_not_as_all():
-    shares = Share(0, 9), Share(1, 9000), Share(32, 9883), Share(1, 2)
-    assert [messages.share_won(share) for share in shares] == ["0%", "<0.1%", "0.3%", "50%"]
-    assert messages.found_of(Share(9998, 10000)) == "all but 2 of 10,000 wrong runs"
-    assert messages.found_of(Share(70, 70)) == "all 70 wrong runs"
-    assert messages.found_of(Share(70, 100), whole=False) == "70.0% of wrong runs"
 
 
 def test_a_winner_by_times_that_are_not_met_again_is_not_sure():

@@ -320,12 +320,8 @@ def _meets(data: Data, phi: float, psi: float, speed: float, c: Any) -> bool:
     """Does the form begin where it should, to rounding, in attitude, theta' and phi' sin theta?"""
     cosine, ax, ay, sine, bx, by, nod, rate = halves(c, 0.0)
     ahead, behind, x, y = 0.5 * (phi + psi), 0.5 * (phi - psi), math.cos(0.5 * data.theta), math.sin(0.5 * data.theta)
-    gap = max(
-        abs(cosine * ax - x * math.cos(ahead)),
-        abs(cosine * ay - x * math.sin(ahead)),
-        abs(sine * bx - y * math.cos(behind)),
-        abs(sine * by - y * math.sin(behind)),
-    )
+    sum_gap = max(abs(cosine * ax - x * math.cos(ahead)), abs(cosine * ay - x * math.sin(ahead)))
+    gap = max(sum_gap, abs(sine * bx - y * math.cos(behind)), abs(sine * by - y * math.sin(behind)))
     if sine < 0.0 and cosine >= 0.0:
         nod = -nod
     across = 2.0 * x * y
@@ -368,10 +364,8 @@ def _lines(data: Data, phi: float, psi: float, a: DoubleDouble, mean: Mean, out:
     if not upright:
         psi_rate, psi_start = neg(psi_rate), neg(psi_start)
     out[at.PERIOD] = mean.period[0]
-    out[at.PHI_PER_PERIOD], out[at.PSI_PER_PERIOD] = (
-        _per_period(phi_rate, mean.period),
-        _per_period(psi_rate, mean.period),
-    )
+    out[at.PHI_PER_PERIOD] = _per_period(phi_rate, mean.period)
+    out[at.PSI_PER_PERIOD] = _per_period(psi_rate, mean.period)
     put_line(out, at.PHI_LINE, phi_rate, phi_start)
     put_line(out, at.PSI_LINE, psi_rate, psi_start)
     put_turns(out, at.PHI_TURNS, phi_rate, phi_start)
@@ -380,28 +374,18 @@ def _lines(data: Data, phi: float, psi: float, a: DoubleDouble, mean: Mean, out:
 
 
 @shared
-def motion_constants(
-    I1: float,
-    I3: float,
-    mgl: float,
-    theta: float,
-    phi: float,
-    psi: float,
-    theta_dot: float,
-    phi_dot: float,
-    psi_dot: float,
-    out: Any,
-) -> int:
-    """Fill in the constants; a status, `DONE` if they can be relied on."""
-    data = Data(I1, I3, mgl, theta, theta_dot, phi_dot, psi_dot)
+def motion_constants(numbers: Any, out: Any) -> int:
+    """Fill in the constants of a row of `symtop.model.top.NUMBERS`; a status, `DONE` if they can be relied on."""
+    data = Data(numbers[0], numbers[1], numbers[2], numbers[3], numbers[6], numbers[7], numbers[8])
+    phi, psi = numbers[4], numbers[5]
     if not _in_range(data, phi, psi):
         return OUT_OF_RANGE
     exact = exact_zeros(data)
     arithmetic, sums, points = _chosen(data, exact)
     for place in range(at.SIZE):
         out[place] = 0.0
-    out[at.ARITHMETIC], out[at.UPRIGHT], out[at.I1] = arithmetic, 1.0 if mgl >= 0.0 else 0.0, I1
-    out[at.P_PSI], out[at.W3] = sums.p_psi[0], div(sums.p_psi, (I3, 0.0))[0]
+    out[at.ARITHMETIC], out[at.UPRIGHT], out[at.I1] = arithmetic, 1.0 if data.mgl >= 0.0 else 0.0, data.I1
+    out[at.P_PSI], out[at.W3] = sums.p_psi[0], div(sums.p_psi, (data.I3, 0.0))[0]
     out[at.ENERGY], out[at.P_PHI] = _conserved(data, sums)
     status, mean = DONE, Mean((math.inf, 0.0), ZERO, ZERO, ZERO, ZERO)
     if exact.separatrix:
@@ -425,7 +409,6 @@ def all_constants(rows: Any, out: Any) -> int:
     """The constants of n tops, of rows (n, 9) of their numbers, with statuses; how many are not to be relied on."""
     failed = 0
     for i in range(len(rows)):
-        one, c = rows[i], out[i]
-        c[at.STATUS] = motion_constants(one[0], one[1], one[2], one[3], one[4], one[5], one[6], one[7], one[8], c)
-        failed += 1 if c[at.STATUS] != DONE else 0
+        out[i][at.STATUS] = motion_constants(rows[i], out[i])
+        failed += 1 if out[i][at.STATUS] != DONE else 0
     return failed

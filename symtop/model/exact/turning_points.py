@@ -38,23 +38,29 @@ import math
 from typing import NamedTuple
 
 from symtop.core.jit_functions import inlined, shared, two_product
-from symtop.model.exact import quad_double as qd
 from symtop.model.exact.double_double import (
     ZERO,
     DoubleDouble,
+    Number,
     add,
     add_double,
     div,
+    doubled,
+    like,
+    minus,
     mul,
+    narrowed,
     neg,
+    plus,
+    quad_sincos,
     root,
     scaled,
     sincos,
     square,
     sub,
+    times,
     two_sum,
 )
-from symtop.model.exact.quad_double import doubled, like, minus, narrowed, plus, times
 
 GRAIN = 1e-31  # relative error of a few operations in double-double
 GRAIN4 = 1e-61  # in quad-double, with three digits to spare
@@ -95,7 +101,7 @@ class Sums(NamedTuple):
 
 
 @shared
-def _sums(data: Data, sine: qd.Number, cosine: qd.Number, grain: float) -> Sums:
+def _sums(data: Data, sine: Number, cosine: Number, grain: float) -> Sums:
     """The sums in the arithmetic of `sine` and `cosine`, those of theta/2."""
     I1, I3, mgl, theta, theta_dot, phi_dot, psi_dot = data
     upright = mgl >= 0.0
@@ -182,7 +188,7 @@ def short_sums(data: Data) -> Sums:
 @shared
 def long_sums(data: Data) -> Sums:
     """The sums in quad-double, rounded to double-double."""
-    sine, cosine = qd.sincos(0.5 * data.theta)
+    sine, cosine = quad_sincos(0.5 * data.theta)
     return _sums(data, sine, cosine, GRAIN4)
 
 
@@ -375,33 +381,23 @@ def turning_points(sums: Sums, exact: Exact, theta_dot: float) -> TurningPoints:
     gap = add(roots.bend, mul(sums.lead, e2))
     if not (gap[0] > 0.0 and (d1[0] > 0.0 or exact.through_down) and (e2[0] > 0.0 or roots.passes_up)):
         return unknown_points()
-    distances = _Distances(d1[0], d2[0], e1[0], e2[0], stiffness[0], gap[0])
+    distances = d1[0], d2[0], e1[0], e2[0], stiffness[0], gap[0]
     rate, value = _bounds(sums, exact, roots, distances)
     swing, bend, passes_up = roots.swing, roots.bend, roots.passes_up
     return TurningPoints(d1, d2, e1, e2, swing, stiffness, bend, gap, roots.x1, roots.x2, passes_up, rate, value)
 
 
-class _Distances(NamedTuple):
-    """High parts of the distances from the poles, of the stiffness and of the gap."""
-
-    d1: float
-    d2: float
-    e1: float
-    e2: float
-    stiffness: float
-    gap: float
-
-
 @shared
-def _bounds(sums: Sums, exact: Exact, roots: _Roots, at: _Distances) -> tuple[float, float]:
+def _bounds(sums: Sums, exact: Exact, roots: _Roots, distances: tuple[float, ...]) -> tuple[float, float]:
     """Bounds of the relative errors of rates and of values; r_ is a relative error, error_ an absolute one."""
+    d1, d2, e1, e2, stiffness, gap = distances  # high parts
     lead, third, total, swing = sums.lead[0], roots.third[0], roots.total[0], roots.swing[0]
     r_up = 0.0 if exact.through_up else sums.twist_up_error / abs(sums.twist_up[0])
     r_down = 0.0 if exact.through_down else sums.twist_down_error / abs(sums.twist_down[0])
     r_third, r_full = 0.0, GRAIN
     if third > 0.0:
         w_error = 2.0 * r_up * sums.twist_up[0] * sums.twist_up[0] / third
-        r_third = GRAIN + (sums.k1_error + sums.k2_error * third + w_error) / (at.gap * (third + at.e1))
+        r_third = GRAIN + (sums.k1_error + sums.k2_error * third + w_error) / (gap * (third + e1))
         r_full += r_third * third / (sums.up[0] + third)
     r_product = GRAIN + r_full
     error_total = (sums.slope_error + lead * roots.product[0] * r_product) / roots.full[0] + abs(total) * r_product
@@ -411,16 +407,16 @@ def _bounds(sums: Sums, exact: Exact, roots: _Roots, at: _Distances) -> tuple[fl
     error_x1, error_x2 = -r_long * roots.x1[0], error_long
     if total > 0.0:
         error_x1, error_x2 = error_long, r_long * roots.x2[0]
-    r_d2, r_e1 = GRAIN + error_x2 / at.d2, GRAIN + error_x1 / at.e1
+    r_d2, r_e1 = GRAIN + error_x2 / d2, GRAIN + error_x1 / e1
     r_d1 = r_e2 = 0.0
     if not exact.through_down:
         by_twist = -roots.x1[0] > 0.5 * sums.down[0]
-        r_d1 = 2.0 * r_down + r_d2 + r_full if by_twist else GRAIN + error_x1 / at.d1
+        r_d1 = 2.0 * r_down + r_d2 + r_full if by_twist else GRAIN + error_x1 / d1
     if not roots.passes_up:
-        r_e2 = GRAIN + error_x2 / at.e2
+        r_e2 = GRAIN + error_x2 / e2
         if roots.x2[0] > 0.5 * sums.up[0]:
             r_e2 = sums.k1_error / abs(sums.k1[0]) + r_e1 if exact.through_up else 2.0 * r_up + r_e1 + r_third
-    r_gap = (r_third * roots.bend[0] + r_e2 * lead * at.e2) / at.gap if lead > 0.0 else GRAIN
-    r_stiffness = r_full + lead * error_x1 / at.stiffness
+    r_gap = (r_third * roots.bend[0] + r_e2 * lead * e2) / gap if lead > 0.0 else GRAIN
+    r_stiffness = r_full + lead * error_x1 / stiffness
     r_p = sums.p_psi_error / abs(sums.p_psi[0]) if sums.p_psi[0] != 0.0 else 0.0
     return max(r_gap, r_d2, r_e1, r_stiffness), max(r_swing, r_d1, r_e2, r_up, r_down, r_p)

@@ -33,7 +33,7 @@ def loaded(path: Path, name: str):
 SCRIPT = """
 import math
 from symtop.methods.runge_kutta import gauss
-from symtop.runner.check import differences
+from symtop.runner.cases import differences
 
 STEPS = (5,)
 CAPTION = "unused"
