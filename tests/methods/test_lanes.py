@@ -1,7 +1,5 @@
 """Members that step side by side in lanes have the bits of runs alone, whatever stands beside them."""
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 
@@ -181,16 +179,6 @@ def test_a_long_run_in_which_lanes_are_given_up_between_samples():
     assert_runs_alone(SOLVERS["strang[axis]"], numbers, h, marks, SOLVERS["strang[axis]"].many(numbers, h, marks))
 
 
-@pytest.mark.parametrize("count", [1, 8, 31, 32, 1000, 100_003])
-def test_what_lanes_step_begins_with_a_line_of_the_cache(count):
-    room = lanes.aligned(count)
-    assert room.shape == (count,)
-    assert room.ctypes.data % 64 == 0
-    assert room.flags.c_contiguous
-    room[:] = 1.0
-    assert room.sum() == count
-
-
 def test_members_stand_in_the_order_of_their_steps_and_uneven_blocks_are_left():
     steps = np.concatenate([np.full(40, 100), [1000, 10_000], np.arange(1, 30)])
     chosen, left = divided(np.arange(len(steps)), steps)
@@ -266,15 +254,6 @@ def test_a_rule_that_is_a_table_of_stages_runs_in_lanes():
     marks = np.tile([0, 10, 50], (40, 1))
     for one, other in zip(solver.many(numbers, steps, marks), strang.many(numbers, steps, marks), strict=True):
         np.testing.assert_array_equal(one, other)
-
-
-def test_threads_get_the_bits_of_one():
-    given = members(300)
-    alone = SOLVERS["strang[axis]"].many(*given)
-    with ThreadPoolExecutor(4) as pool:
-        for made in pool.map(lambda _: SOLVERS["strang[axis]"].many(*given), range(8)):
-            for one, other in zip(made, alone, strict=True):
-                np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.methods.framework.space import field_axis, field_frame, frame_to_attitude, on_axis, on_frame
+from symtop.methods.framework.space import field_axis, frame_to_attitude, on_axis, on_frame
 from symtop.methods.runge_kutta.gauss import STAGES, gauss_rule, march_axis, march_frame
 from symtop.model import charts
 
@@ -162,10 +162,3 @@ def test_a_step_that_nothing_solves_is_reported():
     assert np.isfinite(run["theta"][0])
     wide = symtop.simulate("spheroid", "gauss-2", step_size=0.5, observe="axis", guard=False)
     assert wide.attrs["outcome"] == "ok"
-
-
-def test_the_attitude_says_so_too():
-    scene = symtop.scene("spheroid")
-    par, state = on_frame(scene.top, scene.start)
-    assert len(field_frame(par, state)) == 9
-    assert march_frame(par, gauss_rule(2), state, 1e3, ONE).outcome != 0
