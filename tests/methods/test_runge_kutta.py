@@ -87,7 +87,7 @@ def test_rk4_loses_energy_linearly():
     assert drift.significant
     assert abs(drift.rise) > 1e-3
     assert abs(power.slope - 1.0) < 0.05
-    assert np.all(run["p_phi"] == run["p_phi"][0])  # linear in (e, L): every Runge-Kutta method keeps it
+    assert np.all(run.p_phi == run.p_phi[0])  # linear in (e, L): every Runge-Kutta method keeps it
 
 
 def test_rk4_is_not_reversible():

@@ -24,7 +24,7 @@ def jacobian(par, y):
 
 def newton_step(par, stages, y, h):
     """One step by Newton on all 6 s increments, from zero increments, and the size of the last correction."""
-    mu, b, _ = gauss_rule(stages)
+    mu, b = gauss_rule(stages)[:2]
     parts, change = np.zeros((stages, 6)), math.inf
     for _ in range(30):
         places = y + mu @ parts
@@ -41,7 +41,7 @@ def newton_step(par, stages, y, h):
 
 def sweep_step(par, stages, y, h, sweeps=100):
     """One step by sweeps from h b_i f(y), and the size of the last correction."""
-    mu, b, _ = gauss_rule(stages)
+    mu, b = gauss_rule(stages)[:2]
     parts = np.outer(h * b, field_axis(par, y))
     change = math.inf
     with np.errstate(over="ignore", invalid="ignore"):
