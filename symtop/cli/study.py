@@ -1,4 +1,4 @@
-"""``symtop study``: run studies, show the state of their cases, or compute some again and compare."""
+"""``symtop study``, ``report`` and ``archive``: studies, the page of all findings, and the bundle of all data."""
 
 import sys
 from collections import Counter, deque
@@ -8,16 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from symtop.cli.common import (
-    as_text,
-    completing,
-    filled,
-    json_option,
-    plugin_option,
-    results_option,
-    separated,
-    warn,
-)  # fmt: skip
+from symtop.cli import common
+from symtop.cli.common import File, as_text, completing, json_option, plugin_option, results_option, separated
 from symtop.core.errors import SymtopError, positive
 from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
 from symtop.report.sentences import abridged, counted
@@ -33,9 +25,7 @@ MOST_SENTENCES = 3  # of the findings of a study that has run
 @click.command(short_help="Run studies: datasets, figures and findings.")
 @click.argument("names", nargs=-1, shell_complete=completing("studies"))
 @click.option("--all", "every", is_flag=True, help="Run every study.")
-@click.option(
-    "--quick", is_flag=True, help="Coarse grids, a few seconds a study, into the folder quick of the results."
-)
+@click.option("--quick", is_flag=True, help="Coarse grids, some seconds a study, into the folder quick of the results.")
 @click.option("--full", is_flag=True, help="The longest grid, for the studies that have one.")
 @click.option("--fresh", is_flag=True, help="Compute every case again; with --check, compare every case.")
 @click.option("--status", is_flag=True, help="Print the state of every case; compute nothing.")
@@ -92,7 +82,7 @@ def study(
                 code = run_all(pool, studies, folder, as_json, grid, fresh=fresh, limit=limit)
     except (KeyboardInterrupt, TerminatedError) as stop:
         word, code = ("interrupted", INTERRUPTED) if isinstance(stop, KeyboardInterrupt) else ("terminated", TERMINATED)
-        warn(f"{word}; what was computed is kept, and the same command goes on from there")
+        common.warn(f"{word}; what was computed is kept, and the same command goes on from there")
     sys.exit(code)
 
 
@@ -122,22 +112,24 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
     if not remaining:
         raise reasons[0]
     for reason in reasons:
-        warn(f"{reason}; it is left out")
+        common.warn(f"{reason}; it is left out")
     return remaining
 
 
 def run_all(
-    pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, fresh: bool,
-    limit: float | None,
-) -> int:  # fmt: skip
+    pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], **options: Any
+) -> int:
     """Bring studies up to date, each concluded while the next one is computed; 1 if cases failed."""
     from symtop.report import style
 
     save = style.sketch if grid["quick"] else style.publish  # quick figures are to look at, not to print
-    options = {"fresh": fresh, "limit": limit, "save": save, "beside": len(studies) > 1, **grid}
+    options |= {"save": save, "beside": len(studies) > 1, **grid}
     ended = _in_order(pool, studies, results, options)
     summaries = [_summary(findings, results, as_json) for findings in ended]
-    _end(summaries, results, as_json)
+    if as_json:
+        click.echo(as_text(summaries))
+    elif summaries:
+        click.echo(f"next: symtop report --results {results}, one page of all findings")
     return 1 if any(summary["failures"] for summary in summaries) else 0
 
 
@@ -185,25 +177,16 @@ def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str
     if not as_json:
         drawn = counted(summary["figures"], "figure")
         click.echo("{study}: {computed} of {cases} cases computed, {drawn}".format(drawn=drawn, **summary))
-        for sentence in verdict[:MOST_SENTENCES]:
-            click.echo(filled(f"  - {sentence}"))
         left = len(verdict) - MOST_SENTENCES
         more = f"{counted(left, 'more finding')} in {name}.json" if left > 0 else ""
         pictures = f"figures {results / 'figures' / name}-*" if findings["pictures"] else ""
-        click.echo(filled(f"  dataset {results / name}.nc"))
-        if pictures or more:
-            click.echo(filled(f"  {', '.join(filter(None, (pictures, more)))}"))
+        rest = ", ".join(filter(None, (pictures, more)))
+        for line in (*(f"- {sentence}" for sentence in verdict[:MOST_SENTENCES]), f"dataset {results / name}.nc", rest):
+            if line:
+                click.echo(common.filled(f"  {line}"))
     for failure in findings["failures"]:
         click.echo(f"  {failure}", err=True)
     return summary
-
-
-def _end(summaries: Sequence[dict[str, Any]], results: Path, as_json: bool) -> None:
-    """Print what to do next, or all summaries as JSON."""
-    if as_json:
-        click.echo(as_text(summaries))
-    elif summaries:
-        click.echo(f"next: symtop report --results {results}, one page of all findings")
 
 
 def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool, grid: dict[str, bool]) -> int:
@@ -211,8 +194,6 @@ def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool,
     from symtop.runner import cases
 
     states = {study.name: cases.status(study, results, why=why, **grid) for study in studies}
-    if as_json:
-        click.echo(as_text(states))
     for name, rows in {} if as_json else states.items():
         counts = Counter(row["state"] for row in rows)
         click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in cases.STATES if counts[state]))
@@ -225,7 +206,9 @@ def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool,
             count = f"{len(group)} " if why else ""
             methods, scenes = (list(dict.fromkeys(row[key] for row in group)) for key in ("integrator", "scene"))
             line = f"  {count}{reason}: {abridged(methods, MOST_NAMED)} on {abridged(scenes, MOST_NAMED)}"
-            click.echo(filled(line))
+            click.echo(common.filled(line))
+    if as_json:
+        click.echo(as_text(states))
     return 1 if any(row["state"] == cases.FAILED for rows in states.values() for row in rows) else 0
 
 
@@ -248,3 +231,43 @@ def check_all(
         for difference in entry.differences:
             click.echo(f"  {difference}", err=True)
     return 1 if any(entry.differences for entry in checks) else 0
+
+
+@click.command(short_help="Gather the findings of all studies into one page.")
+@click.option("--embed", is_flag=True, help="Put the figures into the page, for sending it alone.")
+@results_option
+@plugin_option
+def report(results: str, embed: bool) -> None:
+    """Gather the findings of all studies into one page beside its figures.
+
+    If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``. A page that
+    is up to date is not written again.
+    """
+    from symtop.runner import manifest
+
+    folder = Path(results)
+    if not any(folder.glob("*.json")) and any((folder / "quick").glob("*.json")):
+        common.warn(f"{folder} holds no findings; the report is made of those in {folder / 'quick'}")
+        folder /= "quick"
+    made_of = manifest.report_hash(folder, embed=embed)
+    if not click.get_current_context().meta.get(common.PLUGINS) and manifest.is_current(folder, manifest.PAGE, made_of):
+        click.echo(f"report: {folder / manifest.PAGE} (up to date)")
+        return
+    from symtop.report import page
+
+    click.echo(f"report: {page.write(folder, embed=embed)}")
+
+
+@click.command(short_help="Bundle all results for a repository of data.")
+@click.option("--output", type=File(dir_okay=False), help="The zip to write; in the results folder by default.")
+@results_option
+@plugin_option
+def archive(results: str, output: str | None) -> None:
+    """Bundle datasets, findings and report with versions, machine, a description of every variable, and a test set.
+
+    The test set holds the states of all scenes at ten times to 30 digits, for checking other programs.
+    """
+    from symtop.report.archive import bundle
+
+    made = bundle(Path(results), None if output is None else Path(output))
+    click.echo(f"archive: {made} ({made.stat().st_size / 1e6:.1f} MB)")

@@ -71,16 +71,7 @@ class StudyCases:
     def add(self, cases: Iterable[Case]) -> dict[Path, Case]:
         """Take cases in; returns them by their files."""
         chosen = list(cases)
-        try:
-            paths = store.case_paths(self.results, self.study, chosen)
-        except Exception:
-            self.study.check(chosen)
-            if self.study.uses is not None:
-                with failing(self.study.name, "uses"):
-                    for case in chosen:
-                        self.study.uses(case)
-            raise
-        new = dict(zip(paths, chosen, strict=True))
+        new = dict(zip(store.case_paths(self.results, self.study, chosen), chosen, strict=True))
         self.cases |= new
         return new
 
@@ -107,7 +98,7 @@ class StudyCases:
     def compute(self, missing: dict[Path, Case], pool: Pool, limit: float, *, fresh: bool, quiet: bool) -> None:
         """Have cases computed, with a progress bar where somebody is watching."""
         script = str(file_of(self.study.name))
-        tasks = [Task(script, case, path, tuple(plugins.loaded()), limit, fresh) for path, case in missing.items()]
+        tasks = [Task(script, case, path, plugins.loaded(), limit, fresh) for path, case in missing.items()]
         with beating(progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case")) as bar:
 
             def on_result(task: Task, result: Result) -> None:
@@ -144,16 +135,15 @@ def status(
     for path, case in cases.cases.items():
         record = store.read_json(store.failure_path(path))
         earlier = [old for old in older if store.identity_of(old) == store.identity_of(path)]
-        message, causes = "", list[str]()
-        if path in cases.data:
-            state = DONE
-        elif isinstance(record, dict):
-            state, message = FAILED, str(record.get("message", ""))
-        elif earlier:
-            state = STALE
-            causes = changed(study, case, max(earlier, key=lambda old: old.stat().st_mtime)) if why else []
-        else:
-            state, causes = MISSING, other_settings(case, stored) if why else []
+        state, message, causes = DONE, "", list[str]()
+        if path not in cases.data:
+            state = FAILED if isinstance(record, dict) else STALE if earlier else MISSING
+        if state == FAILED:
+            message = str(record.get("message", ""))
+        elif why and state == STALE:
+            causes = changed(study, case, max(earlier, key=lambda old: old.stat().st_mtime))
+        elif why and state == MISSING:
+            causes = other_settings(case, stored)
         row = {"scene": case.scene, "integrator": case.integrator, "state": state, "message": message}
         rows.append(row | ({"why": causes} if why else {}))
     return rows

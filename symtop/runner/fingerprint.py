@@ -16,7 +16,7 @@ from symtop.core import code_hash
 from symtop.core.code_hash import Code, Reasons
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.model.scenes import scenes
-from symtop.runner.study import REFERENCE, Case, Study
+from symtop.runner.study import REFERENCE, Case, Study, failing
 
 EVERY = "*"  # in place of an integrator's or a scene's name: all of them
 _known: dict[tuple[str, int], tuple[object, Reasons]] = {}  # by label and id of a thing, which is held for its id
@@ -39,7 +39,8 @@ def made_of(label: str, thing: object) -> Reasons:
 
 def used(study: Study, case: Case) -> list[str]:
     """Names of the integrators that a case runs, the closed form among them, which others are measured by."""
-    names = {*(case.integrators if study.uses is None else study.uses(case)), REFERENCE}
+    with failing(study.name, "uses"):
+        names = {*(case.integrators if study.uses is None else study.uses(case)), REFERENCE}
     known = integrators().keys()
     return sorted(known if EVERY in names else {split_name(name)[0] for name in names} & known)
 

@@ -5,6 +5,7 @@ last change of each file. Whoever damages a file changes its time; a disk that l
 ``symtop study --check``. Without the manifest everything is read and drawn again, and nothing is computed again.
 """
 
+import contextlib
 import importlib.metadata
 import importlib.util
 import json
@@ -26,23 +27,19 @@ def path_of(results: Path) -> Path:
 
 
 def _entries(results: Path) -> dict[str, Any]:
-    try:
+    with contextlib.suppress(OSError, ValueError):
         content = json.loads(path_of(results).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}
+        return content if isinstance(content, dict) else {}
+    return {}
 
 
-def _marks(results: Path, paths: Iterable[Path]) -> dict[str, list[int]]:
-    """Size and time of the last change (ns) of files by their place in the folder; zeros for one that is missing."""
-    marks = {}
-    for path in paths:
-        try:
-            facts = path.stat()
-            mark = [facts.st_size, facts.st_mtime_ns]
-        except OSError:
-            mark = [0, 0]
-        marks[path.relative_to(results).as_posix()] = mark
+def _marks(results: Path, paths: Iterable[Path]) -> dict[str, list[int] | None]:
+    """Size and time of the last change (ns) of files by their place in the folder; None for one that is missing."""
+    marks: dict[str, list[int] | None] = {path.relative_to(results).as_posix(): None for path in paths}
+    for name in marks:
+        with contextlib.suppress(OSError):
+            facts = (results / name).stat()
+            marks[name] = [facts.st_size, facts.st_mtime_ns]
     return marks
 
 
@@ -52,7 +49,7 @@ def is_current(results: Path, name: str, made_of: str) -> bool:
     if not isinstance(entry, dict) or entry.get("made_of") != made_of or not isinstance(entry.get("files"), dict):
         return False
     known = entry["files"]
-    return [0, 0] not in known.values() and known == _marks(results, [results / file for file in known])
+    return None not in known.values() and known == _marks(results, [results / file for file in known])
 
 
 def note(results: Path, name: str, made_of: str, paths: Iterable[Path]) -> None:

@@ -8,45 +8,28 @@ room knows no style.
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from pebble import ProcessExpired
 
 from symtop.core import files, netcdf
 from symtop.core.code_hash import hashed
-from symtop.core.errors import label, positive, shown
+from symtop.core.errors import positive
 from symtop.core.progress import beating
 from symtop.model.scenes import scenes
 from symtop.runner import fingerprint, manifest, plugins, store
 from symtop.runner.cases import StudyCases, progress_bar
 from symtop.runner.pool import Pool, prepare
 from symtop.runner.scripts import file_of, folder, load, names
-from symtop.runner.study import (
-    Case,
-    Chart,
-    Combined,
-    Opening,
-    Picture,
-    Study,
-    StudyError,
-    Table,
-    each,
-    failing,
-    refusal,
-    sentences,
-)
+from symtop.runner.study import Case, Save, Study, findings_of
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["folder", "load", "names", "run", "start"]
+__all__ = ["findings_of", "folder", "load", "names", "run", "start"]
 
 Findings = dict[str, Any]
-Save = Callable[["Figure", Path], object]  # writes a picture's figure to a file
 
 
 class Started(NamedTuple):
@@ -99,7 +82,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
     script = str(file_of(study.name))
     future = None
     if beside and pool.jobs > 1 and not local and study is load(script):
-        work = script, tuple(plugins.loaded()), results, cases.cases, cases.failures, made_of, drawing, save, quick
+        work = script, plugins.loaded(), results, cases.cases, cases.failures, made_of, drawing, save, quick
         cases.data.clear()  # the worker reads the files
         future = pool.analyse(analyse_stored, *work)
     computing = time.monotonic() - began
@@ -155,57 +138,3 @@ def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> 
             pictures = [results / "figures" / picture["file"] for picture in findings["pictures"]]
             manifest.note(results, study.name, made_of, [dataset, words, *pictures, *cases.cases])
     return findings
-
-
-def findings_of(
-    study: Study, data: Combined, results: Path, save: Save | None, *, failures: list[str], cases: int
-) -> Findings:
-    """Draw a dataset and say what it shows, as the report wants it."""
-    verdict = sentences(study.name, lambda: study.verdict(data))
-    tables = each(study.name, "tables", lambda: study.tables(data), Table, "a list of Table")
-    charts = each(study.name, "charts", lambda: study.charts(data), Chart, "a list of Chart")
-    return {
-        "study": study.name,
-        **{name: getattr(study, name) for name in ("title", "question", "how_to_read")},
-        "verdict": verdict,
-        "tables": [table._asdict() for table in tables],
-        "charts": [chart._asdict() for chart in charts],
-        "opening": _opening(study, data),
-        "pictures": []
-        if save is None
-        else [_save(results, study, picture, save) for picture in _pictures(study, data)],
-        "failures": failures,
-        "cases": cases,
-        "quick": False,
-        "provenance": netcdf.provenance(changes=True),
-    }
-
-
-def _opening(study: Study, data: Combined) -> dict[str, Any] | None:
-    if study.opening is None:
-        return None
-    with failing(study.name, "opening"):
-        opening = study.opening(data)
-        if not isinstance(opening, Opening):
-            raise refusal(study.name, "opening", "an Opening", opening)
-        return opening._asdict() | {"table": opening.table._asdict(), "explained": dict(opening.explained)}
-
-
-def _pictures(study: Study, data: Combined) -> Iterator[Picture]:
-    """The pictures one by one; StudyError for what is none."""
-    for picture in each(study.name, "pictures", lambda: study.pictures(data), Picture, "or yield Pictures"):
-        for key in ("name", "caption", "alt", "lead"):
-            if not isinstance(text := getattr(picture, key), str):
-                raise StudyError(f"study {study.name}: a Picture must have a {key} that is text, not {shown(text)}")
-        if not hasattr(picture.figure, "savefig"):
-            kind = type(picture.figure).__name__
-            raise StudyError(f"study {study.name}: the figure of a Picture must be one of matplotlib, not a {kind}")
-        with failing(study.name, "pictures"):
-            label("name of a picture", picture.name)
-        yield picture
-
-
-def _save(results: Path, study: Study, picture: Picture, save: Save) -> dict[str, str]:
-    file = f"{study.name}-{picture.name}.{getattr(picture.figure, 'suffix', 'png')}"  # a film is a GIF
-    save(picture.figure, results / "figures" / file)
-    return {"file": file} | {key: getattr(picture, key) for key in ("name", "caption", "alt", "lead")}

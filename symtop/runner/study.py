@@ -1,18 +1,18 @@
-"""The declaration of a study; the runner does the rest.
-
-A study is a question, a grid of cases, a function that measures one case, and functions that turn the combined
-dataset into figures, tables and sentences. It holds no numerics of its own.
+"""The declaration of a study: a question, a grid of cases, a function that measures one case, and functions that turn
+the combined dataset into figures, tables and sentences. The runner does the rest.
 """
 
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import xarray as xr
 
+from symtop.core import netcdf
 from symtop.core.errors import SymtopError, foreign_code, label, shown
 from symtop.methods.framework.registry import split_name
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 REFERENCE = "exact"  # the integrator that is the closed form
+Save = Callable[["Figure", Path], object]  # writes a picture's figure to a file
 Combined = xr.Dataset | xr.DataTree  # what a study measured: a tree if its cases are in groups
 LONGEST = 120  # characters of a value that are shown
 
@@ -57,16 +58,10 @@ def each(study: str, function: str, make: Callable[[], Any], kind: type, wanted:
         yield entry
 
 
-def sentences(study: str, verdict: Callable[[], Any]) -> list[str]:
-    """The findings that the verdict of a study returns. Raises StudyError if they are no list of sentences."""
-    return list(each(study, "verdict", verdict, str, "a list of sentences"))
-
-
 class Picture(NamedTuple):
     """A figure of the report: its file name, caption and text for those who cannot see it.
 
-    One with a `lead` opens the report: it is shown small on the first screen, in the order of the studies, under these
-    few words on what it answers.
+    One with a `lead` opens the report: it is shown small on the first screen, under these few words on what it answers.
     """
 
     name: str
@@ -115,7 +110,7 @@ class Opening(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold.
+    """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold, or SymtopError.
 
     A case may measure several integrators against each other: then its dataset has a dimension ``variant``,
     `integrator` names them together and ``settings["integrators"]`` lists them.
@@ -129,6 +124,21 @@ class Case:
     timed: bool = False  # untimed cases must not run beside it, nor timed ones that disturb it
     group: str = ""
 
+    def __post_init__(self) -> None:
+        for name in ("scene", "integrator", "group"):
+            if not isinstance(value := getattr(self, name), str):
+                raise SymtopError(f"{name} must be a name, not {shown(value)[:LONGEST]}")
+        if not isinstance(self.settings, Mapping):
+            raise SymtopError(f"settings must be a mapping of names to values, not {shown(self.settings)[:LONGEST]}")
+        for key, value in self.settings.items():
+            if not isinstance(key, str):
+                raise SymtopError(f"the name of a setting must be text, not {shown(key)[:LONGEST]}")
+            try:
+                json.dumps(value)
+            except (TypeError, ValueError, RecursionError):
+                held = "numbers of Python, text, lists or mappings, which JSON can hold"
+                raise SymtopError(f"setting {key!r} must be {held}, not {shown(value)[:LONGEST]}") from None
+
     @property
     def integrators(self) -> tuple[str, ...]:
         """The integrators that it measures: its own, or those that its settings list."""
@@ -138,23 +148,6 @@ class Case:
     def names(self) -> tuple[str, ...]:
         """The scene and the integrators."""
         return self.scene, *self.integrators
-
-    def flaw(self) -> str:
-        """What of it cannot be stored or compared, in words; empty if nothing is wrong."""
-        for name in ("scene", "integrator", "group"):
-            if not isinstance(value := getattr(self, name), str):
-                return f"{name} must be a name, not {shown(value)[:LONGEST]}"
-        if not isinstance(self.settings, Mapping):
-            return f"settings must be a mapping of names to values, not {shown(self.settings)[:LONGEST]}"
-        for key, value in self.settings.items():
-            if not isinstance(key, str):
-                return f"the name of a setting must be text, not {shown(key)[:LONGEST]}"
-            try:
-                json.dumps(value)
-            except (TypeError, ValueError, RecursionError):
-                held = "numbers of Python, text, lists or mappings, which JSON can hold"
-                return f"setting {key!r} must be {held}, not {shown(value)[:LONGEST]}"
-        return ""
 
     @property
     def label(self) -> str:
@@ -204,12 +197,6 @@ class Study:
     def _listed(self, function: str, make: Callable[[], Any]) -> list[Case]:
         return list(each(self.name, function, make, Case, "a list of Case"))
 
-    def check(self, cases: Iterable[Case]) -> None:
-        """Raise StudyError for the first case that cannot be stored, if there is one."""
-        for case in cases:
-            if flaw := case.flaw():
-                raise StudyError(f"study {self.name}: a Case of {case.integrator} on {case.scene} is wrong: {flaw}")
-
     def only(self, names: Collection[str]) -> "Study":
         """The same study with the cases of some methods, or variants, alone; SymtopError if it has none of them.
 
@@ -220,7 +207,6 @@ class Study:
 
         def chosen(cases: list[Case]) -> list[Case]:
             whole = self._listed("cases", lambda: cases)
-            self.check(whole)
             return [case for case in whole if any({name, split_name(name)[0]} & wanted for name in case.integrators)]
 
         def first(quick: bool) -> list[Case]:
@@ -252,3 +238,50 @@ class Study:
     def is_timed(self, case: Case) -> bool:
         """Are times measured in the case, so that nothing may run beside it that disturbs them?"""
         return self.timed or case.timed
+
+
+def findings_of(
+    study: Study, data: Combined, results: Path, save: Save | None, *, failures: list[str], cases: int
+) -> dict[str, Any]:
+    """Draw a dataset and say what it shows, as the report wants it."""
+    verdict = each(study.name, "verdict", lambda: study.verdict(data), str, "a list of sentences")
+    tables = each(study.name, "tables", lambda: study.tables(data), Table, "a list of Table")
+    charts = each(study.name, "charts", lambda: study.charts(data), Chart, "a list of Chart")
+    return {
+        "study": study.name,
+        **{name: getattr(study, name) for name in ("title", "question", "how_to_read")},
+        "verdict": list(verdict),
+        "tables": [table._asdict() for table in tables],
+        "charts": [chart._asdict() for chart in charts],
+        "opening": None if study.opening is None else _opening(study, study.opening, data),
+        "pictures": [] if save is None else list(_saved(study, data, results, save)),
+        "failures": failures,
+        "cases": cases,
+        "quick": False,
+        "provenance": netcdf.provenance(changes=True),
+    }
+
+
+def _opening(study: Study, make: Callable[[Any], Opening], data: Combined) -> dict[str, Any]:
+    with failing(study.name, "opening"):
+        opening = make(data)
+        if not isinstance(opening, Opening):
+            raise refusal(study.name, "opening", "an Opening", opening)
+        return opening._asdict() | {"table": opening.table._asdict(), "explained": dict(opening.explained)}
+
+
+def _saved(study: Study, data: Combined, results: Path, save: Save) -> Iterator[dict[str, str]]:
+    """Save the pictures one by one; StudyError for what is none."""
+    for picture in each(study.name, "pictures", lambda: study.pictures(data), Picture, "or yield Pictures"):
+        words = {key: getattr(picture, key) for key in ("name", "caption", "alt", "lead")}
+        for key, text in words.items():
+            if not isinstance(text, str):
+                raise StudyError(f"study {study.name}: a Picture must have a {key} that is text, not {shown(text)}")
+        if not hasattr(picture.figure, "savefig"):
+            kind = type(picture.figure).__name__
+            raise StudyError(f"study {study.name}: the figure of a Picture must be one of matplotlib, not a {kind}")
+        with failing(study.name, "pictures"):
+            label("name of a picture", picture.name)
+        file = f"{study.name}-{picture.name}.{getattr(picture.figure, 'suffix', 'png')}"  # a film is a GIF
+        save(picture.figure, results / "figures" / file)
+        yield {"file": file} | words
