@@ -16,8 +16,6 @@ from collections.abc import Callable
 from typing import Any
 
 LOADING, IMPORTING = 0.05, 0.3  # seconds: a kernel from the cache, numba
-
-
 LAZY: "list[LazyKernel]" = []  # of the modules that have been imported
 
 
@@ -54,7 +52,6 @@ class LazyKernel:
                 self.compiled = self._kernel
 
     def _is_cached(self) -> bool:
-        """Is the compiled function in the cache?"""
         if self._kernel is None:
             from numba.core import sigutils  # 0.3 s
 

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from symtop_studies.grid import grid_variants
 
 import symtop
 from symtop.judging.battery import judge
@@ -16,7 +17,6 @@ from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import Plan
 from symtop.model import charts
 from symtop.model.top import flat
-from symtop.runner.grid import grid_variants
 from tests.conftest import random_scenes
 from tests.methods import engine_formulas
 
