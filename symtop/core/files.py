@@ -1,8 +1,8 @@
 """Files: the cache of what can be made again, locks, and Python files that a user names.
 
 The cache holds compiled kernels, references and checkpoints of long runs. Every use of an entry sets its time of
-modification, at most once a day. An entry that nobody used for `UNUSED` days is removed, and then the entries used
-longest ago until the folder is small enough. Another process may be doing the same.
+modification, at most once a day. Entries that nobody used for `UNUSED` days are removed, and those used longest ago
+until the folder is small enough. Another process may be doing the same.
 """
 
 import contextlib
