@@ -1,6 +1,6 @@
 """The scripts of the studies: where they are, their names, and how a Python file is loaded.
 
-A study that ships with symtop is a package, ``symtop_studies.NAME``, whose module ``study`` defines ``STUDY``. These lie
+A study that ships with symtop is a package, ``symtop_studies.NAME``, whose module ``study`` defines ``STUDY``. They lie
 beside symtop, in `studies` in a checkout and in `symtop_studies` in an installed wheel. Any other study is a Python
 file that the user names, alone or in a package, so that it may import what stands beside it.
 """
