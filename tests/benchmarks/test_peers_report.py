@@ -100,7 +100,7 @@ def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_p
 
 def test_what_the_readme_cites_is_in_the_checkout():
     pages = "".join(page.read_text() for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))))
-    cited = set(re.findall(r"results/[\w/-]+\.(?:nc|json|md|png)", pages)) - {"results/NAME.nc"}
+    cited = set(re.findall(r"results/(?:figures/)?[\w-]+\.(?:nc|json|md|png)", pages)) - {"results/NAME.nc"}
     assert {"results/bench.json", "results/peers.nc"} <= cited
     studies = {f"results/{name}.{kind}" for name in runner.names() for kind in ("nc", "json")}
     kept = subprocess.run(["git", "ls-files", "results"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
