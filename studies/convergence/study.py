@@ -3,12 +3,12 @@
 import math
 
 import xarray as xr
+from symtop_studies.grid import grid_scenes
 
 from symtop.measure.order_table import observable, order_table
 from symtop.measure.settings import ladder
 from symtop.methods.framework.registry import integrator, variants
 from symtop.model.scenes import TAGS, scene
-from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
 from . import figures, tables, words

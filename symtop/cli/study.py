@@ -219,18 +219,18 @@ def check_all(
     from symtop.runner.cases import check
 
     checks = [check(study, results, pool, everything=everything, **grid) for study in studies]
-    if not any(entry.stored for entry in checks):
+    if not any(entry["stored"] for entry in checks):
         names = ", ".join(study.name for study in studies)
         raise SymtopError(f"no case of {names} is up to date in {results}; run it first")
     if as_json:
-        click.echo(as_text([entry._asdict() for entry in checks]))
+        click.echo(as_text(checks))
     for entry in [] if as_json else checks:
-        count = len(entry.differences)
+        count = len(entry["differences"])
         verdict = f"{count} differences" if count else "the same to the last bit, times aside"
-        click.echo(f"{entry.study}: {entry.compared} of {entry.stored} cases computed again, {verdict}")
-        for difference in entry.differences:
+        click.echo("{study}: {compared} of {stored} cases computed again, {verdict}".format(verdict=verdict, **entry))
+        for difference in entry["differences"]:
             click.echo(f"  {difference}", err=True)
-    return 1 if any(entry.differences for entry in checks) else 0
+    return 1 if any(entry["differences"] for entry in checks) else 0
 
 
 @click.command(short_help="Gather the findings of all studies into one page.")

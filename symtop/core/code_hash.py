@@ -112,9 +112,7 @@ def add_root(name: str, folder: Path) -> None:
             cached.cache_clear()
 
 
-@functools.cache
-def _path(name: str) -> Path:
-    return Path(name).resolve()
+_path = functools.cache(lambda name: Path(name).resolve())
 
 
 @functools.cache

@@ -3,20 +3,16 @@
 numba stamps a cached kernel with the file of the function itself and does not see edits in the files it calls, so that
 an old kernel can return old numbers in silence; and it compiles again what only moved down by a line. Here the folder
 of a kernel is named after a hash of everything it is compiled from (`symtop.core.code_hash`): instructions, constants
-and values of its functions, wherever they stand, and the versions of Python and numba. A kernel found on disk loads
-a hundred times sooner than it compiles.
-
-Each kernel has a folder of its own, about 100 kilobytes. The first time a process saves a kernel it removes those that
-nobody used for 30 days, and the oldest ones beyond `MOST_BYTES`.
+and values of its functions, wherever they stand, and the versions of Python and numba. The first time a process saves a
+kernel it removes those that nobody used for 30 days, and the oldest ones beyond `MOST_BYTES`.
 
 Beside it stand the operations that numba lacks.
 
     fused     a b + c with one rounding. A number on the grid of its last place plus a correction that hardly changes
               from step to step is rounded the same way every time, a bias of up to half a unit in the last place; the
               exact product has random digits below that grid, and added before the rounding they remove the bias.
-    tables    tuples, whose length a kernel is compiled for, or arrays of any length, multiplied by one instruction an
-              element: LLVM unrolls a loop over a tuple up to about 16 elements and copies the tuple in each pass
-              beyond.
+    times     a row of numbers, each multiplied by one instruction: LLVM unrolls a loop over a tuple up to about 16
+              elements and copies the tuple in each pass beyond.
 """
 
 import contextlib
@@ -156,10 +152,7 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """numba's cache of one kernel, in a folder whose name says all there is to know of it.
-
-    A cache on a full disk, or a damaged one, costs a compilation and not the run.
-    """
+    """numba's cache of one kernel in its folder; a full disk or a damaged cache costs a compilation and not the run."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._name, self._py_func = repr(function), function
@@ -221,9 +214,8 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
 
 @by_name
 def compile_kernel(function: Callable[..., Any]) -> Any:
-    """``njit`` with the disk cache.
+    """``njit`` with the disk cache; division by zero gives infinity, as in C.
 
-    Division by zero gives infinity, as in C: the kernel's outcome says what became of it.
     A kernel with functions typed at a prompt, which have no source file, compiles without the cache. The constructor of
     a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
     """

@@ -1,10 +1,9 @@
 """Requests of the user, heard as exceptions of their own: to end (SIGTERM), and to interrupt (SIGINT).
 
-Partial files, workers and checkpoints are seen to. An exception of its own tells a request from what a plug-in raises.
-
-An exception may start between any two instructions, also between taking a lock and entering the block that gives it
-back. Where a library does so (xarray's lock of HDF5: one in twenty writes that were interrupted left it taken, and the
-next write waited for ever), a request is `deferred` until the library is done.
+An exception of its own tells a request from what a plug-in raises. It may start between any two instructions, also
+between taking a lock and entering the block that gives it back. Where a library does so (xarray's lock of HDF5: one in
+twenty writes that were interrupted left it taken, and the next write waited for ever), a request is `deferred` until
+the library is done.
 """
 
 import contextlib
@@ -35,17 +34,21 @@ def _interrupt(*_: object) -> None:
     raise InterruptedByUser
 
 
+def _in_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()
+
+
 @contextlib.contextmanager
 def _handling(number: int, usual: Any, handler: Callable[..., None]) -> Iterator[None]:
     """Handle a signal in the main thread; a handler that is there already, other than the usual one, stays."""
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(number) != usual:
-        yield
-        return
-    signal.signal(number, handler)
+    ours = _in_main_thread() and signal.getsignal(number) == usual
     try:
+        if ours:
+            signal.signal(number, handler)
         yield
     finally:
-        signal.signal(number, usual)
+        if ours:
+            signal.signal(number, usual)
 
 
 def ending_on_sigterm() -> contextlib.AbstractContextManager[None]:
@@ -65,8 +68,7 @@ def deferred() -> Iterator[None]:
     For calls of milliseconds: until one is over, Ctrl-C has no effect.
     """
     heard: list[int] = []
-    here = threading.current_thread() is threading.main_thread()
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM) if here}
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM) if _in_main_thread()}
     usual = {number: handler for number, handler in handlers.items() if callable(handler)}
     try:
         for number in usual:
@@ -86,8 +88,7 @@ def at_most(seconds: float | None, *, processor: bool = True) -> Iterator[None]:
     It is raised again each second, for code that catches everything. Compiled code hears it when it returns; elsewhere,
     where the system has no such timer, and for None, there is no limit.
     """
-    main = threading.current_thread() is threading.main_thread()
-    if seconds is None or not main or not hasattr(signal, "setitimer"):
+    if seconds is None or not _in_main_thread() or not hasattr(signal, "setitimer"):
         yield
         return
 

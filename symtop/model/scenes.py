@@ -1,7 +1,6 @@
 """Scenes: one top, one start, one horizon, and what the scene is there to show.
 
-The horizon and all times are in the units of the top (seconds, if its parameters are SI). Where a start
-follows from a formula, the formula stands beside it.
+The horizon and all times are in the units of the top (seconds, if its parameters are SI).
 """
 
 import functools
@@ -158,8 +157,8 @@ def spinning(spin: float, precession: float = 0.0) -> Scene:
 def grazing(delta: float) -> Scene:
     """The family over the gap p_phi - p_psi = `delta`: a fall towards the upper pole that misses it by 1.1 delta.
 
-    I1 = I3 = mgl = p_psi = 1, p_phi = 1 + delta, theta = 1, theta' = -1.2; the horizon is one nutation. The axis passes
-    the pole at abs(theta') of about 1.2, so that the passage lasts about delta and turns phi by half a turn.
+    I1 = I3 = mgl = p_psi = 1, p_phi = 1 + delta, theta = 1, theta' = -1.2; the horizon is one nutation. The passage
+    lasts about delta and turns phi by half a turn.
     """
     gap, theta = finite("delta", delta), 1.0
     cosine = math.cos(theta)
@@ -197,15 +196,11 @@ def steady(spin: float) -> Scene:
 
 
 def _named(scene: Scene, name: str, purpose: str, *tags: str) -> Scene:
-    """A member of a family under a name of its own."""
     return replace(scene, name=name, purpose=purpose, tags=[*scene.tags, *tags])
 
 
 def _separatrix() -> Scene:
-    """Woodhouse, Introduction to Analytical Dynamics, problem 5.3: u = cos theta = 1/(1 + sech g t), g^2 = mgl/I1.
-
-    theta0 = pi/3, phi' = 2g/sqrt 3, psi' = (3 I1 - I3) g/(I3 sqrt 3).
-    """
+    """Woodhouse, Introduction to Analytical Dynamics, problem 5.3: u = cos theta = 1/(1 + sech g t), g^2 = mgl/I1."""
     top = SymmetricTop(2.0, 1.0, 2.0)
     g, root = math.sqrt(top.mgl / top.I1), math.sqrt(3.0)
     start = Angles(math.pi / 3.0, phi_dot=2.0 * g / root, psi_dot=(3.0 * top.I1 - top.I3) * g / (top.I3 * root))
@@ -339,15 +334,12 @@ def start_energies(numbers: Array) -> Array:
     """Total energy of the starts, (n,)."""
     I1, I3, mgl, theta, _, _, theta_dot, phi_dot, psi_dot = numbers.T
     across = theta_dot**2 + (phi_dot * np.sin(theta)) ** 2
-    total: Array = 0.5 * I1 * across + 0.5 * I3 * (psi_dot + phi_dot * np.cos(theta)) ** 2 + mgl * np.cos(theta)
-    return total
+    spin = psi_dot + phi_dot * np.cos(theta)
+    return np.asarray(0.5 * I1 * across + 0.5 * I3 * spin**2 + mgl * np.cos(theta))
 
 
 def energy_scales(numbers: Array, theta_range: Array) -> Array:
-    """`Scene.energy_scale` of all, (n,); `theta_range` (n, 2) holds the turning points, rad.
-
-    The lowest place of V lies between the turning points and is found by bisection of its slope.
-    """
+    """`Scene.energy_scale` of all, (n,), by bisection of V' between the turning points, `theta_range` (n, 2) in rad."""
     I1, mgl = numbers[:, 0], numbers[:, 2]
     _, _, north, south = start_momenta(numbers)
     low, high = np.clip(theta_range.T, NEXT_TO_POLE, math.pi - NEXT_TO_POLE)

@@ -84,10 +84,7 @@ def _euler_angles(theta: float, total: float, difference: float, rates: Sequence
 
 @inlined
 def effective_force(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
-    """Return ``V'(theta)``, ``phi'`` and ``cos theta``: all that one kick of the reduced top needs.
-
-    Works on floats and on arrays, and compiles as it stands. Costs one sine and one cosine.
-    """
+    """Return ``V'(theta)``, ``phi'`` and ``cos theta``, on floats, on arrays or compiled: all that one kick needs."""
     return half_angle_force(np.sin(0.5 * theta), np.cos(0.5 * theta), north, south, I1, mgl)
 
 
@@ -104,12 +101,9 @@ def half_angle_force(sin_x: Any, cos_x: Any, north: Any, south: Any, I1: Any, mg
 @inlined
 def effective_stiffness(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
     """Return ``V''(theta)``; at a steady precession ``sqrt(V''/I1)`` is the nutation frequency."""
-    sin_x = np.sin(0.5 * theta)
-    cos_x = np.cos(0.5 * theta)
-    up = north / (sin_x * sin_x)
-    down = south / (cos_x * cos_x)
-    tilt = sin_x * cos_x
-    slope = 0.5 * (down - up)
+    sin_x, cos_x = np.sin(0.5 * theta), np.cos(0.5 * theta)
+    up, down = north / (sin_x * sin_x), south / (cos_x * cos_x)
+    tilt, slope = sin_x * cos_x, 0.5 * (down - up)
     bend = 0.5 * (down * sin_x / cos_x + up * cos_x / sin_x)
     return (slope * slope + tilt * (up + down) * bend) / (4.0 * I1) - mgl * (cos_x * cos_x - sin_x * sin_x)
 
@@ -117,8 +111,7 @@ def effective_stiffness(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -
 @inlined
 def effective_potential(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
     """Return ``V(theta)``, without the constant ``p_psi^2 / 2 I3``."""
-    sin_x = np.sin(0.5 * theta)
-    cos_x = np.cos(0.5 * theta)
+    sin_x, cos_x = np.sin(0.5 * theta), np.cos(0.5 * theta)
     lever = north * cos_x / sin_x + south * sin_x / cos_x
     return lever * lever / (8.0 * I1) + mgl * (cos_x * cos_x - sin_x * sin_x)
 
@@ -280,9 +273,9 @@ class SymmetricTop:
         return cls(across + mass * arm * arm, axial, mass * not_negative("gravity", gravity) * arm)
 
     def spheroid_radii(self, mass: float) -> tuple[float, float]:
-        """Polar and equatorial radius of the solid spheroid that has this inertia about its centre.
+        """Polar and equatorial radius of the solid spheroid of `from_spheroid` without a pivot distance.
 
-        The way back of `from_spheroid` without a pivot distance. Raises SymtopError where there is no such body.
+        Raises SymtopError where there is no such body.
         """
         square = 5.0 * self.I3 / (2.0 * positive("mass", mass))
         rest = 5.0 * self.I1 / mass - square

@@ -234,8 +234,8 @@ def _adaptive_forecast(
 ) -> tuple[float, Probe]:
     """The same of an adaptive method, whose work is known when a first piece has been probed.
 
-    Where the work that is `AFFORDED` reaches further, the probe is taken again, as long as that, up to the whole run:
-    then nothing is left to be grown. Elsewhere an error below what was asked for is luck.
+    Where `AFFORDED` work reaches further, a longer probe is taken, up to the whole run. Elsewhere an error below the
+    tolerance is luck.
     """
     cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
     least = twice if cheap.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0

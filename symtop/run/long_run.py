@@ -29,8 +29,7 @@ from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
 from symtop.core.progress import beating
 from symtop.core.signals import ending_on_sigterm
-from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.loop import Loop, Position
+from symtop.methods.framework.loop import FixedStep, Loop, Position, inside
 from symtop.methods.framework.plan import OK, OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.charts import View
@@ -80,8 +79,8 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     """Relative changes of energy, modified energy and momenta since the start, and theta, of any samples of a run.
 
     The oscillation that the modified energy leaves is fitted on the first `FIRST` steps, which are run here. States are
-    the loop's own, or, where they are `shown`, those of the chart. The energy is that of the momenta that the run shows
-    unless the method conserves them: then those of the start have more digits.
+    the loop's own, or, where `shown`, those of the chart. The energy is that of the momenta that the run shows unless
+    the method conserves them: then those of the start have more digits.
     """
     chart, solver = chart_of(method)
     par, rule, state = solver.setup(scene.top, scene.start, h)

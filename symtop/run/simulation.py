@@ -1,9 +1,8 @@
 """simulate(): one scene, one integrator, one step or tolerance -> one dataset.
 
-Samples never bend the step: a fixed-step run has h = T/N exactly and is sampled at whole steps, t = k h. Samples
-are uniform unless they would fall on the same few phases of the nutation again and again (an energy error
-that is sampled at multiples of the nutation period reads 1e5 times too small); then they are dithered by the
-golden ratio, and the dataset says so.
+Samples never bend the step: a fixed-step run has h = T/N exactly and is sampled at whole steps, t = k h. Samples are
+uniform unless they would fall on the same few phases of the nutation again and again (where an energy error may read
+1e5 times too small); then they are dithered by the golden ratio, and the dataset says so.
 """
 
 import functools
@@ -151,18 +150,16 @@ def simulate(
     ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step. A whole number of
     steps fills the horizon, the one nearest to horizon/step_size: the attribute ``step_size`` is the step made.
 
-    Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a
-    large error is expected; the run is the same either way. Give a function to be handed the sentence instead, or
-    False for no warning. `budget` is the most steps of a fixed-step run
-    (`MOST_STEPS` by default; more are refused) and the most force evaluations, or Taylor steps, of an adaptive one,
-    which then ends `out_of_budget` (by default after about half a minute).
+    Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
+    error is expected; the run is the same either way. Give a function to be handed the sentence instead, or False for
+    no warning. `budget` is the most steps of a fixed-step run (`MOST_STEPS` by default; more are refused) and the most
+    force evaluations, or Taylor steps, of an adaptive one, which then ends `out_of_budget`.
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
     heard = guard if callable(guard) else _warn if boolean("guard", guard) else None
-    chosen, method, chart, plan, dithered = _prepared(
-        scene, integrator, step_size, tolerance, horizon, samples, observe, budget
-    )
+    given = scene, integrator, step_size, tolerance, horizon, samples, observe, budget
+    chosen, method, chart, plan, dithered = _prepared(*given)
     trajectory, caution = _guarded(chosen, method, chart, plan, heard)
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(

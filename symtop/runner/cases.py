@@ -16,7 +16,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 import xarray as xr
@@ -175,19 +175,13 @@ def _attribute(path: Path, name: str) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-class Checked(NamedTuple):
-    """The outcome of checking one study."""
-
-    study: str
-    stored: int  # cases that are up to date on disk
-    compared: int
-    differences: list[str]
-
-
 def check(
     study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False, everything: bool = False
-) -> Checked:
-    """Compute `SAMPLE` stored cases again, or every one, and compare; likewise the dataset that they make together."""
+) -> dict[str, Any]:
+    """Compute `SAMPLE` stored cases again, or every one, and compare; likewise the dataset that they make together.
+
+    Returns how many are ``stored`` and up to date, how many were ``compared``, and the ``differences`` in words.
+    """
     cases = StudyCases.stored(study, results, quick=quick, full=full)
     # in the order of their digests, so that a sample is one of all parts of the grid
     stored = sorted(cases.data.items(), key=lambda item: store.digest_of(item[0]))
@@ -205,7 +199,7 @@ def check(
     if whole.is_file() and len(stored) == len(cases.cases):
         pair = differences(netcdf.read_any(whole), cases.combined(), attributes=False)
         differing += [f"{whole.name}: {text}" for text in pair]
-    return Checked(study.name, len(stored), len(chosen), differing)
+    return {"study": study.name, "stored": len(stored), "compared": len(chosen), "differences": differing}
 
 
 def differences(stored: Combined, again: Combined, *, attributes: bool = True) -> list[str]:

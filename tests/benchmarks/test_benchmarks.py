@@ -8,8 +8,8 @@ import pytest
 from benchmarks import bench, ensemble, kernels, lanes, measured, targets, truth, twin, whole_run
 from symtop.measure.timing import Timing, timings
 from symtop.methods.framework import loop as loops
-from symtop.methods.framework.fixed_step import inside
-from symtop.methods.framework.many import Many
+from symtop.methods.framework.lanes import Many
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import methods
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForms

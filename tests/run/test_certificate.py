@@ -14,7 +14,7 @@ from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import Scene, closed_form, scene, scenes
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.reference import truth as module
-from symtop.run.reference.independent_checks import MAP_STEPS, iterated, iterated_with_error
+from symtop.run.reference.independent_checks import MAP_STEPS, iterate_map, iterate_map_with_error
 from symtop.run.reference.truth import (
     ROUNDING,
     SUSPICIOUS,
@@ -131,12 +131,12 @@ def test_the_discrete_map_as_a_witness_knows_its_own_error_and_is_no_echo(monkey
     where = scene("spheroid")
     times = where.nutation_period * np.array([0.3, 7.7, 100.0])
     truth = closed_form(where).quaternion(times)
-    attitudes, steps = iterated(where, times)
+    attitudes, steps = iterate_map(where, times)
     assert charts.attitude_distance(attitudes, truth).max() < 1e-12
     assert steps == sum(math.ceil(nutations * MAP_STEPS[0]) for nutations in (0.3, 7.7, 100.0))
     other = Scene("other", SymmetricTop(where.top.I1, where.top.I3, where.top.mgl * (1.0 + 1e-9)), where.start, 8.0)
     assert module._against_map(where)[1] < SUSPICIOUS
-    monkeypatch.setattr(module, "iterated_with_error", lambda _, times: iterated_with_error(other, times))
+    monkeypatch.setattr(module, "iterated_with_error", lambda _, times: iterate_map_with_error(other, times))
     assert module._against_map(where)[1] > 1e-9
     made = Certificate(1.0, 1, 0.1, 1.0, module._against_map(where)[1], 0.0)
     assert made.doubt == made.map_apart

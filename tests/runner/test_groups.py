@@ -41,11 +41,6 @@ def test_a_tree_is_read_as_it_was_written(tmp_path):
     assert again["phases/energy"].dtype == np.uint8
     assert again.attrs["question"] == "Does it come back?"
     assert again["windows/energy"].attrs["long_name"] == "total energy"
-    flat = netcdf.write(LONG, tmp_path / "flat.nc")
-    assert isinstance(netcdf.read_any(flat), xr.Dataset)
-    path.write_bytes(path.read_bytes()[:2000])
-    with pytest.raises(SymtopError, match="cannot read"):
-        netcdf.read_any(path)
 
 
 def test_a_check_names_the_group_that_differs():

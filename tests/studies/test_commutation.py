@@ -13,8 +13,7 @@ from symtop_studies.reduction.tables import Column, commutation_table, unreduced
 import symtop
 from symtop.measure.order import power_law
 from symtop.methods.framework import registry
-from symtop.methods.lagrangian.discrete_lagrangian import rule_of
-from symtop.methods.lagrangian.quadrature import Quadrature
+from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, rule_of
 from tests.conftest import random_scenes
 
 SCENES = ("spheroid", "goldstein")
@@ -140,3 +139,8 @@ def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_on
     first, second = words.savings(data)
     assert (first.time, first.more, first.each) == pytest.approx((2.0, 1.5, 4.0 / 3.0))
     assert (second.time, second.more, second.each) == pytest.approx((3.0, 3.0, 1.0))
+
+
+def test_a_kernel_is_known_under_any_name():
+    assert commutation.is_galerkin(dataclasses.replace(symtop.integrator("galerkin-simpson"), name="mine"))
+    assert not commutation.is_galerkin(symtop.integrator("midpoint"))

@@ -16,7 +16,7 @@ from symtop_studies.drift.variants import charts_table
 import symtop
 from symtop.judging.claims.constants import KEPT, Constant
 from symtop.measure.conservation import CONSTANTS, Changed
-from symtop.methods.framework.many import LEAST
+from symtop.methods.framework.lanes import LEAST
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import scene
 from symtop.run.long_run import QUANTITIES, long_run

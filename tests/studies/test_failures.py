@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from symtop_studies.grid import grid_variants
 from symtop_studies.stability import study
 from symtop_studies.stability.failures import (
     sampled_energy_error,
@@ -30,7 +31,6 @@ from symtop.model.charts import View, axis_of
 from symtop.model.scenes import Scene, closed_form, grazing, sleeping
 from symtop.model.top import Angles, SymmetricTop, effective_force
 from symtop.run.linear_stability import trace, with_momenta
-from symtop.runner.grid import grid_variants
 
 STEADY = scenes.scene("steady-fast")  # I1, I3, mgl, theta, w3 = 2, 1, 2, 60 degrees, 20
 OMEGA = STEADY.top.nutation_frequency(STEADY.top.momenta(STEADY.start))

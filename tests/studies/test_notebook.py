@@ -25,7 +25,7 @@ from symtop.core.errors import SymtopError
 from symtop.measure.order import power_law
 from symtop.methods.framework.angles import accelerations, momenta
 from symtop.methods.framework.plan import Plan
-from symtop.methods.lagrangian.quadrature import RULES
+from symtop.methods.lagrangian.discrete_lagrangian import RULES
 from symtop.run.modified_energy import modified_energy
 
 FIRST = symtop.scene("spheroid").top

@@ -48,7 +48,7 @@ from symtop.measure.settings import ladder
 from symtop.measure.step_map import generic_start, restart_gap
 from symtop.measure.step_series import AGREES, SURE, Series, compared, step_series
 from symtop.methods.framework.equations import FORMULATIONS
-from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import Array, sentence
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.framework.registry import Integrator

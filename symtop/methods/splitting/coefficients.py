@@ -8,10 +8,9 @@ Three shapes:
     kick_first     b_0 .. b_n with neither end zero, n forces a step
     drift_first    b_0 = b_n = 0: n - 1 forces and n drifts a step
 
-Only the outer coefficients are written down, as published. The inner ones close the sum: a sum that is wrong by one
-rounding is a systematic error, it runs the clock too fast. Every method of quadrature order p has
-sum_i b_i t_i^k = 1/(k + 1) for k < p, t_i the sum of the drifts before kick i, whatever the two flows are; that is what
-the first number of a generalised order (8, 6, 4) says [McLachlan, BIT 35 (1995) 258].
+Only the outer coefficients are written down, as published; the inner ones close the sum. Every method of quadrature
+order p has sum_i b_i t_i^k = 1/(k + 1) for k < p, t_i the sum of the drifts before kick i, whatever the two flows are:
+the first number of a generalised order (8, 6, 4) [McLachlan, BIT 35 (1995) 258].
 """
 
 import math

@@ -12,20 +12,19 @@ the axis is near and one to the pole that it is far from; up to a common real fa
     m >  1/2    near = cosh s P + i sinh s P, far = P + i sinh 2s P,   s = pi K x/2K',  C = cosh 2s,  nome exp(-pi K/K')
 
 The second line is Jacobi's imaginary transformation. The nome is at most exp(-pi) = 0.043 either way: the first dropped
-term is below 1e-19, m -> 1 is no special case, and m = 0 is trigonometry. As abs(x) <= 1/2, everything is relatively
-accurate at both turning points, however closely the axis grazes a pole there. Then
+term is below 1e-19, and m -> 1 is no special case. As abs(x) <= 1/2, everything is relatively accurate at both turning
+points, however closely the axis grazes a pole there. Then
 
     theta = 2 atan2(abs B, abs A),        (phi +- psi)/2 = mean rate t + (argument - its mean growth) + const,
     theta' sin theta = const theta_1(2z)/theta_4(z)^4,        u - u1, u2 - u = const theta_k(z)^2/theta_4(z)^2.
 
 The phase and the secular angles are products of t with rates of two doubles, so that the error of theta does not grow
-with time, and that of phi and psi only as their last digit does. No special functions, and nothing is expanded in the
-amplitude: not to be confused with the small-nutation approximation. Constants: `symtop.model.exact.constants`, and in
-40 digits `symtop.model.exact.digits`; evaluation: `symtop.model.exact.samples`. Sources: Klein and Sommerfeld, Theory
-of the Top, chapter 6; Whittaker and Watson, A Course of Modern Analysis, chapter 21.
+with time, and that of phi and psi only as their last digit does. Nothing is expanded in the amplitude. Constants:
+`symtop.model.exact.constants`, and in 40 digits `symtop.model.exact.digits`; evaluation: `symtop.model.exact.samples`.
+Sources: Klein and Sommerfeld, Theory of the Top, chapter 6; Whittaker and Watson, A Course of Modern Analysis, 21.
 
 Both classes loop over their members with the same compiled functions, so that a member has the bits of its own closed
-form. The functions release the interpreter's lock and write to arrays of their own: threads may share the work.
+form; the functions release the interpreter's lock, and threads may share the work.
 """
 
 from functools import cached_property
@@ -44,8 +43,7 @@ from symtop.model.exact.constants import DONE, OUT_OF_RANGE, UNMET, UNRESOLVED, 
 from symtop.model.exact.digits import Motion
 from symtop.model.top import LARGEST, NUMBERS, Angles, SymmetricTop, flat
 
-KINDS = (at.EXACTLY, at.DOUBLE_DOUBLE, at.QUAD_DOUBLE, at.DIGITS)
-ARITHMETIC = dict(zip(KINDS, ("double", "double-double", "quad-double", "40 digits"), strict=True))
+ARITHMETIC = ("double", "double-double", "quad-double", "40 digits")  # by `layout.EXACTLY`, `layout.DOUBLE_DOUBLE`, ...
 REASONS = {
     DONE: "",
     OUT_OF_RANGE: "the data or the turning points leave the range in which squares of doubles keep their digits",
@@ -77,10 +75,7 @@ def _constant(place: int, words: str) -> property:
 
 
 class _Form:
-    """What one closed form and many have in common: constants, and views of the motion at given times.
-
-    Shapes are those of a `ClosedForm`; those of many `ClosedForms` begin with the member.
-    """
+    """Constants and views of the motion; shapes are those of a `ClosedForm`, with the member first in `ClosedForms`."""
 
     energy = _constant(at.ENERGY, "Total energy, p_psi^2/2 I3 included.")
     p_phi = _constant(at.P_PHI, "Momentum conjugate to phi.")
@@ -120,14 +115,14 @@ class ClosedForm(_Form):
     finite; so does construction if the axis comes within 1e-145 of a pole that it does not meet.
 
     The constants are double-double numbers. Where a bound says that this is too little they come from quad-double sums,
-    and where that is too little, too, from 40 digits, which takes a thousand times as long: see `provenance`.
+    and where that is too little, too, from 40 digits: see `provenance`.
 
     `nutation_period` is that of small nutations for a steady precession, and infinite where the axis stands on an
     unstable pole or climbs to it for ever; `phi_per_period`, `psi_per_period` are the mean growth over it (0 if the
     mean rate is 0) and `theta_range` the two turning points, radians.
 
     Where the axis passes exactly through a pole, theta' changes sign, and phi and psi jump by pi there and back in
-    turn; `axis`, `quaternion` and `momentum` are smooth. On a pole only phi + psi (phi - psi at pi) has a meaning.
+    turn. On a pole only phi + psi (phi - psi at pi) has a meaning.
     """
 
     def __init__(self, top: SymmetricTop, start: Angles) -> None:
@@ -143,7 +138,7 @@ class ClosedForm(_Form):
     @property
     def provenance(self) -> Provenance:
         """The arithmetic that served for the constants, the bound that it left, and why it was not a shorter one."""
-        kind = float(self._constants[at.ARITHMETIC])
+        kind = int(self._constants[at.ARITHMETIC])
         error = DIGITS_ERROR if kind == at.DIGITS else float(self._constants[at.RATE_ERROR])
         return Provenance(ARITHMETIC[kind], error, REASONS[int(self._constants[at.STATUS])])
 
@@ -159,14 +154,12 @@ class ClosedForm(_Form):
         return Motion(*motion) if len(shape) == 1 else Motion(*(row.reshape(shape) for row in motion))
 
     def turns(self, times: Array) -> Array:
-        """phi and psi alone (2, n) at a row of times, with the bits of a call, at two thirds of its cost."""
-        rows: Array = fill(self._all, _in_a_row(times)[0], samples.TURNS)[0]
-        return rows
+        """phi and psi alone (2, n) at a row of times, with the bits of a call."""
+        return np.asarray(fill(self._all, _in_a_row(times)[0], samples.TURNS)[0])
 
     def axis_distance(self, times: Array, axes: Array) -> Array:
         """Angles between axes (n, 3) and the top's at times (n,), rad, shape (n,)."""
-        apart: Array = distances(self._all, _in_a_row(times)[0], axes[None])[0]
-        return apart
+        return np.asarray(distances(self._all, _in_a_row(times)[0], axes[None])[0])
 
     def run(self, times: Array) -> tuple[Array, Array, Array]:
         """States (n, 7) at a row of times, with p_phi = L_z and p_psi = L.e read off them."""
@@ -234,9 +227,8 @@ def distances(constants: Array, times: Array, axes: Array) -> Array:
 def _within_range(times: Array, bad: int) -> None:
     """Refuse the time at the place `bad`; -1 is none."""
     if bad >= 0:
-        raise SymtopError(
-            f"times must be finite numbers of at most {samples.LONGEST_TIME:g} in size, not {float(times.flat[bad])!r}"
-        )
+        words = f"times must be finite numbers of at most {samples.LONGEST_TIME:g} in size"
+        raise SymtopError(f"{words}, not {float(times.flat[bad])!r}")
 
 
 def _in_a_row(times: ArrayLike) -> tuple[Array, tuple[int, ...]]:
@@ -249,10 +241,10 @@ def _in_a_row(times: ArrayLike) -> tuple[Array, tuple[int, ...]]:
 class ClosedForms(_Form):
     """Closed-form motions of n tops from rows (n, 9) of `NUMBERS`, as `symtop.model.top.flat` puts them together.
 
-    What `ClosedForm` says of a top is an array here, the first dimension the member. Times are a row for all members or
-    an array (n, samples). `constants` are laid out as `symtop.model.exact.layout` says. `refused` holds the
-    reason of each member whose axis comes so close to a pole that no form in doubles exists; what is asked of it is
-    NaN. Raises `SymtopError` for a row that is no top or no start.
+    What `ClosedForm` has of a top is an array here, the first dimension the member. Times are a row for all members or
+    an array (n, samples). `constants` are laid out as in `symtop.model.exact.layout`. A member whose axis comes so
+    close to a pole that no form in doubles exists is NaN, and `refused` holds the reason. Raises `SymtopError` for a
+    row that is no top or no start.
     """
 
     def __init__(self, numbers: ArrayLike) -> None:
@@ -274,7 +266,7 @@ class ClosedForms(_Form):
     @cached_property
     def arithmetic(self) -> list[str]:
         """The arithmetic that served for the constants of each member; empty if it was refused."""
-        return [ARITHMETIC.get(kind, "") for kind in self.constants[:, at.ARITHMETIC].tolist()]
+        return [ARITHMETIC[int(kind)] if kind >= 0.0 else "" for kind in self.constants[:, at.ARITHMETIC].tolist()]
 
     @property
     def theta_range(self) -> Array:
@@ -302,9 +294,8 @@ class ClosedForms(_Form):
         given = real_numbers("times", times)
         rows = np.atleast_2d(given)
         if rows.ndim != 2 or (len(rows) != len(self) and given.ndim != 1):
-            raise SymtopError(
-                f"times must be a row for all members or have the shape ({len(self)}, samples), not {given.shape}"
-            )
+            words = f"times must be a row for all members or have the shape ({len(self)}, samples)"
+            raise SymtopError(f"{words}, not {given.shape}")
         return fill(self.constants, rows if rows.flags.writeable else rows.copy(), view)
 
 

@@ -89,10 +89,7 @@ def _from_dataset(data: xr.Dataset) -> Members:
 
 
 def _check_names(data: xr.Dataset) -> None:
-    """Refuse a variable that looks like one of the nine, which would be zero in its place; others are labels.
-
-    Alike are names that differ in case, in a letter or two or in underscores, and other words for a rate.
-    """
+    """Refuse a variable that looks like one of the nine, in case, letters, underscores or another word for a rate."""
     known = {name.lower(): name for name in NUMBERS}
     for name in (name for name in map(str, data.variables) if name not in NUMBERS and name not in WRITTEN):
         near = [known[like] for like in difflib.get_close_matches(name.lower(), known, n=1, cutoff=NEAR)]
@@ -129,10 +126,7 @@ def _aligned(name: str, value: xr.DataArray, n: int, names: NDArray[Any] | None)
 
 
 def for_each(name: str, value: object, n: int, names: NDArray[Any] | None = None) -> Array:
-    """A number above zero for each of n members, of one for all or of a row of them; read-only where it is one.
-
-    A row with labels along ``member`` is put in the order of the members' own labels, `names`.
-    """
+    """A number above zero for each of n members, of one for all (then read-only) or of a row of them, by `names`."""
     if np.ma.is_masked(value):
         raise SymtopError(f"{name} must be numbers without a mask, not a masked array: what is masked has no value")
     if isinstance(value, xr.DataArray):

@@ -172,12 +172,6 @@ STRATA: dict[str, tuple[float, Callable[[Array], _Start]]] = {
 KINDS = (*STRATA, "all")
 
 
-def _uniform(generator: np.random.Philox, n: int) -> Array:
-    """The next n members' uniform draws (DRAWS, n) in [0, 1), of 53 bits."""
-    integers = generator.random_raw(n * DRAWS) >> np.uint64(11)
-    return np.ascontiguousarray((integers * 2.0**-53).reshape(n, DRAWS).T)
-
-
 def _scaled(start: _Start, draw: Array, mgl: float) -> dict[str, Array]:
     """The variables of members, from starts without units; `mgl` is the sign of gravity."""
     cosine = sine_cosine(start.theta)[1]
@@ -226,6 +220,8 @@ def population(n: int, *, seed: int = 0, kind: str = "all") -> xr.Dataset:
     columns["stratum"] = np.empty(count, dtype=f"U{max(map(len, STRATA))}")
     for begin in range(0, count, BLOCK):
         part = {name: values[begin : begin + BLOCK] for name, values in columns.items()}
-        _fill(part, _uniform(generator, len(part["I1"])), chosen)
+        integers = generator.random_raw(len(part["I1"]) * DRAWS) >> np.uint64(11)
+        uniform = (integers * 2.0**-53).reshape(-1, DRAWS)  # in [0, 1), of 53 bits
+        _fill(part, np.ascontiguousarray(uniform.T), chosen)
     data = xr.Dataset({name: ("member", values) for name, values in columns.items()})
     return netcdf.describe(data, f"{count} tops of the population {chosen!r}", seed=start, kind=chosen)

@@ -59,7 +59,7 @@ def integrate(scene: Scene, times: Array, precision: str, chart: str = "attitude
     return flight.states, flight.steps
 
 
-def iterated(scene: Scene, times: Array, per_nutation: float = MAP_STEPS[0]) -> tuple[Any, int]:
+def iterate_map(scene: Scene, times: Array, per_nutation: float = MAP_STEPS[0]) -> tuple[Any, int]:
     """Attitudes (w, x, y, z) of the discrete map at times above zero, each a whole number of steps; and all steps."""
     solve = integrator("exact-discrete").solvers["attitude"]
     nutation, attitudes, made = min(scene.nutation_period, scene.horizon), [], 0
@@ -71,15 +71,15 @@ def iterated(scene: Scene, times: Array, per_nutation: float = MAP_STEPS[0]) -> 
     return np.array(attitudes), made
 
 
-def iterated_with_error(scene: Scene, times: Array) -> tuple[Any, Array]:
+def iterate_map_with_error(scene: Scene, times: Array) -> tuple[Any, Array]:
     """Attitudes of the discrete map, and their own error so far: `SAFETY` times what two neighbours differ by.
 
     A neighbour has another step, and mgl a last place up or down: next to a separatrix that is another motion.
     """
-    attitudes, apart = iterated(scene, times)[0], np.zeros(len(times))
+    attitudes, apart = iterate_map(scene, times)[0], np.zeros(len(times))
     for way in (-math.inf, math.inf):
         mgl = math.nextafter(scene.top.mgl, way) if scene.top.mgl else 0.0
-        near = iterated(replace(scene, top=replace(scene.top, mgl=mgl)), times, MAP_STEPS[1])[0]
+        near = iterate_map(replace(scene, top=replace(scene.top, mgl=mgl)), times, MAP_STEPS[1])[0]
         apart = np.maximum(apart, charts.attitude_distance(attitudes, near))
     return attitudes, SAFETY * np.maximum.accumulate(apart)
 
@@ -121,7 +121,7 @@ def precise_attitude(top: SymmetricTop, start: Angles, digits: int, t: float) ->
     return tuple(precise_form(top, start, digits).quaternion(t))
 
 
-def seen(scene: Scene, times: Array, quaternions: Any, phis: Any, psis: Any) -> Checks:
+def largest_errors(scene: Scene, times: Array, quaternions: Any, phis: Any, psis: Any) -> Checks:
     """Running maxima of the errors of given attitudes and angles, against the closed form in `DIGITS` digits."""
     mp, rows = context(DIGITS + 10), []
     for t, *numbers in zip(times, *quaternions.T, phis, psis, strict=True):
@@ -164,7 +164,7 @@ def _unwrapped(angle: Any, near: Array) -> Any:
     return angle + turns.astype(angle.dtype) * kind("6.283185307179586476925286766559005768394")
 
 
-class Flown(NamedTuple):
+class Integration(NamedTuple):
     """heyoka's run through the given times and those of the checks."""
 
     grid: Array  # all of them, increasing
@@ -179,16 +179,16 @@ class Flown(NamedTuple):
         return charts.axis_from_quaternion(self.states[self.chosen, :4])
 
 
-def flown(scene: Scene, times: Array, precision: str) -> Flown:
-    """The integration behind `integrated`, and nothing of what judges it."""
+def integrate_with_checks(scene: Scene, times: Array, precision: str) -> Integration:
+    """The integration behind `integration_values`, and nothing of what judges it."""
     check = check_times(scene, float(times[-1]))
     grid, place = np.unique(np.concatenate([times, check]), return_inverse=True)
     start = time.perf_counter()
     states, _ = integrate(scene, grid, precision)
-    return Flown(grid, place[: times.size], place[times.size :], states, time.perf_counter() - start)
+    return Integration(grid, place[: times.size], place[times.size :], states, time.perf_counter() - start)
 
 
-def integrated(scene: Scene, run: Flown) -> tuple[dict[str, Any], Checks]:
+def integration_values(scene: Scene, run: Integration) -> tuple[dict[str, Any], Checks]:
     """heyoka's quantities at the times of a run, and their errors at its checks."""
     attitude = run.states[:, :4]
     theta, phi, psi = charts.angles_from_quaternion(attitude)
@@ -201,5 +201,5 @@ def integrated(scene: Scene, run: Flown) -> tuple[dict[str, Any], Checks]:
         "quaternion": attitude,
     }
     at = run.checked
-    checks = seen(scene, run.grid[at], attitude[at], shown["phi"][at], shown["psi"][at])
+    checks = largest_errors(scene, run.grid[at], attitude[at], shown["phi"][at], shown["psi"][at])
     return {name: values[run.chosen] for name, values in shown.items()}, checks

@@ -53,22 +53,22 @@ from symtop.methods.taylor import heyoka
 from symtop.model import charts
 from symtop.model.charts import Array
 from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.exact.constants import RATE
+from symtop.model.exact.turning_points import RATE
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.reference.independent_checks import (
     CHECKS,
     DIGITS,
     SAFETY,
     Checks,
-    Flown,
+    Integration,
     check_times,
     envelope,
-    flown,
     have_heyoka,
     integrate,
-    integrated,
-    iterated_with_error,
-    seen,
+    integrate_with_checks,
+    integration_values,
+    iterate_map_with_error,
+    largest_errors,
 )
 from symtop.run.reference.sensitivity import conditioning, unbounded
 from symtop.run.trajectory import dataset
@@ -191,12 +191,12 @@ def _dataset(scene: Scene, times: Array, columns: dict[str, Array], bounds: dict
 
 
 def _integration(scene: Scene, times: Array, precision: str) -> xr.Dataset:
-    return judged_integration(scene, times, precision, flown(scene, times, precision))
+    return judged_integration(scene, times, precision, integrate_with_checks(scene, times, precision))
 
 
-def judged_integration(scene: Scene, times: Array, precision: str, run: Flown) -> xr.Dataset:
+def judged_integration(scene: Scene, times: Array, precision: str, run: Integration) -> xr.Dataset:
     """Values, low halves and bounds at the times of a run, increasing and distinct, as `reference` has them."""
-    values, checks = integrated(scene, run)
+    values, checks = integration_values(scene, run)
     grain = 8.0 * max(heyoka.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
     columns: dict[str, Array] = {}
     for name, value in values.items():
@@ -342,7 +342,7 @@ def _compared(scene: Scene, kind: str) -> xr.Dataset:
     """The comparisons of one scene."""
     times = _times(scene, REACH)
     values = closed_values(scene, times)
-    checks = seen(scene, times, values["quaternion"], values["phi"], values["psi"])
+    checks = largest_errors(scene, times, values["quaternion"], values["phi"], values["psi"])
     bounds = closed_bounds(scene, times, values)
     share = max(float(np.max(getattr(checks, name) / bounds[name])) for name in ("attitude", "axis", "phi", "psi"))
     overlap, map_apart = _against_map(scene) if kind != "digits" else (math.nan, math.nan)
@@ -360,7 +360,7 @@ def _times(scene: Scene, nutations: float) -> Array:
 def _against_map(scene: Scene) -> tuple[float, float]:
     """The time of the last comparison with the map, and how far it and the closed form are apart beyond its error."""
     times = _times(scene, OVERLAP)
-    attitudes, own = iterated_with_error(scene, times)
+    attitudes, own = iterate_map_with_error(scene, times)
     gap = charts.attitude_distance(closed_form(scene).quaternion(times), attitudes)
     return float(times[-1]), float(max(np.max(gap - own), 0.0))
 
@@ -371,7 +371,7 @@ def _against_integration(scene: Scene) -> tuple[float, float]:
     states, _ = integrate(scene, times, "longdouble")
     gap = charts.attitude_distance(closed_form(scene).quaternion(times), states[:, :4].astype(float))
     _, phi, psi = charts.angles_from_quaternion(states[:, :4])
-    rounding = seen(scene, times, states[:, :4], phi, psi).attitude  # an unstable motion amplifies its rounding
+    rounding = largest_errors(scene, times, states[:, :4], phi, psi).attitude  # grows where the motion is unstable
     return float(times[-1]), float(max(np.max(gap - 2.0 * rounding), 0.0))
 
 
