@@ -15,16 +15,7 @@ import pytest
 import xarray as xr
 
 import symtop
-from tests.cli.test_bad_input import (
-    CALLS,
-    NOT_FINITE,
-    NOT_POSITIVE,
-    NOT_ROW,
-    NOT_WHOLE,
-    START,
-    TOP,
-    UNKNOWN,
-)  # fmt: skip
+from tests.cli.test_bad_input import CALLS, NOT_FINITE, NOT_POSITIVE, NOT_ROW, NOT_WHOLE, START, TOP, UNKNOWN
 
 SECONDS = 20.0  # of processor time for one call
 
@@ -52,18 +43,8 @@ ANY = [
     xr.Dataset(), xr.DataArray([1.0]), symtop.SymtopError("x"), TOP, START,
 ]  # fmt: skip
 RUN = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.5, samples=11)
-NOT_DATA = [
-    None,
-    3,
-    "x",
-    [],
-    {},
-    object(),
-    {"time": [0.0]},
-    {"time": "x", "theta": [1.0]},
-    xr.Dataset(),
-    {"axis": [[0, 0, 1.0]]},
-]
+NO_TIMES = [{"time": [0.0]}, {"time": "x", "theta": [1.0]}, xr.Dataset(), {"axis": [[0, 0, 1.0]]}]
+NOT_DATA = [None, 3, "x", [], {}, object(), *NO_TIMES]
 NO_NUMBER = [value for value in NOT_POSITIVE if not isinstance(value, np.ndarray | list)]
 SMALL = symtop.population(3, seed=1)
 
