@@ -13,7 +13,6 @@ from symtop.core.errors import SymtopError, shown
 
 PATIENCE = 10  # seconds to wait for a scheduler's answer, or for a worker when there is none
 ABSENT = "scheduler needs the package distributed: pip install 'symtop[distributed]'"
-FAREWELL = 2.0  # seconds to wait for the connection to close
 
 
 def check_sent(address: object, work: object, name: str) -> None:
@@ -73,7 +72,7 @@ def leave(client: Any) -> None:
     """Close the connection, whatever state it is in, and do not wait for a scheduler that does not answer."""
     if client is not None:
         with contextlib.suppress(Exception):
-            client.close(timeout=FAREWELL)
+            client.close(timeout=2.0)
 
 
 @contextlib.contextmanager

@@ -1,8 +1,7 @@
 """Errors of the user and errors of other people's code, each as one sentence.
 
-The checks of arguments (`positive`, `whole`, `one_of`, ...) raise a `SymtopError` that names the argument, its value
-and what is allowed. Within `foreign_code`, around a call of a plug-in's solver or a user's study, whatever is raised
-becomes a SymtopError, errors beside `Exception` included; Ctrl-C and SIGTERM pass.
+Within `foreign_code`, around a call of a plug-in's solver or a user's study, whatever is raised becomes a SymtopError,
+errors beside `Exception` included; Ctrl-C and SIGTERM pass.
 """
 
 import contextlib

@@ -1,8 +1,8 @@
 """Files: the cache of what can be made again, locks, and Python files that a user names.
 
 The cache holds compiled kernels, references and checkpoints of long runs. Every use of an entry sets its time of
-modification, at most once a day. An entry that nobody used for `UNUSED` days is removed, and then the entries used
-longest ago until the folder is small enough. Another process may be doing the same.
+modification, at most once a day. Entries that nobody used for `UNUSED` days are removed, and those used longest ago
+until the folder is small enough. Another process may be doing the same.
 """
 
 import contextlib
@@ -14,7 +14,6 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
-from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import TextIO
@@ -142,27 +141,22 @@ def python_file(path: str | Path, name: str, wanted: str) -> Path:
     raise SymtopError(f"{name} must be {wanted}, not {str(path)!r}", name)
 
 
-class _Reader(SourceFileLoader):
-    """Leaves nothing beside what it loads: Python would write a ``__pycache__`` into the user's folder."""
-
-    def set_data(self, path: str, data: object, *, _mode: int = 0) -> None:
-        """Keep no bytecode."""
-
-
 def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
     """A module of that name from a file, or a package if its `places` are given."""
     for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
         del sys.modules[stale]  # of another folder with the same name
     if file.suffix != ".py":
         raise SymtopError(f"{str(file)!r} cannot be loaded: its name must end in .py")
-    reader = _Reader(name, str(file))
-    spec = importlib.util.spec_from_file_location(name, file, loader=reader, submodule_search_locations=places)
-    assert spec is not None  # noqa: S101  (it has a loader)
+    spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=places)
+    assert spec is not None and spec.loader is not None  # noqa: PT018, S101  (its suffix has one)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # also because kernels are cached under the name of their module
+    usual, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # no ``__pycache__`` in the user's folder
     try:
-        reader.exec_module(module)
+        spec.loader.exec_module(module)
     except BaseException:
         sys.modules.pop(name)
         raise
+    finally:
+        sys.dont_write_bytecode = usual
     return module

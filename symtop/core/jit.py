@@ -152,10 +152,7 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """numba's cache of one kernel, in a folder whose name says all there is to know of it.
-
-    A cache on a full disk, or a damaged one, costs a compilation and not the run.
-    """
+    """numba's cache of one kernel in its folder; a full disk or a damaged cache costs a compilation and not the run."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._name, self._py_func = repr(function), function
@@ -217,9 +214,8 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
 
 @by_name
 def compile_kernel(function: Callable[..., Any]) -> Any:
-    """``njit`` with the disk cache.
+    """``njit`` with the disk cache; division by zero gives infinity, as in C.
 
-    Division by zero gives infinity, as in C: the kernel's outcome says what became of it.
     A kernel with functions typed at a prompt, which have no source file, compiles without the cache. The constructor of
     a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
     """

@@ -1,13 +1,10 @@
 """Functions that are interpreted at first and compiled once that is worth its while.
 
-A process that needs a handful of numbers should neither import numba (0.3 s) nor compile (seconds). `LazyKernel` runs a
-plain function as it stands, adds up what that costs, and goes over to the compiled one
-
-    after `LOADING` seconds of interpreting     if the kernel is in the cache (`IMPORTING` more without numba),
-    after `patience` seconds of interpreting    if it has to be compiled: what compiling costs.
-
-No process spends more than twice what the better of both ways would have cost it. Results do not depend on the way: the
-function keeps the rules of `symtop.core.jit_functions`.
+A process that needs a handful of numbers should neither import numba nor compile. `LazyKernel` adds up what it
+interprets, and goes over to the compiled function after `LOADING` seconds if the kernel is in the cache (`IMPORTING`
+more without numba), or after `patience` seconds, what compiling costs, if it is not: no process spends more than twice
+what the better way would have cost it. Results do not depend on the way: the function keeps the rules of
+`symtop.core.jit_functions`.
 """
 
 import sys

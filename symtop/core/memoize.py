@@ -12,10 +12,7 @@ _answers: dict[Callable[..., Any], tuple[Any, dict[Hashable, Any]]] = {}
 
 
 def of_one_dataset(function: Callable[Concatenate[Any, P], Answer]) -> Callable[Concatenate[Any, P], Answer]:
-    """The same function, which keeps its answers as long as it is asked about the same object, by its other arguments.
-
-    Answers are shared: neither they nor the data may be changed. Another object, equal or not, forgets those before.
-    """
+    """The same function, which keeps its answers about one object at a time; neither these nor the data may change."""
 
     @functools.wraps(function)
     def remembered(data: Any, /, *args: P.args, **kwargs: P.kwargs) -> Answer:

@@ -1,9 +1,7 @@
 """Threads for functions that release Python's lock, and processes that each use one thread for linear algebra.
 
-A process a core with a thread a core in each makes as many threads as cores squared, and OpenBLAS spins while it waits:
-a least-squares fit that takes milliseconds with one thread takes a hundred times as long with two on two busy cores.
-The library reads its variable when it is loaded, so that it is set while a process starts; a user's own setting is
-kept.
+OpenBLAS spins while it waits: a least-squares fit takes a hundred times as long with two threads on two busy cores as
+with one. It reads its variable when it is loaded, so that it is set while a process starts; a user's own setting stays.
 """
 
 import os

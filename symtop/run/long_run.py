@@ -29,8 +29,7 @@ from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
 from symtop.core.progress import beating
 from symtop.core.signals import ending_on_sigterm
-from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.loop import Loop, Position
+from symtop.methods.framework.loop import FixedStep, Loop, Position, inside
 from symtop.methods.framework.plan import OK, OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.charts import View

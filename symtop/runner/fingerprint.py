@@ -1,9 +1,8 @@
 """What a case's numbers and a study's figures are made of, found without running them (`core.code_hash`).
 
-A case is measured by a function of its study, on a scene, with the integrators that the study says it runs
-(`Study.uses`). Each of these counts by the code that it reaches and by its values, so that an edit of one method's
-coefficients makes the cases of that method stale and no other. Settings and versions of packages count besides, and for
-timed cases the processor.
+The measure of a study, a scene and the integrators that the case runs (`Study.uses`) count by the code that they reach
+and by their values, so that an edit of one method's coefficients makes the cases of that method stale and no other.
+Settings and versions of packages count besides, and for timed cases the processor.
 """
 
 import functools

@@ -1,9 +1,8 @@
 """Computes cases: in this process, in worker processes, or on a dask cluster, and in which order.
 
-The pool is Pebble's: it ends a case that takes longer than its limit, in compiled code as well, and a worker that dies
-fails its own case and no other. Workers are started when they are first needed, and stay for the next study, because a
-start takes two seconds. Few cases, and those of integrators that only this process knows, are computed in this process.
-A dask cluster may take the place of the workers for cases that are not timed; its own workers need this version of
+The workers are Pebble's: a limit ends a case in compiled code as well, and a worker that dies fails its own case and no
+other. They stay for the next study, because a start takes two seconds. Few cases, and those of integrators that only
+this process knows, are computed here. On a dask cluster, for cases that are not timed, workers need this version of
 symtop, the scripts of the studies, and the results folder under the same path.
 
 A failure that a case causes (its method, its measure, its time) is recorded and returned, and the others go on. A

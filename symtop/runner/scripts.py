@@ -1,9 +1,8 @@
 """The scripts of the studies: where they are, their names, and how a Python file is loaded.
 
-A study that ships with symtop is a package of its own, ``symtop_studies.NAME``, whose module ``study`` defines
-``STUDY``. The folder of these lies beside symtop: `studies` in a checkout, `symtop_studies` in an installed wheel. Any
-other study is a Python file that the user names, alone or in a package of its own, so that it may import what stands
-beside it.
+A study that ships with symtop is a package, ``symtop_studies.NAME``, whose module ``study`` defines ``STUDY``. They lie
+beside symtop, in `studies` in a checkout and in `symtop_studies` in an installed wheel. Any other study is a Python
+file that the user names, alone or in a package, so that it may import what stands beside it.
 """
 
 import importlib

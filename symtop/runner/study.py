@@ -247,27 +247,26 @@ def findings_of(
     verdict = each(study.name, "verdict", lambda: study.verdict(data), str, "a list of sentences")
     tables = each(study.name, "tables", lambda: study.tables(data), Table, "a list of Table")
     charts = each(study.name, "charts", lambda: study.charts(data), Chart, "a list of Chart")
+    opening = None
+    if study.opening is not None:
+        with failing(study.name, "opening"):
+            first = study.opening(data)
+            if not isinstance(first, Opening):
+                raise refusal(study.name, "opening", "an Opening", first)
+            opening = first._asdict() | {"table": first.table._asdict(), "explained": dict(first.explained)}
     return {
         "study": study.name,
         **{name: getattr(study, name) for name in ("title", "question", "how_to_read")},
         "verdict": list(verdict),
         "tables": [table._asdict() for table in tables],
         "charts": [chart._asdict() for chart in charts],
-        "opening": None if study.opening is None else _opening(study, study.opening, data),
+        "opening": opening,
         "pictures": [] if save is None else list(_saved(study, data, results, save)),
         "failures": failures,
         "cases": cases,
         "quick": False,
         "provenance": netcdf.provenance(changes=True),
     }
-
-
-def _opening(study: Study, make: Callable[[Any], Opening], data: Combined) -> dict[str, Any]:
-    with failing(study.name, "opening"):
-        opening = make(data)
-        if not isinstance(opening, Opening):
-            raise refusal(study.name, "opening", "an Opening", opening)
-        return opening._asdict() | {"table": opening.table._asdict(), "explained": dict(opening.explained)}
 
 
 def _saved(study: Study, data: Combined, results: Path, save: Save) -> Iterator[dict[str, str]]:

@@ -13,7 +13,7 @@ from symtop.judging.battery import judge
 from symtop.measure.settings import compared
 from symtop.methods.framework import registry
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import Plan
 from symtop.model import charts
 from symtop.model.top import flat

@@ -7,8 +7,7 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.methods.framework.lanes import W
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import W, members_of
 from symtop.model.exact.closed_form import NUMBERS, ClosedForms
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.chunks import nutation_periods, schedule

@@ -16,7 +16,7 @@ import symtop
 from symtop.core import code_hash, jit
 from symtop.core.code_hash import PACKAGE
 from symtop.methods.framework import registry
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import is_built_in
 from symtop.report import style
 from symtop.runner import fingerprint, run as runner

@@ -29,6 +29,7 @@ which depends on t. The series of one step from t0 is set beside that of R(t)^T 
 frame at rest, w = 0, is one of wrong times. A step that asks f at t0 alone was written for f(y), which refutes nothing.
 """
 
+import contextlib
 import math
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -36,7 +37,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims.structure import ONE_MAP, plane
+from symtop.judging.claims.structure import ONE_MAP, map_of
 from symtop.judging.claims.subject import FEWEST, FINEST, PLANE, Subject
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, yes_no
 from symtop.measure.accuracy import error_table
@@ -44,10 +45,10 @@ from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order as order_of, 
 from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
-from symtop.measure.step_map import generic_start, restart_gap, step_map
+from symtop.measure.step_map import generic_start, restart_gap
 from symtop.measure.step_series import AGREES, SURE, Series, compared, step_series
 from symtop.methods.framework.equations import FORMULATIONS
-from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import Array, sentence
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.framework.registry import Integrator
@@ -80,8 +81,7 @@ def measure(subject: Subject) -> list[Finding]:
     method = subject.method
     if method.control is None:
         return [inapplicable("order", "it has no step and no tolerance", yes_no(method.order))]
-    measured = _in_plane if subject.in_plane else _exactness if method.exact_steps else _by_steps
-    finding = measured(subject)
+    finding = _exactness(subject) if method.exact_steps else _by_steps(subject)
     table = table_of(method)
     if table is not None:
         power = method.order or table.order
@@ -132,16 +132,14 @@ class ChartSeries(NamedTuple):
         return Measured("by a term", self.order, text=text)
 
 
-def series_of(method: Integrator, scene: Scene, *, quick: bool = False) -> ChartSeries | None:
+def series_of(subject: Subject) -> ChartSeries | None:
     """The series of the chart with the lowest order; None where no step is one map of the state."""
     shown = []
-    for chart in method.charts()[-1:] if quick else method.charts():
-        try:
-            step, start = step_map(method, chart, scene)
+    for chart in subject.charts if subject.method.fixed_step else ():
+        with contextlib.suppress(SymtopError):
+            step, start = map_of(subject, chart)
             if restart_gap(step, start) <= ONE_MAP:
-                shown.append(ChartSeries(chart, step_series(step, start, scene.time_scale())))
-        except SymtopError:
-            continue
+                shown.append(ChartSeries(chart, step_series(step, start, subject.scene.time_scale())))
     return min(shown, key=lambda one: one.order, default=None)
 
 
@@ -200,9 +198,9 @@ def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, fin
 def _by_steps(subject: Subject) -> Finding:
     """What steps and runs show of the order."""
     method, scene, quick, finest = subject.method, subject.scene, subject.quick, subject.finest
-    series = series_of(method, scene, quick=quick) if method.fixed_step else None
-    fitted, claim = measured_order(method, scene, quick=quick, finest=finest), method.order
-    if series and not fitted.measured and series.series.seen and series.order < (claim or 0):
+    series, claim = series_of(subject), method.order
+    fitted = _in_plane(subject) if subject.in_plane else measured_order(method, scene, quick=quick, finest=finest)
+    if series and not subject.in_plane and not fitted.measured and series.series.seen and series.order < (claim or 0):
         # a method of high order is tried at long steps, whose errors fall as no power where the order is low, and the
         # limit of its runs is extrapolated by a power that they do not have: it looks wrong
         method = replace(method, order=max(series.order, 1))
@@ -212,7 +210,8 @@ def _by_steps(subject: Subject) -> Finding:
     slopes = ", ".join(f"{name} {fit}" for name, fit in fitted.fits.items() if math.isfinite(fit.slope))
     slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
     power = method.order or 1
-    if method.fixed_step and not (fitted.measured and series and series.follows(max(power, 1))):
+    sure = subject.in_plane or (fitted.measured and series and series.follows(max(power, 1)))
+    if method.fixed_step and not sure:
         if fitted.measured:
             power = max(1, min(method.order or 99, round(main.slope)))
         wrong = limit(method, scene, power, finest).wrong
@@ -223,8 +222,8 @@ def _by_steps(subject: Subject) -> Finding:
     return weighed(claim, fitted, series, slopes)
 
 
-def _in_plane(subject: Subject) -> Finding:
-    """What runs and steps show of the order of a map of (theta, p_theta)."""
+def _in_plane(subject: Subject) -> Order:
+    """The slope of the errors at the end of runs of a map of (theta, p_theta)."""
     method, scene, stepper = subject.method, subject.scene, subject.stepper
     horizon = NUTATIONS * scene.time_scale()
     finest = max(subject.finest or FEWEST, 4 * COARSEST)
@@ -239,13 +238,7 @@ def _in_plane(subject: Subject) -> Finding:
     step_size, error, bound = horizon / counts, np.array(errors), np.full(counts.size, BOUND)
     omega = 2.0 * math.pi / scene.time_scale()
     fit = order_of(step_size, error, bound, omega, method.order, symmetric=method.symmetric)
-    fitted = Order(scene.name, step_size, error, bound, {PLANE: fit}, PLANE, True)
-    subject.traces.update(settings_shown(fitted))
-    step, start = plane(subject)
-    one_map = restart_gap(step, start) <= ONE_MAP
-    series = ChartSeries(PLANE, step_series(step, start, scene.time_scale())) if one_map else None
-    slopes = f"slopes {PLANE} {fit} on {scene.name}" if math.isfinite(fit.slope) else "no slope"
-    return weighed(method.order, fitted, series, slopes)
+    return Order(scene.name, step_size, error, bound, {PLANE: fit}, PLANE, True)
 
 
 def weighed(claim: int | None, fitted: Order, series: ChartSeries | None, slopes: str) -> Finding:

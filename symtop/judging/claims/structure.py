@@ -12,9 +12,7 @@ momentum.
 """
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +20,7 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import AdapterSolver
 from symtop.judging.adapters.python_step import SeparableStep
-from symtop.judging.claims.subject import PLANE, Subject, declared
+from symtop.judging.claims.subject import Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, undecided, yes_no
 from symtop.measure import step_map as maps
 from symtop.measure.errors import errors
@@ -50,20 +48,11 @@ Answer = tuple[bool | None, float, float, str]  # of a chart: yes, no or neither
 
 def measure(subject: Subject) -> list[Finding]:
     """The findings on symplectic and symmetric."""
-    if subject.in_plane:
-        return structure_of({PLANE: partial(plane, subject)}, subject)
-    names = subject.method.charts()[-1:] if subject.quick else subject.method.charts()
-    steps = {chart: partial(maps.step_map, subject.method, chart, subject.scene) for chart in names}
-    return structure_of(steps, subject)
-
-
-def structure_of(steps: Mapping[str, Callable[[], tuple[maps.StepMap, Angles]]], subject: Subject) -> list[Finding]:
-    """The findings from the map of a step in each chart, with the point to judge it at; a map may refuse to be made."""
     by_chart = []
-    for chart, made in steps.items():
+    for chart in subject.charts:
         answers: list[Answer] = []
         try:
-            step, start = made()
+            step, start = map_of(subject, chart)
             defect, gap = maps.symplectic_defect(step, start), maps.restart_gap(step, start)
             answers.append(_bracket(chart, defect, gap))
             subject.traces.update(defect_width=defect.widths, bracket_defect=defect.raw)
@@ -125,11 +114,13 @@ class Plane(maps.StepMap):
         return 1.0
 
 
-def plane(subject: Subject) -> tuple[maps.StepMap, Angles]:
-    """The map at a step so large that its structure shows, and the point to judge it at."""
+def map_of(subject: Subject, chart: str) -> tuple[maps.StepMap, Angles]:
+    """The map at a step so large that its structure shows, and the point to judge it at; it may refuse to be made."""
+    if not subject.in_plane:
+        return maps.step_map(subject.method, chart, subject.scene)
     scene, start = subject.scene, maps.generic_start(subject.scene)
     h, momenta = maps.SHARE * scene.time_scale(), scene.top.momenta(start)
-    trial = Plane(subject.method, PLANE, scene.top, scene.momentum_scale, h, subject.stepper, momenta)
+    trial = Plane(subject.method, chart, scene.top, scene.momentum_scale, h, subject.stepper, momenta)
     return maps.coarsest(trial, start), start
 
 

@@ -60,6 +60,11 @@ class Subject:
         return isinstance(self.stepper, SeparableStep)
 
     @property
+    def charts(self) -> tuple[str, ...]:
+        """The charts in which a step is looked at."""
+        return (PLANE,) if self.in_plane else self.method.charts()[-1 if self.quick else 0 :]
+
+    @property
     def long_steps(self) -> float | None:
         """The most steps of a long run; None for what an implementation is given."""
         if not self.seconds_a_step:

@@ -28,9 +28,8 @@ from symtop.core.parallel import heed
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.lanes import W, column, put
-from symtop.methods.framework.many import Many, members_of
+from symtop.methods.framework.lanes import Many, W, column, members_of, put
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUTCOMES, Plan
 from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
@@ -284,7 +283,7 @@ class Job:
             done, ended = solver.many(self.numbers, self.tolerance, plan.times, plan.counts, self.budget)
             return _Runs(done.states, done.momenta, done.steps, done.work, 0 * done.work, done.outcome, ended)
         if solver is exact.solve:
-            states, momenta = exact.solve_many(self.numbers, np.nan_to_num(plan.times))
+            states, momenta = ClosedForms(self.numbers).run(np.nan_to_num(plan.times))
             none = np.zeros(len(self.numbers), dtype=np.int64)
             return _Runs(states, momenta, none, plan.counts, none, none, self.horizon)
         return self._in_turn(plan)
