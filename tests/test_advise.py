@@ -13,7 +13,6 @@ from symtop import advise
 from symtop.advise import regime
 from symtop.cli.main import main
 from symtop.measure import settings
-from symtop.measure.ranking import Near
 from symtop.methods.framework.registry import methods
 
 
@@ -154,22 +153,6 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
     assert run.attrs["integrator"] == advice.integrator
 
 
-def test_a_variant_that_the_nearest_random_tops_were_not_run_with_is_counted_by_its_method():
-    near = Near({"rk4[axis]": 40, "strang[axis]": 7, "stormer-verlet[angles]": 0}, 50, "axis", 1e-6, 10.0)
-    assert advise._same("rk4[axis]", advise._usable("attitude")) == "rk4[angles]"
-    assert advise._same("stormer-verlet", list(near.served)) == "stormer-verlet[angles]"
-    assert advise._same("gauss-4[axis]", list(near.served)) is None
-    assert "on 40 of the 50 nearest random tops" in near.words("rk4[axis]")
-    assert "on 0 of the 50" in near.words("stormer-verlet[angles]")  # and it says so
-
-
-def test_nothing_is_said_of_random_tops_without_results(monkeypatch):
-    few(monkeypatch, 1)
-    advice = symtop.recommend("spheroid", accuracy=1e-3, horizon=20.0)
-    assert advice.nearest == ""
-    assert "random" not in str(advice)
-
-
 def test_an_older_study_is_refused_with_a_remedy(tmp_path):
     xr.Dataset({"seconds": ("setting", [1.0])}).to_netcdf(tmp_path / "work_precision.nc")
     with pytest.raises(symtop.SymtopError, match=r"older version, without .*control.*--fresh"):
@@ -193,15 +176,6 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
     assert advice.integrator not in ended
     assert all(name in " ".join(advice.fails) for name in ended)
     assert "not to the end (stopped by rounding" in " ".join(advice.fails)
-
-
-def test_a_run_to_the_end_at_the_references_limit_is_not_called_extrapolated(monkeypatch):
-    few(monkeypatch, 1)
-    real = settings.attempt
-    monkeypatch.setattr(settings, "attempt", lambda *question: real(*question)._replace(bound=0.99e-4))
-    advice = symtop.recommend("spheroid", accuracy=1e-4, horizon=20.0)
-    assert advice.confidence == "at the reference's limit"
-    assert "measured to the end" in advice.reason
 
 
 def test_a_folder_without_a_study_is_refused():

@@ -279,6 +279,7 @@ class View:
 
 
 READING_SECONDS = 2e-5  # of NumPy beyond what the compiled function takes
+_NONE, _NO_ROOM = np.empty(0), np.empty((2, 0))
 
 
 def _read(
@@ -317,8 +318,8 @@ def axes(chart: str, states: Array) -> Array:
     """Unit vectors (n, 3) along the top's axis, of states (n, dimension)."""
     if chart != "attitude" or not _compilable(states) or not _reader.ready(READING_SECONDS / 3.0):
         return np.asarray(axis_of(chart, states))
-    axis, none = np.empty((len(states), 3)), np.empty(0)
-    _reader.compiled(states, none, none, none, 1.0, 0.0, 0.0, axis, np.empty((2, 0)))
+    axis = np.empty((len(states), 3))
+    _reader.compiled(states, _NONE, _NONE, _NONE, 1.0, 0.0, 0.0, axis, _NO_ROOM)
     return axis
 
 

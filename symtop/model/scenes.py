@@ -334,8 +334,7 @@ def start_energies(numbers: Array) -> Array:
     """Total energy of the starts, (n,)."""
     I1, I3, mgl, theta, _, _, theta_dot, phi_dot, psi_dot = numbers.T
     across = theta_dot**2 + (phi_dot * np.sin(theta)) ** 2
-    spin = psi_dot + phi_dot * np.cos(theta)
-    return np.asarray(0.5 * I1 * across + 0.5 * I3 * spin**2 + mgl * np.cos(theta))
+    return np.asarray(0.5 * I1 * across + 0.5 * I3 * (psi_dot + phi_dot * np.cos(theta)) ** 2 + mgl * np.cos(theta))
 
 
 def energy_scales(numbers: Array, theta_range: Array) -> Array:

@@ -164,10 +164,10 @@ def _probe(
         piece = Plan.until(duration * (_places() / POINTS), plan.tolerance, most)
     run = solve(method, chart, scene.top, start, piece)
     with np.errstate(all="ignore"):
-        error = form.axis_distance(since + piece.times, axes(chart, np.asarray(run.states)))
+        error = form.axis_distance(since + piece.times if since else piece.times, axes(chart, run.states))
     outcome = run.outcome
-    if not (finite := np.isfinite(error)).all():
-        error[~finite] = math.inf
+    if not math.isfinite(error.sum()):  # no angle is more than pi
+        error[~np.isfinite(error)] = math.inf
         outcome = "not_finite" if outcome == "ok" else outcome
     return Probe(piece.times, error, outcome, since + run.reached, run.force_evaluations)
 

@@ -272,27 +272,15 @@ def read(path: Path, seed: int = SEED) -> dict[int, Outcome]:
 
 def told(runs: list[Outcome]) -> str:
     """The figures of so many runs, and each run that should not be."""
-    ended = collections.Counter(run.outcome for run in runs)
     wrong, right = [run for run in runs if run.wrong], [run for run in runs if run.right]
     silent, false = [run for run in wrong if not run.warning], [run for run in right if run.warning]
-    slow = [run for run in runs if run.seconds >= LONGEST or run.outcome == "endless"]
-    share = 100.0 * len(false) / max(1, len(right))
-    crashed = [run for run in runs if run.outcome == "crashed"]
+    odd = [run for run in runs if run.outcome in ("endless", "crashed") or run.seconds >= LONGEST]
     lines = [
-        f"{len(runs)} runs: " + ", ".join(f"{count} {name}" for name, count in ended.most_common()),
+        f"{len(runs)} runs: {dict(collections.Counter(run.outcome for run in runs))}",
         f"{len(wrong)} wrong by more than {WRONG} rad, of them silent: {len(silent)}",
-        f"{len(right)} right to {RIGHT} rad, of them warned of: {len(false)} ({share:.2f} %)",
-        f"longest {max((run.seconds for run in runs), default=0.0):.1f} s, beyond {LONGEST:.0f} s: {len(slow)}",
+        f"{len(right)} right to {RIGHT} rad, of them warned of: {len(false)}",
     ]
-    refused = [run for run in runs if run.outcome == "refused"][:20]
-    named = {"silent": silent, "slow": slow, "crashed": crashed, "refused": refused}
-    for name, group in named.items():
-        lines += [
-            f"{name} {run.k} {run.kind} {run.integrator} {run.observe} {run.control} {run.nutations:.3g} nutations, "
-            f"error {run.error:.2g}, {run.seconds:.1f} s {run.warning}"
-            for run in group
-        ]
-    return "\n".join(lines)
+    return "\n".join([*lines, *map(repr, silent), *map(repr, odd)])
 
 
 def run_all(count: int, path: Path, seed: int = SEED) -> dict[int, Outcome]:

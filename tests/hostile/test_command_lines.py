@@ -7,7 +7,6 @@ import click
 import pytest
 from click.testing import CliRunner
 
-import symtop
 from symtop.cli.main import main
 
 GOOD = {
@@ -135,9 +134,3 @@ def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
     if sorted(path.name for path in folder.parent.iterdir()) != above:
         faults.append("wrote beside the folder")
     assert not faults, "\n".join(repr(fault).replace("a" * 290, "aaa").replace("x" * 4990, "xxx") for fault in faults)
-
-
-def test_they_are_many():
-    assert len(LINES) >= 500
-    assert {words[0] for words in LINES} == {*GOOD}
-    assert symtop.scenes()

@@ -302,20 +302,8 @@ def test_a_fused_sum_is_rounded_once_and_a_plain_one_twice():
 
 def test_the_command_runs_and_says_what_changed(tmp_path):
     output = tmp_path / "long.nc"
-    done = CliRunner().invoke(
-        main,
-        [
-            "long",
-            "spheroid",
-            "cayley",
-            "--steps",
-            "2e4",
-            "--checkpoint",
-            str(tmp_path / "c.nc"),
-            "--output",
-            str(output),
-        ],
-    )
+    files = ["--checkpoint", str(tmp_path / "c.nc"), "--output", str(output)]
+    done = CliRunner().invoke(main, ["long", "spheroid", "cayley", "--steps", "2e4", *files])
     assert done.exit_code == 0, done.output
     assert "modified_energy" in done.output
     assert output.is_file()

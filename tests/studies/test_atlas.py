@@ -18,7 +18,7 @@ from symtop.measure.verdicts import judgement
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
-from symtop.runner import run as runner, store
+from symtop.runner import store
 from symtop.runner.study import Case
 
 STEPS = [0.011, 0.053, 0.17, 0.31, 0.83]
@@ -300,27 +300,6 @@ def test_an_energy_error_that_no_sample_sees_is_no_ratio_of_a_floor():
     part = xr.Dataset(columns, coords={"variant": ["yoshida-4", "stormer-verlet", "rkmk-se3-2", "gauss-4"]})
     assert messages.hidden_sampled(part) == ["yoshida-4"]
     assert messages.worst_sampled(part) == "stormer-verlet"
-
-
-def test_cells_that_were_not_run_are_marked_and_counted():
-    settings = {"parameters": [0.3, 3.0, 8.0, 20.0], "ladder": np.geomspace(0.01, 0.5, 30).tolist(), "periods": 10.0}
-    data = store.combine([(Case("cusp", "strang[axis]"), map_table("cusp", integrator("strang[axis]"), settings))])
-    one = atlas.maps(data, "cusp")["strang[axis]"]
-    assert 0.1 < one.made.mean() < 0.8
-    assert (one.outcome[~one.made] == 0).all()
-    assert np.sum(data["outcome"].values == outcome_maps.SETTLED) == np.sum(~one.made)
-
-
-def test_every_named_column_is_written_and_every_variable_has_a_name():
-    """What figures and words read, they read by a name of `Column`; the quick grid writes each of them."""
-    study = runner.load("stability")
-    scenes = {"cusp", "grazing", "steady-fast", "sleeping", "separatrix", "goldstein"}
-    written = set()
-    for case in study.cases(True):
-        if case.integrator == "midpoint[angles]" and case.scene in scenes:
-            small = {key: value[:3] if isinstance(value, list) else value for key, value in case.settings.items()}
-            written |= set(study.measure(Case(case.scene, case.integrator, small)).data_vars)
-    assert written == {value for key, value in vars(Column).items() if key.isupper()}
 
 
 def test_the_midpoint_rule_is_known_by_its_nodes_and_not_by_its_name():

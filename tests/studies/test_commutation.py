@@ -108,14 +108,6 @@ def test_a_solver_remembers_its_rule_and_others_have_none():
         assert rule_of(symtop.integrator(name)) is None
 
 
-@pytest.mark.parametrize("name", ["midpoint", "trapezoidal", "galerkin-simpson"])
-def test_the_comparison_follows_the_solver_and_not_the_name(name):
-    scene, known = symtop.scene("goldstein"), symtop.integrator(name)
-    renamed = dataclasses.replace(known, name="another-name")
-    tables = [commutation_table(scene, method, scene.nutation_period, COUNTS[:2]) for method in (known, renamed)]
-    assert tables[0].identical(tables[1])
-
-
 def test_an_unreduced_form_steps_the_same_rule_whatever_it_is_called(monkeypatch):
     known = dict(registry.integrators())
     known["whole"] = dataclasses.replace(known.pop("midpoint-unreduced"), name="whole")

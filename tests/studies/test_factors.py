@@ -28,7 +28,6 @@ from symtop_studies.factors.tables import (
     Goal,
     Timed,
     changes,
-    chart_ratio,
     factorial,
     fastest,
     goals_of,
@@ -221,12 +220,6 @@ def test_the_effect_of_a_factor_is_found_where_effects_multiply_and_spread_where
     charts = spread["chart", "angles", "axis"]
     assert (min(charts), max(charts)) == (pytest.approx(3.0), pytest.approx(12.0))
     assert len(charts) == 3 * len(LANGUAGES) * len(CALLS)
-
-
-def test_charts_are_compared_in_the_compiled_kernels_alone():
-    assert chart_ratio(synthetic(), "rk4", "attitude") == pytest.approx(1.5)
-    assert chart_ratio(synthetic(interaction=4.0), "rk4", "angles") == pytest.approx(12.0)
-    assert math.isnan(chart_ratio(synthetic(), "Taylor", "angles"))
 
 
 @pytest.mark.parametrize(("attitude", "chart"), [(0.95, "axis"), (0.8, "attitude")])

@@ -12,7 +12,6 @@ from symtop_studies.work_precision import (
     against_taylor,
     closed_form as work_closed_form,
     energy,
-    figures,
     leads,
     timing_rounds as rounds_module,
     trust,
@@ -34,7 +33,7 @@ import symtop
 from symtop.measure import ranking
 from symtop.measure.accuracy import error_row
 from symtop.measure.settings import TARGETS, compared, limits
-from symtop.measure.timing import Timing, timings
+from symtop.measure.timing import Timing
 from symtop.methods.framework.registry import methods
 from symtop.runner import store
 from symtop.runner.study import Case
@@ -232,12 +231,6 @@ def test_the_parts_are_compared_at_equal_settings_and_above_rounding():
     assert energy.growth_at_equal_settings(runs, "shape") == pytest.approx(2.5)
 
 
-def test_the_middle_slowdown_counts_targets_that_are_not_met_as_endless():
-    table = xr.DataArray([[1.0, 1.0, np.nan, np.nan], [50.0, 60.0, 70.0, np.nan]], dims=("variant", "problem"),
-                         coords={"variant": ["quick", "sure"]})  # fmt: skip
-    assert figures.middles(table) == (3, [("quick", 2, 1.0), ("sure", 3, 60.0)])
-
-
 def test_settings_come_close_to_every_target_from_below():
     scene, method = symtop.scene("goldstein"), symtop.integrator("kahan-li-6")
     table = work_table(scene, method, [10.0 * scene.nutation_period], 1e6).isel(horizon=0)
@@ -369,13 +362,6 @@ def test_a_sample_that_no_other_comes_near_is_not_met_again():
     assert met_again([1.0, 1.05, 3.0, math.nan])
     assert not met_again([1.0, 1.3, 1.3])
     assert not met_again([1.0, math.nan])
-
-
-def test_batches_of_a_round_are_neighbours_in_time():
-    called = []
-    timings([lambda name=name: called.append(name) for name in "abc"], batches=4, batch=0.0)
-    rounds = ["".join(sorted(called[-12 + 3 * k : -9 + 3 * k or None])) for k in range(4)]
-    assert rounds == ["abc"] * 4
 
 
 def cell(samples, errors=None, implementations=None):

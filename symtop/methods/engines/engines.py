@@ -21,9 +21,8 @@ Two rotations are in use. With u = h w/2,
     exponential   p = (cos |u|, u sin |u|/|u|)                    the body turns at the rate w for a time h
     linear        p = (1, u)/sqrt(1 + u.u)                        q + h (0, w) q/2, normalised: the Cayley rotation
 
-Every function works in the precision of its arguments: 0, 1/2 and 1 are fields of `EngineTop`, because a literal of
-Python would turn single precision into double. The loop adds the difference of two such numbers, and its compensated
-sum gives the second one exactly. The step is h rounded to single precision, while samples are shown at multiples of h.
+Every function works in the precision of its arguments: 0, 1/2 and 1 are fields of `EngineTop`, for a literal of Python
+would make it double. The loop's compensated sum gives a rounded state exactly; samples are shown at multiples of h.
 
 *Kicks.* The angular velocity changes first, then the body turns by it: the semi-implicit family. They differ in what
 becomes of the gyroscopic term w x I_s w, which is why two engines disagree on a top and agree on a ball. All take tau
@@ -39,7 +38,7 @@ In body axes the third row of J is (0, 0, I3), so that the spin is kept and two 
 w3 e x x = r; the projected form has a closed form too. All are of order 1, but for the first, which leaves out a term
 of the equations: it follows the spherical top with I3 := I1, started with the same w, at any step. What `rescaled`
 keeps is |L|, not L: in a fast top the axis wanders away from L by (1 - I3/I1)^2 w3^2 h/2 a second, relatively, until
-the body lies flat. Where N = 0, in a body at rest, it stays zero, as in the engines.
+the body lies flat.
 
 *Half kicks*, as in molecular dynamics, where L is what is carried: L += h tau/2 before and after a rotation of order 2,
 not the exact one of a free body (`strang` takes that). With w(q, L) = R(q) I^-1 R(q)^T L and n(q) = q/|q|:

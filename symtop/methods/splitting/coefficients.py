@@ -82,7 +82,7 @@ METHODS = {
         STRANG, "hairer-lubich-wanner-2003", "kick-drift-kick splitting of the reduced Hamiltonian", "angles"),
     "stormer-verlet-yoshida-4": Splitting(YOSHIDA_4, "yoshida-1990", "three Stormer-Verlet steps", "angles"),
     "stormer-verlet-suzuki-4": Splitting(SUZUKI_4, "suzuki-1990", "five Stormer-Verlet steps", "angles"),
-    "stormer-verlet-blanes-moan-6": Splitting(  # up to five times more accurate here than the table of srkn-14-6
+    "stormer-verlet-blanes-moan-6": Splitting(  # more accurate here than the table of srkn-14-6
         BLANES_MOAN_11, "blanes-moan-2002",
         "Runge-Kutta-Nystrom splitting of the reduced Hamiltonian, 11 forces", "angles"),
     "strang": Splitting(STRANG, "touma-wisdom-1994", "free top and gravity kicks, one force"),

@@ -68,7 +68,7 @@ class Arithmetic(NamedTuple):
 
     kind: Any  # converts a decimal string
     epsilon: float
-    compact: bool  # unrolled code in quadruple precision takes 20 times longer to build and runs no faster
+    compact: bool  # unrolled code in quadruple precision takes long to build and runs no faster
 
 
 def arithmetic(precision: str) -> Arithmetic:
@@ -178,7 +178,7 @@ def _padded(values: Any, size: int) -> Array:
     return padded
 
 
-# beyond double there are no vector units, and quadruple precision is software: a step costs 12 and 500 times as much
+# beyond double there are no vector units, and quadruple precision is software
 _SUMMARIES = {
     "double": "heyoka's Taylor series on the space-frame equations, without poles",
     "longdouble": "heyoka's Taylor series in 80-bit arithmetic, samples rounded to double",

@@ -16,7 +16,7 @@ alone. With y = w/(h mgl), a = h/I1, m = h mgl, P = a p_phi and S_n = [Re y_n, I
 
 N (N - 1)/2 fused products for the order N, 190 for N = 20, where a general compiler of Taylor series takes six scalar
 products, 3 N^2. Three traps. c1 and c0 are those of the *present* state: constants of the start make it unstable.
-kappa = a m is applied as two products: rounded, it drives the energy away 5 times as fast. And L from w'/(i mgl) loses
+kappa = a m is applied as two products: rounded, it drives the energy away. And L from w'/(i mgl) loses
 digits where gravity is weak, so that y carries L and z comes from its slope.
 
 *The attitude*: the half angles beside the axis, by the same heights.
