@@ -202,7 +202,7 @@ def _stored(file: Path) -> xr.Dataset:
 
 
 def _usable(quantity: str) -> list[str]:
-    """Compiled methods with a step or tolerance, each in the charts that show the quantity, named if there are several."""
+    """Compiled methods with a step or a tolerance, each in the charts that show the quantity, which it then names."""
     return [
         variant.name if len(integrator(variant.method).charts()) > 1 else variant.method
         for variant in settings.compared(settings.observed(quantity))
