@@ -162,7 +162,7 @@ def recommend(
     trials: list[_Trial] = []
     ranked: list[_Trial] = []
     fails: dict[str, list[str]] = {}
-    # Methods of high order first: they are the cheapest at most accuracies, and their cost ends the other searches.
+    # those of high order first: they are the cheapest at most accuracies, and their cost ends the other searches
     for method in sorted(map(integrator, guesses), key=lambda method: -(method.order or 0)):
         patience = TOO_DEAR * min((one.met.evaluations for one in trials), default=math.inf)
         trial = _try(question, method, guesses[method.name], patience)
@@ -202,10 +202,7 @@ def _stored(file: Path) -> xr.Dataset:
 
 
 def _usable(quantity: str) -> list[str]:
-    """What can be recommended: compiled methods with a step or a tolerance, in each chart that shows the quantity.
-
-    A method is named with its chart, ``rk4[axis]``, if it has several.
-    """
+    """Compiled methods with a step or a tolerance, each in the charts that show the quantity, which it then names."""
     return [
         variant.name if len(integrator(variant.method).charts()) > 1 else variant.method
         for variant in settings.compared(settings.observed(quantity))
@@ -274,10 +271,7 @@ def _try(question: _Question, method: Integrator, guess: float | None, patience:
 
 
 def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
-    """The trial run to the whole horizon with its setting corrected, or the reason why it fails there.
-
-    A trial that would need too many evaluations is not run so far; its setting is rounded all the same.
-    """
+    """The trial run to the whole horizon, if not too much, with its setting corrected; or the reason why it fails."""
     scene, accuracy, quantity, horizon = question
     short = trial.met
     if short.evaluations * horizon / short.horizon > settings.MOST_EVALUATIONS[short.integrator.implementation]:
