@@ -128,9 +128,12 @@ def _traced(task: Task) -> Iterator[None]:
 
 
 def failed(task: Task, why: object, trace: str = "") -> Result:
-    """Record how a case failed."""
+    """Record how a case failed; a file that an earlier run may have left is no longer its result."""
     message = f"{task.case.integrator} on {task.case.scene} failed: {' '.join(str(why).split())}"
-    store.save_failure(task.path, task.case, message, trace)
+    question = {"scene": task.case.scene, "integrator": task.case.integrator, "settings": dict(task.case.settings)}
+    record = question | {"message": message, "traceback": trace.splitlines()}
+    netcdf.write_json(store.failure_path(task.path), record)
+    task.path.unlink(missing_ok=True)
     return Result("failed", message)
 
 

@@ -115,13 +115,6 @@ def trace_path(path: Path) -> Path:
     return path.with_name(f".{path.stem}.trace")
 
 
-def save_failure(path: Path, case: Case, message: str, trace: str) -> None:
-    """Record how a case failed; a file that an earlier run may have left is no longer its result."""
-    question = {"scene": case.scene, "integrator": case.integrator, "settings": dict(case.settings)}
-    netcdf.write_json(failure_path(path), {**question, "message": message, "traceback": trace.splitlines()})
-    path.unlink(missing_ok=True)
-
-
 def stored(results: Path, study: Study) -> list[Path]:
     """The files of all cases of a study that were ever computed and not replaced."""
     return sorted((results / "cases" / study.name).glob("[!.]*.npz"))
