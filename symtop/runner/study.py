@@ -245,7 +245,10 @@ def findings_of(
     charts = each(study.name, "charts", lambda: study.charts(data), Chart, "a list of Chart")
     opening = None
     if study.opening is not None:
-        (first,) = each(study.name, "opening", lambda: [study.opening and study.opening(data)], Opening, "an Opening")
+        with failing(study.name, "opening"):
+            first = study.opening(data)
+        if not isinstance(first, Opening):
+            raise StudyError(f"study {study.name}: opening must return an Opening, not {shown(first)[:LONGEST]}")
         opening = first._asdict() | {"table": first.table._asdict(), "explained": dict(first.explained)}
     return {
         "study": study.name,

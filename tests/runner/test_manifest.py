@@ -116,11 +116,11 @@ def test_the_hash_of_the_report_follows_sources_processor_and_files(tmp_path, mo
     (tmp_path / "one.json").touch()
     assert sources.report_hash(tmp_path, embed=False) != before
     (tmp_path / "one.json").unlink()
-    monkeypatch.setattr(manifest, "processor", lambda: "another")
+    monkeypatch.setattr(sources, "processor", lambda: "another")
     assert sources.report_hash(tmp_path, embed=False) != before
     monkeypatch.undo()
-    real = manifest.file_hash
-    monkeypatch.setattr(manifest, "file_hash", lambda path: real(path) + "x" * (path.name == "page.js"))
+    real = sources.file_hash
+    monkeypatch.setattr(sources, "file_hash", lambda path: real(path) + "x" * (path.name == "page.js"))
     assert sources.report_hash(tmp_path, embed=False) != before
 
 
