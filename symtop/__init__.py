@@ -14,12 +14,13 @@ from symtop.core import old_paths as old_paths
 if TYPE_CHECKING:
     from symtop.advise import Advice as Advice, recommend as recommend
     from symtop.core.errors import SymtopError as SymtopError, SymtopWarning as SymtopWarning
+    from symtop.judging.comparison import compare as compare
     from symtop.judging.judge_step import judge as judge
     from symtop.measure.errors import errors as errors
+    from symtop.measure.sweep import sweep as sweep
     from symtop.methods.framework.angles import chart_outcome as chart_outcome, on_angles as on_angles
     from symtop.methods.framework.equations import field as field
-    from symtop.methods.framework.fixed_step import FixedStep as FixedStep
-    from symtop.methods.framework.loop import kernel_loop as kernel_loop
+    from symtop.methods.framework.loop import FixedStep as FixedStep, kernel_loop as kernel_loop
     from symtop.methods.framework.plan import Plan as Plan, Run as Run
     from symtop.methods.framework.registry import (
         Integrator as Integrator,
@@ -43,11 +44,9 @@ if TYPE_CHECKING:
     from symtop.run.long_run import long_run as long_run
     from symtop.run.reference.truth import reference as reference
     from symtop.run.simulation import simulate as simulate
-    from symtop.runner.compare import compare as compare
     from symtop.runner.study import Case as Case, Picture as Picture, Study as Study, Table as Table
-    from symtop.runner.sweep import sweep as sweep
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 _NAMES = {  # by the module that holds them
     "advise": "Advice recommend",
@@ -57,8 +56,7 @@ _NAMES = {  # by the module that holds them
     "methods.lagrangian.discrete_lagrangian": "discrete_lagrangian",
     "methods.framework.angles": "chart_outcome on_angles",
     "methods.framework.equations": "field",
-    "methods.framework.fixed_step": "FixedStep",
-    "methods.framework.loop": "kernel_loop",
+    "methods.framework.loop": "FixedStep kernel_loop",
     "methods.framework.plan": "Plan Run",
     "methods.framework.registry": "Integrator citation integrator integrators register",
     "methods.framework.space": "on_attitude on_axis",
@@ -73,11 +71,11 @@ _NAMES = {  # by the module that holds them
     "run.ensemble.population": "population",
     "run.reference.truth": "reference",
     "run.simulation": "simulate",
+    "judging.comparison": "compare",
     "report.card": "card",
     "report.plot": "plot",
-    "runner.compare": "compare",
     "runner.study": "Case Picture Study Table",
-    "runner.sweep": "sweep",
+    "measure.sweep": "sweep",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 

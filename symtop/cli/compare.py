@@ -5,13 +5,26 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, table, warn
+from symtop.cli.common import (
+    File,
+    as_text,
+    check_outputs,
+    completing,
+    json_option,
+    plugin_option,
+    say,
+    say_written,
+    table,
+    warn,
+)  # fmt: skip
 from symtop.core.progress import ticking
 
 if TYPE_CHECKING:
     import xarray as xr
 
 TARGETS = (1e-3, 1e-6, 1e-9)  # whose cheapest runs are shown
+FACTS = ("scene", "quantity", "horizon", "nutations", "cost", "timed", "budget")
+COLUMNS = ("step_size", "tolerance", "steps_per_nutation", "error", "seconds", "seconds_spread", "force_evaluations")
 
 
 @click.command(short_help="Compare methods on one scene: error against run time.")
@@ -27,71 +40,70 @@ TARGETS = (1e-3, 1e-6, 1e-9)  # whose cheapest runs are shown
 @plugin_option
 @json_option
 def compare(
-    scene: str, methods: tuple[str, ...], quantity: str, cost: str, horizon: float | None, nutations: float | None,
-    budget: float | None, output: str | None, figure: str | None, as_json: bool,
-) -> None:  # fmt: skip
+    scene: str, methods: tuple[str, ...], output: str | None, figure: str | None, as_json: bool, **options: Any
+) -> None:
     """Compare METHODS on one SCENE: which is cheapest for an error of 1e-3, 1e-6 and 1e-9?
 
     A method is a name, or a variant such as rk4[angles]; without a chart it runs in the smallest one that shows the
-    quantity. Each is run from coarse settings to fine ones, and its runs are timed against those of the others.
+    quantity. FILE.py:NAME, a library and a command are steps of your own, as symtop judge takes them. Each is run from
+    coarse settings to fine ones, and its runs are timed against those of the others.
 
     \b
     symtop compare goldstein stormer-verlet midpoint rk4 dop853 taylor --figure c.png
     symtop compare spheroid strang "rk4[angles]" bullet --nutations 10 --cost evaluations --output c.nc
+    symtop compare spheroid my.py:step rk4
     """
     check_outputs(output=output, figure=figure)
     with ticking("loading"):
         from symtop.core import netcdf
+        from symtop.judging import comparison
+        from symtop.measure.sweep import failed_setting
         from symtop.measure.timing import NOISY
-        from symtop.runner import compare as runner
 
-    data = runner.compare(
-        scene, methods, horizon=horizon, nutations=nutations, quantity=quantity, cost=cost, budget=budget
-    )
+    data = comparison.compare(scene, methods, **options)
     if output is not None:
         netcdf.write(data, output)
     if figure is not None:
         from symtop.report.plot import draw_compare
 
         draw_compare(data, figure)
-    cells = {target: runner.cheapest(data, target).tolist() for target in TARGETS}
+    places = {target: comparison.cheapest(data, target).tolist() for target in TARGETS}
+    cells = [data.isel(variant=k) for k in range(data.sizes["variant"])]
+    records = [[_record(cell, target, places[target][k]) for target in TARGETS] for k, cell in enumerate(cells)]
     if as_json:
-        facts = {
-            name: data.attrs[name] for name in ("scene", "quantity", "horizon", "nutations", "cost", "timed", "budget")
-        }
-        runs = [_record(data, k, target, cells[target][k]) for k in range(data.sizes["variant"]) for target in TARGETS]
-        click.echo(as_text(facts | {"exact_seconds": data["exact_seconds"].item(), "cheapest": runs}))
+        facts = {name: (data.attrs | {"scene": scene})[name] for name in FACTS}
+        click.echo(
+            as_text(
+                facts
+                | {"exact_seconds": data["exact_seconds"].item(), "cheapest": [one for own in records for one in own]}
+            )
+        )
         return
-    timed = cost == "time"
-    end, count = (data.attrs[name] for name in ("horizon", "nutations"))
-    say(f"{scene} to t = {end:.6g} ({count:.3g} nutations): the cheapest run by {cost}")
-    say(f"steps a nutation or tolerance{', time' if timed else ''}, force evaluations; largest error of {quantity}")
-    rows = [
-        [str(name), *(_cell(_record(data, k, target, cells[target][k]), timed) for target in TARGETS)]
-        for k, name in enumerate(data["variant"].values)
-    ]
+    timed, end, count = options["cost"] == "time", data.attrs["horizon"], data.attrs["nutations"]
+    say(f"{scene} to t = {end:.6g} ({count:.3g} nutations): the cheapest run by {options['cost']}")
+    say(f"steps a nutation or tolerance{', time' * timed}, force evaluations; error of {data.attrs['quantity']}")
+    rows = [[str(data["variant"].values[k]), *(_cell(one, timed) for one in own)] for k, own in enumerate(records)]
     click.echo(table(["variant", *map("error {:.0e}".format, TARGETS)], rows))
-    for k, name in enumerate(map(str, data["variant"].values)):
-        for sentence in _remarks(data.isel(variant=k), runner.fails_from(data.isel(variant=k))):
-            say(f"{name}: {sentence}")
+    for cell in cells:
+        least = cell["error"].min().item()
+        words = [str(one) for one in cell["message"].values if one][:1] or [failed_setting(cell)]
+        words += [f"its least error was {least:.1e}"] if least > TARGETS[-1] else []
+        if any(words):
+            say(f"{cell['variant'].item()}: {'; '.join(filter(None, words))}")
     if timed:
-        say(f"the exact motion takes {_time(data['exact_seconds'].item())}; time is that of a call of the solver alone")
-        noisy = float((data["seconds_spread"] > NOISY).sum() / data["seconds_spread"].notnull().sum())
-        if noisy > 0.5:
+        exact = _time(data["exact_seconds"].item())
+        say(f"The exact motion takes {exact}. A time is that of one call of the solver, with nothing around it.")
+        if float((data["seconds_spread"] > NOISY).sum() / data["seconds_spread"].notnull().sum()) > 0.5:
             warn("the machine is busy: times are the least of some, and most others took a quarter longer")
-    for file in (output, figure):
-        if file is not None:
-            click.echo(f"written to {file}")
+    say_written(output, figure)
 
 
-def _record(data: "xr.Dataset", variant: int, target: float, place: int) -> dict[str, Any]:
+def _record(cell: "xr.Dataset", target: float, place: int) -> dict[str, Any]:
     """The cheapest run of a variant for a target, or why there is none."""
-    cell = data.isel(variant=variant)
     record = {"variant": str(cell["variant"].item()), "target": target, "reached": place >= 0}
     if place < 0:
         return record | {"reason": str(cell["reached"].sel(target=target).item())}
-    names = ("step_size", "tolerance", "steps_per_nutation", "error", "seconds", "seconds_spread", "force_evaluations")
-    return record | {name: cell[name].values[place].item() for name in names}
+    return record | {name: cell[name].values[place].item() for name in COLUMNS}
 
 
 def _cell(record: dict[str, Any], timed: bool) -> str:
@@ -106,21 +118,3 @@ def _cell(record: dict[str, Any], timed: bool) -> str:
 def _time(seconds: float) -> str:
     unit, name = (1e6, "us") if seconds < 1e-3 else (1e3, "ms") if seconds < 1.0 else (1.0, "s")
     return f"{seconds * unit:.3g} {name}"
-
-
-def _remarks(cell: "xr.Dataset", last: int) -> list[str]:
-    """Where a variant fails, and what ended its runs before the finest target shown."""
-    if cell["message"].item():
-        return [str(cell["message"].item())]
-    errors, sentences = cell["error"].where(cell["outcome"] == "ok"), []
-    if last >= 0:
-        how = str(cell["outcome"].values[last]).replace("_", " ")
-        steps, tolerance = (cell[name].values[last] for name in ("steps_per_nutation", "tolerance"))
-        setting = f"{steps:.3g} steps a nutation" if math.isnan(tolerance) else f"tolerance {tolerance:.0e}"
-        sentences.append(f"fails at {setting}: {how}")
-    reached = {target: str(cell["reached"].sel(target=target).item()) for target in TARGETS}
-    if missed := {why for why in reached.values() if why != "met"}:
-        least = float(errors.min()) if errors.notnull().any() else math.nan
-        most = f", {cell['force_evaluations'].max().item():.1e} force evaluations" if "budget" in missed else ""
-        sentences.append(f"the least error was {least:.1e}, and what ends it is {', '.join(sorted(missed))}{most}")
-    return sentences

@@ -1,8 +1,7 @@
 """Runs as pictures: on an Axes of the caller's (`plot`), or as a file of one run or of an ensemble.
 
 a run        its motion beside the true one, its errors, and the residuals of constants of the motion
-a sweep      the largest error against what was varied
-a comparison the largest error against run time
+a sweep      the largest error against what was varied, or run time; a comparison likewise
 an ensemble  how the errors of its members spread as time goes on
 """
 
@@ -14,11 +13,12 @@ import numpy as np
 import xarray as xr
 
 from symtop.core.errors import SymtopError, at_home, one_of
-from symtop.measure import spread
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES, errors
+from symtop.measure.sweep import failed_setting
 from symtop.model.scenes import Scene
-from symtop.report.figures import BELOW, error_band, name_beside
+from symtop.report import spread
+from symtop.report.figures import error_band, name_ends
 from symtop.report.style import (
     BLACK,
     BLUE,
@@ -37,13 +37,13 @@ from symtop.report.style import (
     save,
 )  # fmt: skip
 from symtop.run.trajectory import Trajectory
-from symtop.runner.compare import fails_from
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LEAST = 1e-17  # what is smaller is drawn here
 LINES = ("-", "--", "-.", ":")  # of a sweep's scenes
+AXES = {"seconds": "time of a run, one core (s)", "force_evaluations": "force evaluations of a run"}
 COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
 BANDS = ((0, 4, 0.18), (1, 3, 0.38))  # of `spread.LEVELS`, 1 to 99 % and 10 to 90 %, and how opaque
 MOST = {"axis": np.pi, "energy": 1e3}  # what is larger, and members that failed, are drawn here
@@ -58,10 +58,10 @@ def plot(
         a run         the error of `quantity` over time, or a variable of the run itself (``phi``, ``p_theta``, ...)
         its errors    (a dataset of `errors`) the error of `quantity` over time, and the least that can be seen
         a sweep       the largest error of `quantity` against ``step_size`` or ``tolerance``, or work where
-                      some methods have one and some the other, or what `x` names: a line for each integrator, dashed
-                      for further scenes
-        a comparison  (a dataset of `compare`) the error against run time or evaluations, of `quantity` if that is not
-                      the axis; crosses are runs that failed, the grey band is what the reference cannot judge
+                      some methods have one and some the other, or what `x` names, or run time if it is there: a line
+                      for each variant, dashed for further scenes; crosses are runs that failed, the grey band is what
+                      the reference cannot judge
+        a comparison  the same for one scene, of the quantity that is compared, with the time of the exact motion
         an ensemble   quantiles over members of the error of `quantity` ("axis" or "energy") over time; `members` are
                       the tops that were run (the dataset does not hold them)
 
@@ -71,15 +71,11 @@ def plot(
         raise SymtopError(f"data must be a dataset of simulate, sweep or ensemble, not {type(data).__name__}")
     if not isinstance(quantity, str):
         raise SymtopError(f"quantity must be the name of one, not {type(quantity).__name__}")
-    drawn = _ensemble if "member" in data.dims else _sweep if "setting" in data.dims else _over_time
-    drawn = _compare if "cost" in data.attrs and drawn is _sweep else drawn
     if ax is None:
         ax = plt.subplots(figsize=(7.2, 4.4), layout="constrained")[1]
-    if drawn is _ensemble:
+    if "member" in data.dims:
         _ensemble(ax, data, quantity, members)
-    elif drawn is _compare:
-        _compare(ax, data, quantity)
-    elif drawn is _sweep:
+    elif "setting" in data.dims:
         _sweep(ax, data, quantity, x)
     else:
         _over_time(ax, data, quantity)
@@ -109,15 +105,12 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         ax.plot(times, values.values, color=color, lw=1.2)
         ax.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
     title, ended = (data.attrs.get(word, "") for word in ("title", "outcome_message"))
-    ax.set(xlabel=f"time{_unit(data)}", title=f"{title}: {ended}" if ended else title)
-
-
-def _unit(data: xr.Dataset) -> str:
     unit = data["time"].attrs.get("units", "")
-    return f" ({unit})" if unit else ""
+    ax.set(xlabel=f"time ({unit})" if unit else "time", title=f"{title}: {ended}" if ended else title)
 
 
 def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
+    quantity = data.attrs.get("quantity", quantity) if quantity == "axis" else quantity
     one_of("quantity", quantity, [name for name in QUANTITIES if name in data])
     if "integrator" in data.coords:  # a sweep of version 0.2
         data = data.rename(integrator="variant")
@@ -127,84 +120,40 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
         if dim not in data.dims:  # of one alone, as isel leaves it
             data = data.expand_dims(dim)
     controls = [name for name in ("step_size", "tolerance") if name in data and data[name].notnull().any()]
-    x = x or (controls[0] if len(controls) == 1 else "force_evaluations")
-    x = one_of("x", x, [str(name) for name, values in data.data_vars.items() if _can_be_x(values)])
-    ax.set(xscale="log", yscale="log", ylabel=f"largest {QUANTITIES[quantity]}", xlabel=x.replace("_", " "))
-    ends = []
+    timed, compared = "seconds" in data and bool(data["seconds"].notnull().any()), "cost" in data.attrs
+    x = x or ("seconds" if timed else controls[0] if len(controls) == 1 and not compared else "force_evaluations")
+    numbers = {name: values for name, values in data.data_vars.items() if values.dtype.kind in "iuf"}
+    of_runs = [str(name) for name, values in numbers.items() if {*values.dims} == {"scene", "variant", "setting"}]
+    x = one_of("x", x, of_runs)
+    words = AXES.get(x, x.replace("_", " "))
+    ax.set(xscale="log", yscale="log", ylabel=f"largest {QUANTITIES[quantity]}", xlabel=words)
+    ends, level = {}, error_band(ax, data[f"{quantity}_bound"].values)
+    edge: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 3}
     for number, scene in enumerate(data["scene"].values):
-        for name in data["variant"].values:
-            cell = data.sel(scene=scene, variant=name).sortby(x)
-            row = str(name) if "chart" not in cell or str(name).endswith("]") else f"{name}[{cell['chart'].item()}]"
-            label = row if data.sizes["scene"] == 1 else f"{row} on {scene}"
-            options = line(row) | ({"ls": LINES[number % len(LINES)]} if data.sizes["scene"] > 1 else {})
-            good = np.isfinite(cell[x].values) & np.isfinite(cell[quantity].values)
-            failed = np.isfinite(cell[x].values) & ~np.isin(cell["outcome"].values, ("ok", "not_run"))
-            _crosses(ax, cell[x].values[failed], options["color"])
-            if good.any():
-                across, errors = cell[x].values[good], np.maximum(cell[quantity].values[good], LEAST)
-                ax.plot(across, errors, lw=1.2, label=label, **options)
-                ends.append((label, float(across[-1]), float(errors[-1]), options["color"]))
-    name_beside(ax, ends)
-
-
-def _crosses(ax: "Axes", places: Any, color: str) -> None:
-    """Crosses at the top edge: runs that failed."""
-    edge = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 3}
-    ax.scatter(places, np.full(np.size(places), 0.975), 26.0, color, "x", lw=1.0, **edge)
-
-
-def _compare(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
-    """Error against cost, a line for each method, with the time of the exact motion and the bound of the truth.
-
-    A method that fails has a cross where its coarsest good run would be with the longest step from which it fails.
-    """
-    facts, x = data.attrs, "seconds" if data.attrs["cost"] == "time" else "force_evaluations"
-    own = facts["quantity"]
-    shown = own if quantity == "axis" else one_of("quantity", quantity, [own, *(q for q in QUANTITIES if q in data)])
-    y = "error" if shown == own else shown
-    runs = f"{facts['nutations']:.3g} nutations" if facts["nutations"] > 0.0 else f"t = {facts['horizon']:g}"
-    words = "time of a run, one core (s)" if x == "seconds" else "force evaluations of a run"
-    ax.set(xscale="log", yscale="log", ylabel=f"largest {QUANTITIES[shown]}", xlabel=words)
-    ax.set_title(f"Speed against accuracy: {facts['scene']}, {runs}", loc="left", weight="bold")
-    ends, failures = [], []
-    for name in map(str, data["variant"].values):
-        cell, color = data.sel(variant=name), look(name).color
-        cost, errors, last = cell[x].values, np.maximum(cell[y].values, LEAST), fails_from(cell)
-        good = np.flatnonzero(np.isfinite(cost) & np.isfinite(errors))
-        if good.size:
-            ax.plot(cost[good], errors[good], **line(name), lw=1.6, label=name)
-            ends.append((name, float(cost[good[-1]]), float(errors[good[-1]]), color))
-        if last >= 0:
-            count, tolerance = cell["steps_per_nutation"].values, cell["tolerance"].values[last]
-            place = cost[good[0]] * count[last] / count[good[0]] if good.size else np.nan
-            longest = f"{count[last]:.2g}" if np.isnan(tolerance) else f"{tolerance:.0e}"
-            failures.append((longest if good.size else f"{name}: failed", place, color))
-    known = [data[x].values.ravel(), [data["exact_seconds"].item() if x == "seconds" else np.nan]]
-    places = np.concatenate([*known, [place for _, place, _ in failures]])
-    low, high = (float(end) for end in (np.nanmin(places[places > 0.0]) / 1.6, np.nanmax(places) * 1.6))
-    largest = np.nanmax(data[y].values, initial=1e-12)
-    ax.set(xlim=(low, high), ylim=(None, 20.0 * largest))
-    small, beside, below = {"color": "0.35", "fontsize": LEAST_TEXT}, ax.get_yaxis_transform(), ax.get_xaxis_transform()
-    if y == "error":
-        level = error_band(ax, data["error_bound"].values)
-        ax.set_ylim(bottom=0.1 * level)
-        ax.text(0.99, 0.3 * level, BELOW, va="center", ha="right", transform=beside, **small)
-    if x == "seconds":
-        exact = data["exact_seconds"].item()
-        ax.axvline(exact, color="0.35", ls=(0, (1, 2)), lw=1.0)
-        ax.text(exact, 0.15, "exact motion ", rotation=90, ha="right", transform=below, **small)
-    for label, place, color in failures:
-        _crosses(ax, [place if np.isfinite(place) else low], color)
-        ends.append((label, float(place) if np.isfinite(place) else low, np.inf, color))
-    if failures:
-        words = "\N{MULTIPLICATION SIGN} fails at so many steps a nutation and fewer"
-        ax.text(0.99, 0.975, words, va="center", ha="right", transform=ax.transAxes, **small)
-    name_beside(ax, ends)
-
-
-def _can_be_x(values: xr.DataArray) -> bool:
-    """Has it a number for each run of a sweep?"""
-    return values.dtype.kind in "iuf" and {*values.dims} == {"scene", "variant", "setting"}
+        for name in map(str, data["variant"].values):
+            cell = data.sel(scene=scene, variant=name)
+            variant = name if "chart" not in cell or name.endswith("]") else f"{name}[{cell['chart'].item()}]"
+            options = line(variant) | ({"ls": LINES[number % len(LINES)]} if data.sizes["scene"] > 1 else {})
+            label = variant if data.sizes["scene"] == 1 else f"{variant} on {scene}"
+            across, errors = cell[x].values, np.maximum(cell[quantity].values, LEAST)
+            good = np.flatnonzero(np.isfinite(across) & np.isfinite(errors))
+            good = good[np.argsort(across[good])]
+            ax.plot(across[good], errors[good], lw=1.4, label=label, **options)
+            failed = across[(cell["outcome"].values != "ok") & np.isfinite(across)]
+            ax.scatter(failed, np.full(failed.size, 0.985), 22.0, options["color"], marker="x", lw=1.0, **edge)
+            last = good[np.argmin(errors[good])] if good.size else 0
+            place = (across[last], errors[last]) if good.size else (np.nanmax(data[x].values, initial=1e-300), np.pi)
+            fails = failed_setting(cell).partition(",")[0]
+            ends[f"{label}: {fails}" if fails else label] = (*map(float, place), options["color"])
+    ax.set_ylim(bottom=0.1 * level)
+    if compared:
+        nutations, end = data.attrs["nutations"], data.attrs["horizon"]
+        runs = f"{nutations:.3g} nutations" if nutations > 0.0 else f"t = {end:g}"
+        ax.set_title(f"{data['scene'].item()}, {runs}", loc="left", weight="bold")
+        if x == "seconds":
+            ax.axvline(exact := data["exact_seconds"].item(), color="0.35", ls=(0, (1, 2)), lw=1.0)
+            ax.text(exact, 0.1, "exact motion ", rotation=90, ha="right", size=LEAST_TEXT, transform=edge["transform"])
+    name_ends(ax, ends)
 
 
 def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None:
@@ -260,7 +209,7 @@ def draw_ensemble(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> No
 
 
 def _bands(axis: Any, members: xr.Dataset, data: xr.Dataset, quantity: str) -> None:
-    """Quantiles over members of an error against time, on one Axes, at places of `symtop.measure.spread.at_places`.
+    """Quantiles over members of an error against time, on one Axes, at places of `symtop.report.spread.at_places`.
 
     Errors beyond `MOST` are drawn there: angles do not exceed pi, and a quantile of runs that failed is named so. Where
     all members have as many steps a nutation, a sample at a whole nutation is one for all of them, and energy errors
@@ -305,5 +254,5 @@ def _draw_quantiles(axis: Any, times: Any, errors: Any, most: float, color: str)
 def draw_compare(data: xr.Dataset, path: str | Path) -> None:
     """The figure of a comparison in a file."""
     figure, axes = panels(1, 1, height=3.6)
-    _compare(axes[0, 0], data, "axis")
+    _sweep(axes[0, 0], data, "axis", None)
     save(figure, at_home(path))

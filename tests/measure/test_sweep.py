@@ -1,0 +1,211 @@
+"""sweep(): one dataset of errors, work and outcomes; kept in a file, resumed from it, and drawn."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import symtop
+from symtop.core import netcdf
+from symtop.measure import sweep as module
+from symtop.measure.accuracy import error_row
+
+STEPS = [0.02, 0.01, 0.005]
+METHODS = ["strang", "rk4[axis]", "rk45-compiled", "exact"]
+ASKED = {"step_size": STEPS, "tolerance": [1e-4, 1e-6], "horizon": 2.0, "quiet": True}
+
+
+@pytest.fixture(scope="module")
+def data():
+    return symtop.sweep(["spheroid", "goldstein"], METHODS, **ASKED)
+
+
+def test_each_entry_is_that_of_one_run(data):
+    assert dict(data.sizes) == {"scene": 2, "variant": 4, "setting": 3}
+    for scene in ("spheroid", "goldstein"):
+        row = error_row(symtop.scene(scene), symtop.integrator("strang"), 0.01, 2.0)
+        cell = data.sel(scene=scene, variant="strang").isel(setting=1)
+        for name in ("axis", "attitude_end", "energy_bound", "force_evaluations", "step_size", "outcome"):
+            assert cell[name].values == row[name]
+
+
+def test_settings_belong_to_those_who_have_them(data):
+    adaptive, formula = (data.sel(variant=name, scene="spheroid") for name in ("rk45-compiled", "exact"))
+    assert adaptive["outcome"].values.tolist() == ["ok", "ok", "not_run"]
+    assert adaptive["tolerance"].values[:2].tolist() == [1e-4, 1e-6]
+    assert np.isnan(adaptive["step_size"].values[:2]).all()
+    assert formula["outcome"].values.tolist() == ["ok", "not_run", "not_run"]
+    slope = np.diff(np.log(data.sel(variant="rk4[axis]", scene="spheroid")["axis"].values)) / math.log(0.5)
+    assert slope == pytest.approx([4.0, 4.0], abs=0.3)
+    assert data["axis"].attrs["long_name"] == "angle between axes (rad), largest over the run"
+
+
+def test_one_thread_and_many_and_a_file_give_the_same(data, tmp_path):
+    file = tmp_path / "sweep.nc"
+    for options in ({"threads": 1}, {"path": file}):
+        again = symtop.sweep(["spheroid", "goldstein"], METHODS, **ASKED, **options)
+        xr.testing.assert_identical(again.drop_attrs(), data.drop_attrs())
+    xr.testing.assert_identical(netcdf.read(file).drop_attrs(), data.drop_attrs())
+
+
+def test_a_sweep_that_was_stopped_goes_on_from_its_file(tmp_path, monkeypatch):
+    """Killed after three cells of eight, it computes the other five; a changed setting computes its own cells only."""
+    file, table, ran = tmp_path / "sweep.nc", module._table, []
+
+    def counted(cell):
+        ran.append((cell.scene.name, cell.method.name))
+        return table(cell)
+
+    def stopping(cell):
+        if len(ran) == 3:
+            raise KeyboardInterrupt
+        return counted(cell)
+
+    call = {**ASKED, "path": file, "threads": 1}
+    monkeypatch.setattr(module, "_table", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        symtop.sweep(["spheroid", "goldstein"], METHODS, **call)
+    ran.clear()
+    monkeypatch.setattr(module, "_table", counted)
+    whole = symtop.sweep(["spheroid", "goldstein"], METHODS, **call)
+    assert len(ran) == 5
+    assert (whole["made_of"] != "").all()
+    ran.clear()
+    symtop.sweep(["spheroid", "goldstein"], METHODS, **call)
+    assert ran == []
+    symtop.sweep(["spheroid", "goldstein"], METHODS, **{**call, "tolerance": [1e-5]})
+    assert ran == [("spheroid", "rk45-compiled"), ("goldstein", "rk45-compiled")]
+
+
+def test_failures_are_rows():
+    """A run that leaves its chart, and a method that raises, beside one that is well."""
+
+    def broken(top, start, plan):
+        raise ZeroDivisionError("of its own")
+
+    bad = symtop.Integrator(name="broken", family="other", summary="raises", solvers={"axis": broken})
+    data = symtop.sweep("spheroid", [bad, "stormer-verlet", "strang"], step_size=[1.0, 0.01], horizon=8.0, quiet=True)
+    outcomes = data["outcome"].values[0]
+    assert outcomes[0].tolist() == ["raised", "raised"]
+    assert "ZeroDivisionError: of its own" in str(data["message"].values[0, 0, 0])
+    assert data["step_size"].values[0, 0].tolist() == [1.0, 0.01]
+    assert outcomes[1].tolist() == ["left_chart", "ok"]
+    assert outcomes[2].tolist() == ["ok", "ok"]
+    assert np.isnan(data["axis"].values[0, 0]).all()
+
+
+def test_a_file_with_other_cells_is_refused_and_left_as_it_is(tmp_path, monkeypatch):
+    """Fewer cells than the file holds, or others, would destroy what is there; more of them, in any order, do not."""
+    file, asked = tmp_path / "sweep.nc", {"step_size": [0.02], "horizon": 1.0, "quiet": True}
+    symtop.sweep("spheroid", ["rk4[axis]", "strang"], path=file, **asked)
+    before, table = file.read_bytes(), module._table
+    monkeypatch.setattr(module, "_table", lambda _: pytest.fail("it computes"))
+    for scene, names, left in (
+        ("spheroid", ["strang"], r"rk4\[axis\] on spheroid"),
+        ("spheroid", ["midpoint"], r"rk4\[axis\] on spheroid, strang on spheroid"),
+        ("goldstein", ["rk4[axis]", "strang"], r"rk4\[axis\] on spheroid, strang on spheroid"),
+    ):
+        with pytest.raises(symtop.SymtopError, match=f"holds what was not asked for, {left}: ask for these as well"):
+            symtop.sweep(scene, names, path=file, **asked)
+    assert file.read_bytes() == before
+    turned = symtop.sweep("spheroid", ["strang", "rk4[axis]"], path=file, **asked)
+    xr.testing.assert_identical(netcdf.read(file).drop_attrs(), turned.drop_attrs())
+    monkeypatch.setattr(module, "_table", table)
+    more = symtop.sweep(["goldstein", "spheroid"], ["midpoint", "strang", "rk4[axis]"], path=file, **asked)
+    xr.testing.assert_identical(netcdf.read(file).drop_attrs(), more.drop_attrs())
+    for name in ("strang", "rk4[axis]"):
+        one = {"scene": "spheroid", "variant": name}
+        assert more["axis"].sel(one).values == turned["axis"].sel(one).values
+
+
+def test_a_cell_that_raised_is_tried_again_and_one_that_ended_early_is_not(tmp_path, monkeypatch):
+    file, disk, well = tmp_path / "sweep.nc", tmp_path / "disk", symtop.integrator("strang[axis]").solvers["axis"]
+    ran, table = [], module._table
+
+    def moody(top, start, plan):
+        if not disk.exists():  # a list of calls would be part of what the numbers depend on
+            disk.touch()
+            raise OSError("the disk is away")
+        return well(top, start, plan)
+
+    monkeypatch.setattr(module, "_table", lambda cell: ran.append(cell.method.name) or table(cell))
+    method = symtop.Integrator(name="moody", family="other", summary="raises once", solvers={"axis": moody})
+    for outcomes, again in (
+        (["raised", "ok"], ["stormer-verlet", "moody"]),
+        (["ok", "ok"], ["moody"]),
+        (["ok"] * 2, []),
+    ):
+        asked = {"step_size": [1.0, 0.02], "path": file, "threads": 1, "quiet": True}
+        data = symtop.sweep("spheroid", ["stormer-verlet", method], **asked)
+        assert data["outcome"].sel(variant="moody").values[0].tolist() == outcomes
+        assert data["outcome"].sel(variant="stormer-verlet").values[0].tolist() == ["left_chart", "ok"]
+        assert ran == again
+        ran.clear()
+        xr.testing.assert_identical(netcdf.read(file).drop_attrs(), data.drop_attrs())
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ({}, "strang has a fixed step: give step_size or per_nutation"),
+        ({"step_size": 0.1, "per_nutation": 9}, "give step_size or per_nutation"),
+        ({"step_size": [0.1, -1]}, "step_size must be above zero, not -1.0"),
+        ({"step_size": 99.0}, "step_size must be at most the horizon"),
+        ({"step_size": 0.1, "integrators": "rk45"}, "rk45 is adaptive: give tolerance"),
+        ({"step_size": 0.1, "integrators": []}, "integrators must be one or more, each once"),
+        ({"step_size": 0.1, "scenes": ["spheroid", "spheroid"]}, "scenes must be one or more, each once"),
+        ({"step_size": 0.1, "scenes": "sferoid"}, "did you mean spheroid"),
+        ({"step_size": 0.1, "scenes": {"I1": [1.0]}}, "for a dataset of tops there is ensemble"),
+        ({"step_size": 0.1, "threads": 0}, "threads must be a whole number"),
+    ],
+)
+def test_bad_input_is_one_sentence(words, says):
+    with pytest.raises(symtop.SymtopError, match=says):
+        symtop.sweep(**{"scenes": "spheroid", "integrators": "strang", **words})
+
+
+def test_a_file_of_something_else_is_refused(tmp_path):
+    file = tmp_path / "run.nc"
+    symtop.simulate("spheroid", "strang", step_size=0.01).to_netcdf(file)
+    before = file.read_bytes()
+    with pytest.raises(symtop.SymtopError, match="path must be a new file or that of a sweep"):
+        symtop.sweep("spheroid", "strang", step_size=0.01, path=file)
+    assert file.read_bytes() == before
+
+
+def test_steps_a_nutation_are_those_of_each_scene():
+    data = symtop.sweep(["spheroid", "goldstein"], "strang", per_nutation=[50], horizon=2.0, quiet=True)
+    for name in ("spheroid", "goldstein"):
+        steps = 2.0 / round(2.0 * 50 / symtop.scene(name).nutation_period)
+        assert data.sel(scene=name)["step_size"].item() == pytest.approx(steps)
+
+
+def test_the_chart_of_each_run_is_said(data):
+    assert data["chart"].sel(scene="spheroid", variant="rk4[axis]").item() == "axis"
+    charts = symtop.sweep(["spheroid", "grazing"], ["rk4", "strang"], step_size=0.01, horizon=0.5, quiet=True)["chart"]
+    for (scene, name), chart in zip([(s, n) for s in ("spheroid", "grazing") for n in ("rk4", "strang")],
+                                    charts.values.ravel(), strict=True):  # fmt: skip
+        assert symtop.simulate(scene, name, step_size=0.01, horizon=0.5, guard=False).attrs["chart"] == chart
+
+
+def test_times_are_those_of_runs_that_ended_well_and_are_kept(tmp_path):
+    file = tmp_path / "sweep.nc"
+    options = {"step_size": [0.001, 3.0], "horizon": 20.0, "timed": True, "quiet": True, "path": file}
+    data = symtop.sweep("spheroid", ["rk4", "strang"], **options)
+    good = data["outcome"].values == "ok"
+    assert 0 < good.sum() < good.size
+    assert (np.isfinite(data["seconds"].values) == good).all()
+    assert (data["seconds"].values[good] > 0.0).all()
+    assert "one call of the method's solver" in data.attrs["timed"]
+    again = symtop.sweep("spheroid", ["rk4", "strang"], **options)
+    np.testing.assert_array_equal(again["seconds"].values, data["seconds"].values)
+    untimed = symtop.sweep("spheroid", "rk4", step_size=0.1, quiet=True)
+    assert "seconds" not in untimed
+    assert untimed.attrs["timed"].startswith("nothing")
+    with pytest.raises(symtop.SymtopError, match="timed must be"):
+        symtop.sweep("spheroid", "rk4", step_size=0.1, timed="yes")
+    ax = symtop.plot(data)
+    assert ax.get_xlabel() == "time of a run, one core (s)"
+    assert {text.get_text().split(":")[0] for text in ax.texts} == {"rk4[angles]", "strang[attitude]"}
+    ax.figure.clear()
