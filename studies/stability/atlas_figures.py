@@ -32,6 +32,7 @@ HATCHES = {  # of the legend, and in the map: which pixels, by row, counted upwa
     "drifting": ("----", lambda row, column: (row % 6 == 0) & (column >= 0)),
     "step_too_small": ("....", lambda row, column: (row % 5 == 0) & (column % 5 == 0)),
     "out_of_budget": ("||||", lambda row, column: (column % 6 == 0) & (row >= 0)),
+    "not_normalised": ("oooo", lambda row, column: ((row + column) % 8 == 0) & (row % 4 == 0)),
 }
 SETTLED = {"step_size": "accurate at longer steps, not run", "tolerance": "accurate at looser tolerances, not run"}
 PALE_GREEN = "#9FDAC8"

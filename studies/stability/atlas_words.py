@@ -25,6 +25,7 @@ FAILURES = {
     "not_finite": "overflow",
     "step_too_small": "stop because their steps become too small",
     "out_of_budget": "exceed their budget of steps",
+    "not_normalised": "let the quaternion's length leave one",
 }  # what runs do
 NO_LIMIT = "none"  # in the table: small nutations grow at none of the steps tried
 EXCEPTIONS = 2  # methods at most that a sentence on all others names apart

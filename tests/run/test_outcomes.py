@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import symtop
+from symtop.model import charts
 from symtop.model.scenes import grazing, steady
 
 # ---- outcomes in the kernels -----------------------------------------------------------------------------------------
@@ -28,6 +29,7 @@ HUGE = symtop.Scene("huge", symtop.SymmetricTop(1.0, 1.0, 1e30), symtop.Angles(t
         ("spheroid", "rk45-compiled", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
         ("spheroid", "dop853", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
         ("spheroid", "taylor", {"budget": 3}, "out_of_budget"),
+        ("spheroid", "rk4[attitude]", {"step_size": 0.2}, "not_normalised"),
     ],
 )
 def test_every_outcome_is_produced_said_and_timed(scene, name, controls, outcome):
@@ -109,3 +111,33 @@ def test_absurd_runs_end_at_once_with_a_sentence(scene, name, controls):
 
 def _fine(name):
     return {} if name in ("taylor", "exact") else {"tolerance": 1e-3}
+
+
+@pytest.mark.parametrize(("name", "step_size"), [("rk4[attitude]", 0.2), ("series[attitude]", 0.5)])
+def test_a_quaternion_that_leaves_length_one_has_failed_alone_and_in_an_ensemble(name, step_size):
+    options = {"step_size": step_size, "horizon": 8.0, "samples": 41}
+    run = symtop.simulate("spheroid", name, **options, guard=False)
+    assert run.attrs["outcome"] == "not_normalised"
+    assert "0.1 %" in run.attrs["outcome_message"]
+    shown = np.isfinite(run["quaternion"].values).all(axis=1)
+    assert 0 < shown.sum() < shown.size
+    assert (np.diff(shown.astype(int)) <= 0).all()  # nothing after the failure
+    lengths = np.linalg.norm(run["quaternion"].values[shown], axis=1)
+    assert np.abs(lengths - 1.0).max() <= 1e-3
+    assert run.attrs["reached_time"] == run["time"].values[shown][-1]
+    assert np.isnan(run["p_phi"].values[~shown]).all()
+    assert np.nanmax(symtop.errors(run)["attitude"].values) <= np.pi
+    many = symtop.ensemble(["spheroid", "goldstein"], name, **options, observe="attitude", quiet=True).isel(member=0)
+    assert many["outcome"].item() == "not_normalised"
+    assert many["reached_time"].item() == run.attrs["reached_time"]
+    np.testing.assert_array_equal(many["quaternion"].values, run["quaternion"].values)
+
+
+def test_a_quaternion_that_keeps_its_length_has_not_failed():
+    run = symtop.simulate("spheroid", "strang[attitude]", step_size=0.5, guard=False)
+    assert run.attrs["outcome"] == "ok"
+    near = symtop.simulate("spheroid", "rk4[attitude]", step_size=0.05, guard=False)
+    assert near.attrs["outcome"] == "ok"
+    assert np.abs(np.linalg.norm(near["quaternion"].values, axis=1) - 1.0).max() > 5e-4
+    far = charts.attitude_distance(np.array([3e116, 0.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 0.0]))
+    assert far == np.pi
