@@ -40,7 +40,7 @@ from numba.extending import intrinsic, overload, register_jitable as _register
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from symtop.core.code_hash import Walk, by_name, digest, hashed
-from symtop.core.files import cache_root, on_cold, prune, touch
+from symtop.core.files import cache_root, is_trusted, make_private, on_cold, prune, touch
 from symtop.core.jit_functions import Function, fused, inlined_parts, shared_parts, two_product
 from symtop.core.sines import polynomials, sincos
 
@@ -119,7 +119,7 @@ class _Folder:
         if not _pruned:
             _pruned.append(self.path)
             prune(self.path.parent, MOST_BYTES)
-        self.path.mkdir(parents=True, exist_ok=True)
+        make_private(self.path)
 
 
 class _Index(IndexDataCacheFile):  # type: ignore[misc]
@@ -128,7 +128,8 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
     numba counts them: two processes that save at the same time give two signatures one file, and from then on each
     process that asks for one of them gets the code of the other. And it runs what it finds: a single byte that has
     flipped on the disk ended the process (SIGSEGV, SIGILL) in one trial out of five. Here the code follows its hash,
-    and an index that cannot be read is empty.
+    and an index that cannot be read is empty. A pickle is a program: one that somebody else may have written is not
+    read, and only the user can write what is saved.
     """
 
     def save(self, key: Any, data: Any) -> None:
@@ -138,6 +139,8 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
         self._save_index(self._load_index() | {key: name})
 
     def _load_index(self) -> dict[Any, str]:
+        if not is_trusted(Path(self._index_path)):
+            return {}
         try:
             index: dict[Any, str] = super()._load_index()
         except Exception:  # noqa: BLE001  (a damaged pickle raises nearly anything)
@@ -149,8 +152,17 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
         with self._open_for_write(self._data_path(name)) as file:
             file.write(hashlib.sha256(code).digest() + code)
 
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[Any]:
+        with super()._open_for_write(filepath) as file:
+            Path(file.name).chmod(0o600)
+            yield file
+
     def _load_data(self, name: str) -> Any:
-        whole = Path(self._data_path(name)).read_bytes()
+        path = Path(self._data_path(name))
+        if not is_trusted(path):
+            raise ValueError("the code on disk may be somebody else's")
+        whole = path.read_bytes()
         checksum, code = whole[:HASH], whole[HASH:]
         if hashlib.sha256(code).digest() != checksum:
             raise ValueError("the code on disk is damaged")
@@ -230,7 +242,8 @@ def _without_collecting(compiling: Callable[..., Any]) -> Callable[..., Any]:
 def compile_kernel(function: Callable[..., Any]) -> Any:
     """``njit`` with the disk cache.
 
-    Division by zero gives infinity, as in C: the kernel's outcome says what became of it.
+    Division by zero gives infinity, as in C: the kernel's outcome says what became of it. A cache that somebody else
+    may write is not used, with a warning (`is_trusted`).
     A kernel with functions typed at a prompt, which have no source file, compiles without the cache. The constructor of
     a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
     """
@@ -241,8 +254,9 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     written = [part for part in walk.functions if not part.__module__.startswith("namedtuple_")]
     if all(Path(part.__code__.co_filename).is_file() for part in written):
         folder = cache_root() / "kernels" / digest(walk.values())
-        touch(folder)
-        kernel._cache = _Cache(function, folder)
+        if all(map(is_trusted, (cache_root(), folder.parent, folder))):
+            touch(folder)
+            kernel._cache = _Cache(function, folder)
     return kernel
 
 

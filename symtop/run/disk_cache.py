@@ -16,7 +16,7 @@ import xarray as xr
 
 from symtop.core import code_hash, netcdf
 from symtop.core.errors import SymtopError, SymtopWarning
-from symtop.core.files import cache_root, prune, touch
+from symtop.core.files import cache_root, make_private, prune, touch
 
 MOST_BYTES = 500_000_000  # of a folder; a reference at 1000 times takes 200 kB
 OFTEN = 50  # files that a process writes between two looks at the size of the folder
@@ -54,10 +54,11 @@ def cached(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> 
             warnings.warn(sentence, SymtopWarning, stacklevel=depth)
     data = compute()
     try:
+        make_private(path.parent)
         netcdf.write(data.assign_attrs(content=netcdf.content_hash(data)), path)
         if next(_written) % OFTEN == 0:
             prune(path.parent, MOST_BYTES)
-    except SymtopError as error:
+    except (SymtopError, OSError) as error:
         if depth is not None:
             warnings.warn(f"the reference is not kept: {error}", SymtopWarning, stacklevel=depth)
     return data

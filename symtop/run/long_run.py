@@ -25,7 +25,7 @@ from tqdm import tqdm
 from symtop.core import netcdf
 from symtop.core.code_hash import digest, file_reasons, hashed
 from symtop.core.errors import SymtopError, SymtopWarning, check_replaceable, file_path, positive, whole
-from symtop.core.files import cache_root
+from symtop.core.files import cache_root, make_private
 from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
 from symtop.core.progress import beating
@@ -284,6 +284,8 @@ class _Book:
         columns: dict[str, Any] = {"position": ("number", numbers), "rows": (("window", "part"), rows)}
         data = xr.Dataset({**columns, "steps_done": ((), at.k)})
         data.attrs.update(content=netcdf.content_hash(data), identity=self.identity)
+        if self.own:
+            make_private(self.file.parent)
         netcdf.write(data, self.file)
         self.saved, self.latest = time.monotonic(), None
 
