@@ -17,7 +17,6 @@ import xarray as xr
 from tqdm import tqdm
 
 from symtop.core import code_hash, netcdf
-from symtop.core.code_hash import Walk
 from symtop.core.errors import SymtopError, boolean, file_path, positive, row, whole
 from symtop.core.parallel import MOST_THREADS, cores, in_threads
 from symtop.core.progress import beating
@@ -27,7 +26,6 @@ from symtop.measure.settings import ANGLES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.simulation import chart_of, make_plan
-from symtop.runner import depends
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
@@ -190,20 +188,17 @@ def _cell(
     return _Cell(scene, method, tuple(settings), until, observe, _made_of(scene, method, (settings, until, observe)))
 
 
-def _made_of(scene: Scene, method: Integrator, asked: object) -> str:
+def _made_of(scene: Scene, method: Integrator, settings: object) -> str:
     """The digest of all that the numbers of a cell depend on."""
-    walk = Walk("sweep")
-    walk.add((scene, method, repr(asked)))
-    measured, files = _measure()
-    return code_hash.digest(
-        {**code_hash.packages(), **walk.values(), **measured, **depends.hashes(files | walk.closure())}
-    )
+    code = _code().reasons("sweep", error_row, scene, method)
+    return code_hash.digest(code | code_hash.packages() | {"settings": repr(settings)})
 
 
 @functools.cache
-def _measure() -> tuple[code_hash.Reasons, frozenset[Path]]:
-    base = depends.basis(error_row)
-    return base.values, base.files
+def _code() -> code_hash.Code:
+    from symtop.core.jit import code  # numba
+
+    return code()
 
 
 def _table(cell: _Cell) -> xr.Dataset:
