@@ -46,7 +46,7 @@ def test_what_is_made_is_the_users_alone(planted):
     root, *_ = planted
     modes = {path.is_dir(): stat.S_IMODE(path.stat().st_mode) for path in (root.parent, root, *root.rglob("*"))}
     assert modes == {True: 0o700, False: 0o600}
-    assert not [finding for finding in doctor._caches() if not finding.healthy]
+    assert not [finding for finding in doctor._caches(root) if not finding.healthy]
 
 
 def test_a_program_in_a_cache_of_our_own_is_ours_to_run(planted):
@@ -67,7 +67,7 @@ def test_what_others_may_write_is_not_read(planted, monkeypatch, at, fault):
     else:
         path.chmod(path.stat().st_mode | {"group": 0o020, "anybody": 0o002}[fault])
     words = "belongs to user 12345; set SYMTOP_CACHE" if fault == "owner" else "chmod -R go-w"
-    (found,) = [finding for finding in doctor._caches() if not finding.healthy]
+    (found,) = [finding for finding in doctor._caches(root) if not finding.healthy]
     assert found.topic == "compiled code"
     assert str(path) in found.result
     with pytest.warns(SymtopWarning, match=words):

@@ -265,7 +265,8 @@ class Job:
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
             runs = self._runs(plan)
-            top: Any = SimpleNamespace(**{name: self.numbers[:, k : k + 1] for k, name in enumerate(("I1", "I3", "mgl"))})
+            columns = {name: self.numbers[:, k : k + 1] for k, name in enumerate(("I1", "I3", "mgl"))}
+            top: Any = SimpleNamespace(**columns)
             top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)  # of all tops at once
             view = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
             runs, columns = _whole(runs, view, plan), self._observables(view, plan.times)
