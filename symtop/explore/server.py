@@ -147,10 +147,6 @@ class Handler(BaseHTTPRequestHandler):
         if self.place not in ACTIONS:
             self._refuse(404, f"there is no {self.place} here")
             return
-        origin, site = self.headers.get("Origin"), self.headers.get("Sec-Fetch-Site", "none")
-        if origin not in (None, f"http://{self.headers.get('Host')}") or site not in ("none", "same-origin"):
-            self._refuse(403, "the explorer answers its own page only")
-            return
         if self.headers.get_content_type() != "application/json":
             self._refuse(415, "a question must be JSON")
             return
@@ -189,7 +185,15 @@ class Handler(BaseHTTPRequestHandler):
             return True
 
     def _is_local(self) -> bool:
-        """Does the request name this machine? The check refuses a foreign name that resolves to 127.0.0.1."""
+        """Does the request name this machine, and a POST no page of another origin?
+
+        The check refuses a foreign name that resolves to 127.0.0.1.
+        """
+        origin, site = self.headers.get("Origin"), self.headers.get("Sec-Fetch-Site", "none")
+        foreign = origin not in (None, f"http://{self.headers.get('Host')}") or site not in ("none", "same-origin")
+        if self.command == "POST" and foreign:
+            self._refuse(403, "the explorer answers its own page only")
+            return False
         host = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host", "")
         if host in ("127.0.0.1", "localhost"):
             return True

@@ -39,7 +39,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.core.errors import SymtopError, at_home, one_of, shown, words_of
+from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, words_of
 from symtop.judging.adapters.adapter import heartbeat
 from symtop.judging.battery import Stage, measure, stages, unmeasured
 from symtop.judging.claims.constants import KEPT, Constant
@@ -103,7 +103,8 @@ def judge(
         raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {shown(energy)}", "energy")
     claims = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
     claims_of_energy = {"conserves": conserves, "energy_error": energy}
-    request = Request(target, form, chart, adaptive, find_scene(scene), quick, claims | claims_of_energy)
+    flags = boolean("adaptive", adaptive), find_scene(scene), boolean("quick", quick)
+    request = Request(target, form, chart, *flags, claims | claims_of_energy)
     made = request.claimed()  # claims that make no sense are refused before anything is loaded
     implied = {"time"} | ({"energy"} if energy is None and "energy" not in (made.conserves or ()) else set())
     table = isinstance(target, (xr.Dataset, Mapping))

@@ -283,7 +283,9 @@ def begun(log: Path, count: int, process) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "code", "says"), [(2, 130, "interrupted"), (15, 143, "terminated"), (1, 143, "terminated")])
+@pytest.mark.parametrize(
+    ("number", "code", "says"), [(2, 130, "interrupted"), (15, 143, "terminated"), (1, 143, "terminated")]
+)
 @pytest.mark.parametrize("quick", [True, False])
 def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quick):
     log = tmp_path / "log"
