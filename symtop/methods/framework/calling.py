@@ -38,7 +38,7 @@ def solve(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan
         if not own:
             _restore(method, top, start, before)
         checked = _checked(method, (plan.times.size, DIMENSIONS[chart]), plan, run, copy=not own)
-        return _of_length_one(plan, checked) if chart == "attitude" else checked
+        return _of_length_one(plan, checked, chart)
 
 
 def _restore(method: Integrator, top: SymmetricTop, start: Angles, before: tuple[float, ...]) -> None:
@@ -68,21 +68,18 @@ def _checked(method: Integrator, shape: tuple[int, int], plan: Plan, run: Any, *
             raise SymtopError(f"{must} a number of {name}, not {type(getattr(run, name)).__name__}")
     checked = Run(states, p_phi, p_psi, *run[3:])
     if checked.outcome == "ok" and not np.isfinite(states).all():
-        whole: Any = np.isfinite(states).all(axis=1)
-        reached = float(plan.times[int(np.argmin(whole)) - 1]) if whole[0] else 0.0
-        return checked._replace(outcome="not_finite", reached=reached)
+        return checked._replace(outcome="not_finite", reached=plan.last_of(np.isfinite(states).all(axis=1)))
     return checked
 
 
-def _of_length_one(plan: Plan, run: Run) -> Run:
+def _of_length_one(plan: Plan, run: Run, chart: str) -> Run:
     """The run, which ends where its quaternion has left length one."""
     with np.errstate(all="ignore"):
-        lost = off_length(run.states)
+        lost = off_length(chart, run.states)
     if not lost.any():
         return run
     states, p_phi, p_psi = np.where(lost[:, None], np.nan, run.states), *np.where(lost, np.nan, run[1:3])
-    reached = float(plan.times[max(int(np.argmax(lost)) - 1, 0)])
-    return Run(states, p_phi, p_psi, *run[3:6], "not_normalised", reached)
+    return Run(states, p_phi, p_psi, *run[3:6], "not_normalised", plan.last_of(~lost))
 
 
 def _real(values: object, *, copy: bool) -> Array | None:
