@@ -217,10 +217,12 @@ def fill(constants: Array, times: Array, view: int) -> Array:
 
 def distances(constants: Array, times: Array, axes: Array) -> Array:
     """Angles (n, samples) between axes (n, samples, 3) and those of n tops, rad; times as in `fill`."""
-    if not _compare.ready(SAMPLE_SECONDS * axes.size / 3):
-        return charts.axis_distance(axes, fill(constants, times, samples.AXIS))
     out = np.empty(axes.shape[:2])
-    _within_range(times, _compare.compiled(constants, times, axes, out))
+    if _compare.ready(SAMPLE_SECONDS * axes.size / 3):
+        bad = _compare.compiled(constants, times, axes, out)
+    else:
+        bad = samples.all_gaps(constants.tolist(), times.tolist(), axes, out)
+    _within_range(times, bad)
     return out
 
 
