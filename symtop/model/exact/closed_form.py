@@ -36,7 +36,6 @@ from numpy.typing import ArrayLike
 from symtop.core.errors import SymtopError
 from symtop.core.lazy_kernel import LazyKernel
 from symtop.core.numbers import real_numbers
-from symtop.model import charts
 from symtop.model.charts import Array
 from symtop.model.exact import layout as at, samples
 from symtop.model.exact.constants import DONE, OUT_OF_RANGE, UNMET, UNRESOLVED, all_constants
