@@ -230,7 +230,7 @@ class Integrator:
 _BUILT_IN = (
     "lagrangian.discrete_lagrangian", "lagrangian.unreduced", "lagrangian.galerkin", "lagrangian.exact_discrete",
     "lie_group.lie_variational", "splitting.splitting", "splitting.reversible_steps", "runge_kutta.runge_kutta",
-    "runge_kutta.dormand_prince", "runge_kutta.gauss", "runge_kutta.kahan", "lie_group.lie_runge_kutta",
+    "runge_kutta.dormand_prince", "runge_kutta.pairs", "runge_kutta.gauss", "runge_kutta.kahan", "lie_group.lie_runge_kutta",
     "lie_group.energy_momentum", "lie_group.generalised_alpha", "runge_kutta.collective_gauss", "library.scipy_ivp",
     "taylor.taylor", "taylor.series", "library.exact", "engines.engines",
 )  # fmt: skip

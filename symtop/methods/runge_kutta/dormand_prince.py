@@ -6,6 +6,8 @@
     h <- h min(10, .9 |err|^(-1/5)) after a step (min(1, ..) after a rejection),  h max(.2, .9 |err|^(-1/5)) rejected
     y(t + x h) = y + h sum_i k_i (p_i1 x + p_i2 x^2 + p_i3 x^3 + p_i4 x^4)     samples between steps, order 4
 
+The loop serves any pair with SciPy's control (`pairs`): a `Method` says how a step is tried and how samples are taken.
+
 `rk45-compiled` is the same method as `rk45` on the same equations (see `formulations`): it accepts and rejects the same
 steps in each chart, so that their times differ only by what Python costs and their errors not at all. It exists to keep
 the language out of a comparison of methods. Order 5, explicit, six evaluations a step; nothing is conserved.
@@ -15,6 +17,7 @@ the initial step: Hairer, Norsett, Wanner, Solving Ordinary Differential Equatio
 
 import functools
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,6 +37,17 @@ EVALUATIONS = 1_000_000_000  # a run's limit: about half a minute
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 
 
+class Method(NamedTuple):
+    """A pair in one chart, in functions that compile; `slopes` (rows, size) begins with f(y) and ends with f(y+)."""
+
+    attempt: Callable[..., Any]  # (par, state, slopes, h, tolerance) -> new state and |err|; fills `slopes`
+    refine: Callable[..., int]  # (par, state, slopes, h) -> evaluations: what samples of a step need beyond that
+    sample: Callable[..., Any]  # (par, state, new, slopes, h, x) -> the state at a fraction x of the step
+    rows: int
+    evaluations: int  # of an attempt
+    power: float  # of |err| in the step control: -1/(order of the estimate + 1)
+
+
 class Embedded(NamedTuple):
     """An embedded pair: the tableau, the weights of its error estimate and those of its interpolant."""
 
@@ -41,6 +55,23 @@ class Embedded(NamedTuple):
     b: tuple[float, ...]
     error: tuple[float, ...]
     dense: tuple[tuple[float, ...], ...]  # one polynomial in x = (t - t_old)/h for each stage, without constant
+
+    def method(self, field: Callable[..., Any]) -> Method:
+        """The pair on the equations y' = field(par, y)."""
+        a, b, error, dense = self
+
+        @register_jitable
+        def attempt(par, state, slopes, h, tolerance):  # type: ignore[no-untyped-def]
+            later_stages(field, par, a, len(b), state, slopes, h)
+            new = plus(state, weighted(b, state, slopes, h))
+            store(slopes, len(b), field(par, new))
+            return new, rms(weighted(error, state, slopes, h), state, new, tolerance)
+
+        @register_jitable
+        def sample(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
+            return interpolate(dense, state, slopes, h, x)
+
+        return Method(attempt, nothing_more, sample, len(error), len(b), -0.2)
 
 
 DORMAND_PRINCE = Embedded(
@@ -66,7 +97,7 @@ DORMAND_PRINCE = Embedded(
 
 
 @register_jitable
-def _rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
+def rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
     """Root mean square of a vector in units of what is allowed, tolerance (1 + |y|)."""
     total = 0.0
     for m in range(len(vector)):
@@ -76,7 +107,7 @@ def _rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
 
 
 @register_jitable
-def _interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any:
+def interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any:
     """The state at a fraction x of the step."""
     weights = dense[0] + dense[1][:3]  # a tuple of seven
     for i in range(len(dense)):
@@ -86,9 +117,16 @@ def _interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any
 
 
 @register_jitable
+def nothing_more(par: Any, state: Any, slopes: Any, h: float) -> int:
+    """Samples need no further evaluations."""
+    return 0
+
+
+@register_jitable
 def _try_steps(
-    field: Any, par: Any, pair: Any, state: Any, slopes: Any, tolerance: float, t: float, step: float, end: float
-) -> Any:
+    attempt: Any, cost: int, power: float, par: Any, state: Any, slopes: Any, tolerance: float, t: float, step: float,
+    end: float,
+) -> Any:  # fmt: skip
     """Shrink the step until its error passes: new state, new time, next step, evaluations, outcome."""
     least = 10.0 * (np.nextafter(t, np.inf) - t)
     step = max(step, least)
@@ -97,12 +135,9 @@ def _try_steps(
     while step >= least:
         after = min(t + step, end)
         h = after - t
-        later_stages(field, par, pair.a, len(pair.b), state, slopes, h)
-        new = plus(state, weighted(pair.b, state, slopes, h))
-        store(slopes, len(pair.b), field(par, new))
-        evaluations += len(pair.b)
-        error = _rms(weighted(pair.error, state, slopes, h), state, new, tolerance)
-        change = GROW if error == 0.0 else SAFETY * error**-0.2
+        new, error = attempt(par, state, slopes, h, tolerance)
+        evaluations += cost
+        change = GROW if error == 0.0 else SAFETY * error**power
         if error < 1.0:
             return new, after, h * min(grow, change), evaluations, OK
         step = h * (change if change > SHRINK else SHRINK)  # noqa: FURB136  (max would pass NaN on)
@@ -111,20 +146,20 @@ def _try_steps(
 
 
 @register_jitable
-def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, tolerance: float) -> float:
+def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, tolerance: float, power: float) -> float:
     """SciPy's initial step: 1 % of |y|/|f|, then from the size of the second derivative, by one evaluation of f."""
-    d0, d1 = _rms(state, state, state, tolerance), _rms(slope, state, state, tolerance)
+    d0, d1 = rms(state, state, state, tolerance), rms(slope, state, state, tolerance)
     trial = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, end)
     bent = field(par, add(state, slope, trial))
     for m in range(len(state)):
         bent = set_item(bent, m, bent[m] - slope[m])
-    d2 = _rms(bent, state, state, tolerance) / trial
-    guess = max(1e-6, 1e-3 * trial) if max(d1, d2) <= 1e-15 else (0.01 / max(d1, d2)) ** 0.2
+    d2 = rms(bent, state, state, tolerance) / trial
+    guess = max(1e-6, 1e-3 * trial) if max(d1, d2) <= 1e-15 else (0.01 / max(d1, d2)) ** -power
     return min(100.0 * trial, guess, end)
 
 
 @functools.cache
-def loop(chart: str, pair: Embedded = DORMAND_PRINCE) -> Loop:  # noqa: C901
+def loop(chart: str, pair: Any = DORMAND_PRINCE) -> Loop:  # noqa: C901
     """The loop in one chart as `adaptive` takes it, compiled when it is first used; it counts force evaluations.
 
     The place is (state, its slope, time, step).
@@ -133,7 +168,9 @@ def loop(chart: str, pair: Embedded = DORMAND_PRINCE) -> Loop:  # noqa: C901
     field, ended, observe, prepare, size = form.field, form.ended, form.observe, form.prepare.numbers, form.prepare.size
     sample = as_it_steps if form.present is None else form.present.sample
     register_jitable(observe)
-    clock, stages = 2 * size, len(pair.error)
+    method: Method = pair.method(field)
+    attempt, refine, between, stages, cost, power = method
+    clock, last = 2 * size, method.evaluations
 
     def march(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
         par, state = prepare(Body(*numbers[:3]), Start(*numbers[3:]))
@@ -144,27 +181,31 @@ def loop(chart: str, pair: Embedded = DORMAND_PRINCE) -> Loop:  # noqa: C901
         if seen < 0:
             slope = field(par, state)
             store(slopes, 0, slope)
-            seen, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance), 2
+            seen, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance, power), 2
         else:
             t, step = place[clock], place[clock + 1]
             for m in range(size):
                 state, slopes[0, m] = set_item(state, m, place[m]), place[size + m]
         while t < end and effort < budget:
             before, start = state, t
-            state, t, step, work, outcome = _try_steps(field, par, pair, before, slopes, tolerance, start, step, end)
+            state, t, step, work, outcome = _try_steps(
+                attempt, cost, power, par, before, slopes, tolerance, start, step, end
+            )
             effort += work
             if outcome != OK:
                 break
             steps += 1
             h = t - start
+            if seen < len(times) and times[seen] <= t:
+                effort += refine(par, before, slopes, h)
             while seen < len(times) and times[seen] <= t:
-                place_then = _interpolate(pair.dense, before, slopes, h, (times[seen] - start) / h)
+                place_then = between(par, before, state, slopes, h, (times[seen] - start) / h)
                 store(states, seen, sample(par, times[seen], place_then))
                 momenta[seen, 0], momenta[seen, 1] = observe(par, 0.0, place_then, nothing, 0.0)
                 seen += 1
             outcome = ended(state)
             for m in range(size):
-                slopes[0, m] = slopes[stages - 1, m]
+                slopes[0, m] = slopes[last, m]
             if outcome != OK:
                 break
         for m in range(size):
@@ -176,7 +217,7 @@ def loop(chart: str, pair: Embedded = DORMAND_PRINCE) -> Loop:  # noqa: C901
     return compiled
 
 
-def solver(chart: str, pair: Embedded = DORMAND_PRINCE) -> Adaptive:
+def solver(chart: str, pair: Any = DORMAND_PRINCE) -> Adaptive:
     """A solver of the registry in one chart."""
     form: Any = FORMULATIONS[chart]
     size, shown = form.prepare.size, form.prepare.size if form.present is None else form.present.size
