@@ -45,7 +45,7 @@ def measure() -> list[Item]:
     """Times a member of `simulate`, of the whole call, and of its parts on one thread."""
     tops = symtop.population(MEMBERS, seed=1)
     numbers = reading.read_members(tops).numbers
-    row = symtop.integrator(METHOD).row(CHART)
+    row = symtop.integrator(METHOD).variant(CHART)
     period = nutation_periods(numbers)
     horizon, steps = NUTATIONS * period, np.full(MEMBERS, NUTATIONS * PER_NUTATION)
     plan, solver = schedule(period, horizon, SAMPLES, steps), row.solvers[CHART]

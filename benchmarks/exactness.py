@@ -20,10 +20,11 @@ import numpy as np
 
 import symtop
 from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.loop import Loop, accumulate_plainly, driver
+from symtop.methods.framework.loop import Loop, driver
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian import exact_discrete
-from symtop.methods.lagrangian.exact_map import exact_map
+from symtop.methods.lagrangian.oscillators import exact_map
+from symtop.methods.vectors import accumulate_plainly
 from symtop.model import charts
 from symtop.model.exact.precise_form import PreciseForm
 from symtop.model.top import Angles, SymmetricTop

@@ -28,7 +28,7 @@ from symtop.measure.timing import timings
 from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.lanes import W
 from symtop.methods.framework.many import members_of
-from symtop.methods.taylor import taylor
+from symtop.methods.taylor import heyoka
 from symtop.model import charts
 from symtop.model.exact.closed_forms import ClosedForms
 from symtop.model.top import flat
@@ -173,10 +173,10 @@ class Batches:
     def __init__(self, numbers: np.ndarray, tolerance: float) -> None:
         import heyoka as hy
 
-        system, self.wide = taylor.equations("axis"), hy.recommended_simd_size()
-        tops = [taylor.start_numbers("axis", "double", *top) for top in members_of(numbers)]
+        system, self.wide = heyoka.equations("axis"), hy.recommended_simd_size()
+        tops = [heyoka.start_numbers("axis", "double", *top) for top in members_of(numbers)]
         self.states, self.pars = np.array([state for state, _ in tops]), np.array([par[:2] for _, par in tops])
-        self.single = taylor.stepper("axis", "double", tolerance)
+        self.single = heyoka.stepper("axis", "double", tolerance)
         self.batch = hy.taylor_adaptive_batch(system, np.zeros((len(system), self.wide)), tol=tolerance)
         self.steps_a_top = np.nan  # of the last call side by side
 

@@ -21,10 +21,10 @@ import numpy as np
 from symtop.methods.framework.fixed_step import inside
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian import discrete_lagrangian, exact_discrete, galerkin, unreduced
-from symtop.methods.lie_group import energy_momentum, generalised_alpha, lie_runge_kutta, lie_variational
-from symtop.methods.runge_kutta import collective_gauss, gauss, kahan, runge_kutta
-from symtop.methods.splitting import splitting_angles, splitting_space
-from symtop.methods.taylor import attitude_series, axis_series
+from symtop.methods.lie_group import energy_momentum, generalised_alpha, runge_kutta, variational
+from symtop.methods.runge_kutta import collective_gauss, explicit, gauss, kahan
+from symtop.methods.splitting import angles, space
+from symtop.methods.taylor import series
 from symtop.methods.taylor.series import DEFAULT_ORDER
 from symtop.model.scenes import Scene
 
@@ -66,31 +66,31 @@ FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
     discrete_lagrangian.march: ("discrete_lagrangian", ""),
     unreduced.march: ("unreduced", ""),
     galerkin.march: ("galerkin", ""),
-    splitting_angles.march: ("splitting_angles", ""),
-    splitting_space.march_axis: ("splitting_space", ""),
-    splitting_space.march_attitude: ("splitting_space", "ATTITUDE"),
-    **{loop: ("runge_kutta", chart.upper()) for chart, loop in runge_kutta.LOOPS.items()},
+    angles.march: ("splitting_angles", ""),
+    space.march_axis: ("splitting_space", ""),
+    space.march_attitude: ("splitting_space", "ATTITUDE"),
+    **{loop: ("runge_kutta", chart.upper()) for chart, loop in explicit.LOOPS.items()},
     exact_discrete.march_axis: ("exact_discrete", ""),
     exact_discrete.march_attitude: ("exact_discrete", ""),
-    axis_series.march(DEFAULT_ORDER): ("series", ""),
-    attitude_series.march(DEFAULT_ORDER): ("series", "ATTITUDE"),
+    series.march_axis(DEFAULT_ORDER): ("series", ""),
+    series.march_attitude(DEFAULT_ORDER): ("series", "ATTITUDE"),
     gauss.march_axis: ("gauss", "AXIS"),
     gauss.march_frame: ("gauss", "FRAME"),
     kahan.march_axis: ("kahan", ""),
     kahan.march_frame: ("kahan", "FRAME"),
-    lie_runge_kutta.march: ("lie_group", "RUNGE_KUTTA"),
-    lie_variational.march: ("lie_group", "VARIATIONAL"),
+    runge_kutta.march: ("lie_group", "RUNGE_KUTTA"),
+    variational.march: ("lie_group", "VARIATIONAL"),
     energy_momentum.march: ("lie_group", "ENERGY_MOMENTUM"),
     generalised_alpha.march: ("lie_group", "ALPHA"),
     collective_gauss.march: ("lie_group", "COLLECTIVE"),
 }
 # maps between the variables that are stepped and those that are shown, once a run
 SHOWN: dict[Callable[..., Any], tuple[Callable[..., Any], Callable[..., Any]]] = {
-    splitting_space.march_axis: (splitting_space.enter_axis, splitting_space.present_axis),
-    splitting_space.march_attitude: (splitting_space.enter_attitude, splitting_space.present_attitude),
+    space.march_axis: (space.enter_axis, space.present_axis),
+    space.march_attitude: (space.enter_attitude, space.present_attitude),
     exact_discrete.march_axis: (exact_discrete.enter, exact_discrete.present_axis),
     exact_discrete.march_attitude: (exact_discrete.enter, exact_discrete.present_attitude),
-    attitude_series.march(DEFAULT_ORDER): (lambda _par, _rule, state, _h: state, attitude_series.present),
+    series.march_attitude(DEFAULT_ORDER): (lambda _par, _rule, state, _h: state, series.present),
 }
 
 

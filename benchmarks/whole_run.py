@@ -37,7 +37,7 @@ def measure() -> list[Item]:
     """The parts of one run, and the whole, in a process that has loaded every kernel."""
     for kernel in LAZY:
         kernel.compile()
-    scene, method = symtop.scene(SCENE), symtop.integrator(METHOD).row(CHART)
+    scene, method = symtop.scene(SCENE), symtop.integrator(METHOD).variant(CHART)
     h = scene.horizon / STEPS
     plan, _ = make_plan(scene, method, h, None, horizon=scene.horizon, samples=501)
     run = solve(method, CHART, scene.top, scene.start, plan)

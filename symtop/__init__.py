@@ -14,18 +14,18 @@ if TYPE_CHECKING:
     from symtop.core.errors import SymtopError as SymtopError, SymtopWarning as SymtopWarning
     from symtop.judging.judge_step import judge as judge
     from symtop.measure.errors import errors as errors
-    from symtop.methods.framework.citations import citation as citation
-    from symtop.methods.framework.field import field as field
+    from symtop.methods.framework.equations import field as field
     from symtop.methods.framework.plan import Plan as Plan, Run as Run
     from symtop.methods.framework.registry import (
         Integrator as Integrator,
+        citation as citation,
         integrator as integrator,
         integrators as integrators,
         register as register,
     )
     from symtop.methods.lagrangian.discrete_lagrangian import discrete_lagrangian as discrete_lagrangian
-    from symtop.methods.runge_kutta.runge_kutta import runge_kutta as runge_kutta
-    from symtop.methods.splitting.splitting import composition as composition
+    from symtop.methods.runge_kutta.explicit import runge_kutta as runge_kutta
+    from symtop.methods.splitting.composition import composition as composition
     from symtop.methods.taylor.series import series as series
     from symtop.model.exact.closed_form import ClosedForm as ClosedForm
     from symtop.model.scenes import Scene as Scene, register_scene as register_scene, scene as scene, scenes as scenes
@@ -47,14 +47,13 @@ _NAMES = {  # by the module that holds them
     "core.errors": "SymtopError SymtopWarning",
     "judging.judge_step": "judge",
     "measure.errors": "errors",
-    "methods.framework.citations": "citation",
     "methods.lagrangian.discrete_lagrangian": "discrete_lagrangian",
-    "methods.framework.field": "field",
+    "methods.framework.equations": "field",
     "methods.framework.plan": "Plan Run",
-    "methods.framework.registry": "Integrator integrator integrators register",
-    "methods.runge_kutta.runge_kutta": "runge_kutta",
+    "methods.framework.registry": "Integrator citation integrator integrators register",
+    "methods.runge_kutta.explicit": "runge_kutta",
     "methods.taylor.series": "series",
-    "methods.splitting.splitting": "composition",
+    "methods.splitting.composition": "composition",
     "model.exact.closed_form": "ClosedForm",
     "model.scenes": "Scene register_scene scene scenes",
     "model.top": "Angles Momenta SymmetricTop",

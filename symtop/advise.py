@@ -178,7 +178,7 @@ def _stored(file: Path) -> xr.Dataset:
         data = netcdf.read(file)
     except SymtopError as error:
         raise SymtopError(f"{file} cannot be read ({error.__cause__}); {remedy}") from error
-    if missing := [name for name in ranking.NEEDS if name not in data]:
+    if missing := [name for name in ("variant", *ranking.NEEDS) if name not in data]:
         raise SymtopError(f"{file} is of an older version, without {', '.join(missing)}; {remedy}")
     return data
 
@@ -229,7 +229,7 @@ def _candidates(
     for place in ranking.cheapest(cell, accuracy, stored_as):
         name = _same(place.integrator, usable)
         if name is not None and name not in cheapest:
-            row = cell.sel(integrator=place.integrator).isel(setting=place.setting)
+            row = cell.sel(variant=place.integrator).isel(setting=place.setting)
             cheapest[name] = _setting(row, scene, stored[closest])
     served = _served(near, usable)
     chosen = {name: cheapest.get(name) for name in [*served, *cheapest][:CANDIDATES]}

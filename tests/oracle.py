@@ -1,10 +1,10 @@
 """Hashes of every stored number and finding of a results folder, to hold a change of structure against.
 
-    python tests/oracle.py RESULTS OTHER --stable TWICE_A TWICE_B    compare two folders, but for what two runs differ in
+    python tests/oracle.py RESULTS OTHER --stable TWICE_A TWICE_B    compare two folders, but for what varies
 
-A dataset's variables are hashed cell by cell, a cell being a (scene, variant, ...) of the labelled dimensions, so that the
-name of a dimension and the order of its labels do not count. Variables and sentences that differ between two runs of one
-version hold times; they are left out.
+A dataset's variables are hashed cell by cell, a cell being a (scene, variant, ...) of the labelled dimensions, so that
+the name of a dimension and the order of its labels do not count. Variables and sentences that differ between two runs
+of one version hold times; they are left out.
 """
 
 import argparse

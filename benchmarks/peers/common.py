@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from symtop.methods.framework.euler_lagrange import accelerations, with_rates
+from symtop.methods.framework.angles import accelerations, with_rates
 from symtop.methods.framework.plan import Array, Plan, Run
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import on_axis

@@ -221,7 +221,7 @@ def _searched(scene: Scene, peer: Peer) -> tuple[Peer, list[Point]] | None:
 def _combined(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, str], dict[str, Any]]) -> xr.Dataset:
     names = list(about)
     shape = len(scenes), len(names), max((len(cell["axis"]) for cell in cells.values()), default=0)
-    one, each = ("scene", "integrator", "setting"), ("call", "scene", "integrator", "setting")
+    one, each = ("scene", "variant", "setting"), ("call", "scene", "variant", "setting")
     plain = [key for key in next(iter(cells.values())) if key != "timing"]
     values = {key: np.full(shape, np.nan) for key in plain}
     timed = {key: np.full((len(CALLS), *shape), np.nan) for key in ("seconds", "first_call", "reliable")}
@@ -249,8 +249,8 @@ def _combined(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, 
         {key: (one, array) for key, array in values.items()}
         | {key: (each, array) for key, array in timed.items()}
         | {"seconds_samples": ((*each, "batch"), samples)}
-        | {key: ("integrator", column) for key, column in words.items()},
-        coords={"call": list(CALLS), "scene": scenes, "integrator": names},
+        | {key: ("variant", column) for key, column in words.items()},
+        coords={"call": list(CALLS), "scene": scenes, "variant": names},
     )
 
 

@@ -15,7 +15,7 @@ from symtop.methods.framework.calling import solve
 from symtop.methods.framework.fixed_step import inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.taylor import taylor
+from symtop.methods.taylor import heyoka
 from symtop.model.scenes import Scene
 
 LANGUAGE = "numba, inside the kernel"
@@ -36,8 +36,8 @@ def inner(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Inner:
         ends = Plan.steps(plan.step_size, plan.marks[-1:])
         return Inner(lambda: fixed(top, start, ends), lambda run: run.states[-1])
     if method.name == "taylor":
-        stepper = taylor.stepper(chart, "double", plan.tolerance)
-        numbers, parameters = taylor.start_numbers(chart, "double", top, start)
+        stepper = heyoka.stepper(chart, "double", plan.tolerance)
+        numbers, parameters = heyoka.start_numbers(chart, "double", top, start)
         begin, par, horizon = np.array(numbers), np.array(parameters[: stepper.pars.size]), plan.horizon
 
         def call() -> Any:

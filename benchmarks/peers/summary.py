@@ -44,7 +44,7 @@ def groups(data: xr.Dataset) -> dict[str, list[str]]:
     kinds = list(zip(packages, data["chart"].values.astype(str), data["language"].values.astype(str), strict=True))
     several = {one for one in packages if len({kind for kind in kinds if kind[0] == one}) > 1} - {OURS, HEYOKA}
     found: dict[str, list[str]] = {}
-    for kind, row in zip(kinds, data["integrator"].values.astype(str).tolist(), strict=True):
+    for kind, row in zip(kinds, data["variant"].values.astype(str).tolist(), strict=True):
         package, chart, language = kind
         name = f"{package}[{chart}], {SHORT.get(language, language)}" if package in several else package
         found.setdefault(name, []).append(row)
@@ -53,14 +53,14 @@ def groups(data: xr.Dataset) -> dict[str, list[str]]:
 
 def best_of(data: xr.Dataset, call: str, scene: str, rows: Sequence[str], target: float) -> Best | None:
     """The fastest measured run of some rows with an error of at most `target`; None if none is."""
-    cell = data.sel(call=call, scene=scene, integrator=list(rows))
+    cell = data.sel(call=call, scene=scene, variant=list(rows))
     seconds = np.where(cell["axis"].values <= target, cell["seconds"].values, np.inf)
     seconds[np.isnan(seconds)] = np.inf
     if not np.isfinite(seconds).any():
         return None
     row, column = np.unravel_index(int(np.argmin(seconds)), seconds.shape)
     samples = tuple(cell["seconds_samples"].values[row, column].tolist())
-    return Best(str(cell["integrator"].values[row]), Timing(samples, float(cell["first_call"].values[row, column])))
+    return Best(str(cell["variant"].values[row]), Timing(samples, float(cell["first_call"].values[row, column])))
 
 
 class Standing(NamedTuple):
@@ -210,14 +210,12 @@ def tables(data: xr.Dataset) -> list[Table]:
                 by_row.append([scene, f"{target:.0e}", row, cells[1], cells[2], cells[4], cells[5]])
     both = []
     for name, rows in known.items():
-        one = data.sel(integrator=rows[0])
+        one = data.sel(variant=rows[0])
         public, inner = (_range(span(data, call, ours, rows)) for call in NAMES)
         if name != OURS:
             both.append([name, str(one["chart"].values), str(one["language"].values), public, inner])
     keys = ("package", "version", "chart", "language", "implementation", "shows", "formulation")
-    given = [
-        [str(row), *(str(data[key].sel(integrator=row).values) for key in keys)] for row in data["integrator"].values
-    ]
+    given = [[str(row), *(str(data[key].sel(variant=row).values) for key in keys)] for row in data["variant"].values]
     return [
         Table(
             f"Both ratios: the time over symtop's ({_fixed(data)})",

@@ -1,5 +1,5 @@
 /* Right-hand sides: twins of field_axis, field_frame and field_attitude (symtop/methods/framework/space.py) and of field_angles
-   (symtop/methods/framework/euler_lagrange.py). -DAXIS, -DFRAME, -DATTITUDE or -DANGLES chooses one, and with it Par and DIM. */
+   (symtop/methods/framework/angles.py). -DAXIS, -DFRAME, -DATTITUDE or -DANGLES chooses one, and with it Par and DIM. */
 
 #ifdef ANGLES
 #include "sines.h"

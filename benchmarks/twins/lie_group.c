@@ -1,4 +1,4 @@
-/* Twin of symtop/methods/lie_group/lie_loop.py around one map: -DRUNGE_KUTTA lie_runge_kutta.py, -DVARIATIONAL
+/* Twin of symtop/methods/lie_group/loop.py around one map: -DRUNGE_KUTTA lie_runge_kutta.py, -DVARIATIONAL
    lie_variational.py, -DENERGY_MOMENTUM energy_momentum.py, -DALPHA generalised_alpha.py, -DCOLLECTIVE
    collective_gauss.py.
 

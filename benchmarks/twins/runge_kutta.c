@@ -1,4 +1,4 @@
-/* Twin of symtop/methods/runge_kutta/runge_kutta.py; STAGES is the number of stages, AXIS, ATTITUDE or ANGLES the chart. */
+/* Twin of symtop/methods/runge_kutta/explicit.py; STAGES is the number of stages, AXIS, ATTITUDE or ANGLES the chart. */
 
 #include "march.h"
 

@@ -1,4 +1,4 @@
-/* Twin of symtop/methods/taylor/axis_series.py, or with -DATTITUDE of attitude_series.py, of order 16.
+/* Twin of symtop/methods/taylor/series.py, or with -DATTITUDE of attitude_series.py, of order 16.
 
    Vectors of four doubles are gcc's; a product is fused with a sum where the Python kernel fuses them. The spin that is
    added to a sample is no part of a step; the caller does it. */

@@ -1,4 +1,4 @@
-/* Twin of symtop/methods/splitting/splitting_angles.py; DRIFTS is the number of drifts in the table. */
+/* Twin of symtop/methods/splitting/angles.py; DRIFTS is the number of drifts in the table. */
 
 #include "march.h"
 #include "sines.h"

@@ -1,4 +1,4 @@
-/* Twin of symtop/methods/splitting/splitting_space.py: on (e, L), or with -DATTITUDE on (q, L).
+/* Twin of symtop/methods/splitting/space.py: on (e, L), or with -DATTITUDE on (q, L).
 
    DRIFTS is the number of drifts in the table. A processed method's maps and the spin that is added to a sample are
    no part of a step; the caller does them. */

@@ -55,8 +55,8 @@ p.
 import numpy as np
 
 data = symtop.sweep(scene, ["midpoint", "strang", "rk4", "gauss-4"], step_size=np.geomspace(1e-3, 0.05, 8), quiet=True)
-for name in data["integrator"].values:
-    error = data["axis"].sel(integrator=name).values[0]
+for name in data["variant"].values:
+    error = data["axis"].sel(variant=name).values[0]
     slope = np.log(error[3] / error[1]) / np.log(data["step_size"].values[0, 0, 3] / data["step_size"].values[0, 0, 1])
     print(f"{name:<9} slope {slope:.1f}")
 ax = symtop.plot(data)

@@ -115,7 +115,7 @@ def bracket_message(falling: list[str], level: list[str]) -> str:
 
 
 def _bracket(data: xr.Dataset) -> Picture:
-    names = [str(name) for name in data["integrator"].values]
+    names = [str(name) for name in data["variant"].values]
     measured = defects(data, [name for name in names if name in MARKED] or names)
     figure, axes = style.panels(1, 1, height=2.8)
     axis, ends = axes[0, 0], {}

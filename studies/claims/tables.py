@@ -12,8 +12,8 @@ from symtop.judging.findings import Finding, read
 def findings(data: xr.Dataset) -> dict[str, list[Finding]]:
     """The findings of every integrator that was judged, by its name, with the scene where that is a user's."""
     rows = {}
-    for scene, name in product(data["scene"].values, data["integrator"].values):
-        row = read(data.sel(scene=scene, integrator=name))
+    for scene, name in product(data["scene"].values, data["variant"].values):
+        row = read(data.sel(scene=scene, variant=name))
         if any(finding.verdict for finding in row):
             rows[str(name) if scene == SCENE else f"{name} on {scene}"] = row
     return rows
@@ -22,6 +22,6 @@ def findings(data: xr.Dataset) -> dict[str, list[Finding]]:
 def defects(data: xr.Dataset, names: list[str]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Differencing widths and how far one step is from preserving the bracket, of some integrators, on one scene."""
     first = data[["defect_width", "bracket_defect"]].isel(scene=0)
-    cells = {name: first.sel(integrator=name).dropna("width") for name in names}
+    cells = {name: first.sel(variant=name).dropna("width") for name in names}
     return {name: (cell["defect_width"].values, cell["bracket_defect"].values)
             for name, cell in cells.items() if cell.sizes["width"]}  # fmt: skip

@@ -41,11 +41,11 @@ WINDOWS = 18  # of time, in each of which the largest energy error is drawn
 
 def pictures(data: xr.Dataset) -> list[Picture]:
     """The five named methods; the work that each row with a step needs; error against the tolerance."""
-    drawn = [_named(data)] if any(split_name(str(name))[0] in NAMED for name in data["integrator"].values) else []
+    drawn = [_named(data)] if any(split_name(str(name))[0] in NAMED for name in data["variant"].values) else []
     works = efficiencies(data, TARGET)
     drawn += [_constants(data, works)] if works else []
     chosen = adaptive(data)
-    return [*drawn, _by_tolerance(chosen)] if chosen.sizes["integrator"] else drawn
+    return [*drawn, _by_tolerance(chosen)] if chosen.sizes["variant"] else drawn
 
 
 def _line(axis: Any, name: str, label: str, x: Any, y: Any) -> None:
@@ -66,7 +66,7 @@ def _named(data: xr.Dataset) -> Picture:
         floor = 0.3 * error_band(axis, part[f"{MAIN}_bound"].values)
         axis.set(xscale="log", yscale="log", ylim=(0.5 * floor, 10.0), ylabel="largest axis error (rad)")
     for name, label in labels.items():
-        cell = part.sel(integrator=name)
+        cell = part.sel(variant=name)
         error, paid = np.maximum(cell[MAIN].values, floor), evaluations_a_nutation(cell, scene)
         cells = cell["force_evaluations"].values
         with np.errstate(invalid="ignore"):
@@ -219,7 +219,7 @@ def _met(data: xr.Dataset) -> dict[str, Met]:
     for name in merged(data, MAIN):
         parts = {}
         for scene in map(str, data["scene"].values):
-            cell, used = data.sel(scene=scene, integrator=name), fitted[scene, name].used
+            cell, used = data.sel(scene=scene, variant=name), fitted[scene, name].used
             parts[scene] = (cell[MAIN] / cell["tolerance"]).values[used]
         if sum(part.size for part in parts.values()):
             worst_on = max(parts, key=lambda scene: parts[scene].max(initial=0.0))

@@ -17,9 +17,9 @@ TARGET = 1e-6  # rad, the axis error at which costs are compared
 
 def named_rows(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
     """The five named methods on the first scene, without a chart that another covers, and their labels."""
-    named = [name for name in map(str, data["integrator"].values) if split_name(name)[0] in NAMED]
+    named = [name for name in map(str, data["variant"].values) if split_name(name)[0] in NAMED]
     names = [name for name in named if name.replace("[attitude]", "[axis]") not in named or "[attitude]" not in name]
-    return data.sel(integrator=names).isel(scene=0), merged(data.sel(integrator=names), MAIN)
+    return data.sel(variant=names).isel(scene=0), merged(data.sel(variant=names), MAIN)
 
 
 def least_work(part: xr.Dataset, labels: Mapping[str, str]) -> list[tuple[str, float]]:
@@ -29,7 +29,7 @@ def least_work(part: xr.Dataset, labels: Mapping[str, str]) -> list[tuple[str, f
     """
     paid, scene = {}, str(part["scene"].values)
     for name in labels:
-        cell = part.sel(integrator=name)
+        cell = part.sel(variant=name)
         work = evaluations_a_nutation(cell, scene)[cell[MAIN].values <= TARGET]
         if work.size:
             paid[name] = float(np.min(work))

@@ -6,7 +6,7 @@ import xarray as xr
 
 from symtop.measure.order_table import observable, order_table
 from symtop.measure.settings import step_ladder, tolerance_ladder
-from symtop.methods.framework.registry import integrator, rows
+from symtop.methods.framework.registry import integrator, variants
 from symtop.model.scenes import scene
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
@@ -38,7 +38,7 @@ def on_scene(name: str, quick: bool) -> list[Case]:
     """The cases of one scene."""
     on, grid = scene(name), []
     horizon = min(on.horizon, math.inf if name == WHOLE else NUTATIONS * on.nutation_period)
-    for row in rows():
+    for row in variants():
         if row.exact_steps:
             continue  # no step is more accurate than another
         if row.fixed_step:

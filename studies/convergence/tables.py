@@ -43,18 +43,18 @@ def declared_order(name: str) -> int | None:
 
 def stepping(data: xr.Dataset) -> xr.Dataset:
     """The rows that have a step to choose."""
-    return data.sel(integrator=np.isfinite(data["step_size"]).any(["scene", "setting"]))
+    return data.sel(variant=np.isfinite(data["step_size"]).any(["scene", "setting"]))
 
 
 def adaptive(data: xr.Dataset) -> xr.Dataset:
     """The rows that have a tolerance to choose."""
-    return data.sel(integrator=np.isfinite(data["tolerance"]).any(["scene", "setting"]))
+    return data.sel(variant=np.isfinite(data["tolerance"]).any(["scene", "setting"]))
 
 
 def by_order(data: xr.Dataset) -> dict[int, list[str]]:
     """Rows by their declared order, 0 for none, from low to high."""
     groups: dict[int, list[str]] = {}
-    for name in data["integrator"].values:
+    for name in data["variant"].values:
         groups.setdefault(declared_order(str(name)) or 0, []).append(str(name))
     return dict(sorted(groups.items()))
 
@@ -64,8 +64,8 @@ def fits(data: xr.Dataset, quantity: str, *, at_end: bool = False) -> Pairs:
     """The order of every row of fixed step on every scene, from the largest errors or those at the end."""
     column, part = f"{quantity}_end" if at_end else quantity, stepping(data)
     fitted = {}
-    for name, label in product(map(str, part["scene"].values), map(str, part["integrator"].values)):
-        row, cell = registered(label), part.sel(scene=name, integrator=label)
+    for name, label in product(map(str, part["scene"].values), map(str, part["variant"].values)):
+        row, cell = registered(label), part.sel(scene=name, variant=label)
         if row is not None and not (quantity == "attitude" and observable(row) == "axis"):
             fitted[name, label] = order_fit(scene(name), row, cell, column, float(cell["horizon"]))
     return fitted
@@ -92,8 +92,8 @@ def judged(data: xr.Dataset) -> dict[tuple[str, str], Judged]:
 def tolerance_fits(data: xr.Dataset) -> Pairs:
     """error = constant * tolerance^slope of every adaptive row on every scene, a straight line."""
     part, fitted = adaptive(data), {}
-    for name, label in product(map(str, part["scene"].values), map(str, part["integrator"].values)):
-        cell = part.sel(scene=name, integrator=label)
+    for name, label in product(map(str, part["scene"].values), map(str, part["variant"].values)):
+        cell = part.sel(scene=name, variant=label)
         error, bound = cell[MAIN].values, cell[f"{MAIN}_bound"].values
         fitted[name, label] = power_law(cell["tolerance"].values, error, (error < LARGE) & (error > 10.0 * bound))
     return fitted
@@ -102,7 +102,7 @@ def tolerance_fits(data: xr.Dataset) -> Pairs:
 def merged(data: xr.Dataset, quantity: str) -> dict[str, str]:
     """Labels of rows for a figure: rows of one method with the same errors are one, ``strang[axis, attitude]``."""
     labels: dict[str, str] = {}
-    for name in map(str, data["integrator"].values):
+    for name in map(str, data["variant"].values):
         method, chart = split_name(name)
         twin = next((one for one in labels if split_name(one)[0] == method and _same(data, one, name, quantity)), None)
         if twin is None:
@@ -114,8 +114,8 @@ def merged(data: xr.Dataset, quantity: str) -> dict[str, str]:
 
 def _same(data: xr.Dataset, first: str, second: str, quantity: str) -> bool:
     """Do two rows have the same errors, wherever these are above rounding?"""
-    one, other = (data[quantity].sel(integrator=name).values for name in (first, second))
-    limit = ABOVE_BOUND * data[f"{quantity}_bound"].sel(integrator=first).values
+    one, other = (data[quantity].sel(variant=name).values for name in (first, second))
+    limit = ABOVE_BOUND * data[f"{quantity}_bound"].sel(variant=first).values
     seen = np.isfinite(one) & np.isfinite(other) & (one > np.maximum(limit, EPSILON))
     return bool(seen.any() and np.all(np.abs(one[seen] - other[seen]) <= SAME * one[seen]))
 
@@ -161,7 +161,7 @@ def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Effici
     for (name, label), fit in fits(data, MAIN).items():
         if not (np.isfinite(fit.slope) and fit.used.any()):
             continue
-        cell, order = data.sel(scene=name, integrator=label), declared_order(label) or round(fit.slope)
+        cell, order = data.sel(scene=name, variant=label), declared_order(label) or round(fit.slope)
         used, steps = fit.used, cell["step_size"].values[fit.used]
         each = np.median((evaluations_a_nutation(cell, name)[used] * steps) / scene(name).nutation_period)
         constant = np.median(cell[MAIN].values[used] / steps**order)

@@ -31,7 +31,7 @@ def tables(data: xr.Dataset) -> list[Table]:
               "C in axis error C h^p at the end"]  # fmt: skip
     made = [Table("Orders extrapolated to h = 0, with 95 % intervals", header, rows)]
     short = [_open(results), _by_method(data), _cheapest(data)]
-    if adaptive(data).sizes["integrator"]:
+    if adaptive(data).sizes["variant"]:
         header = ["scene", "method[chart]", "x in axis error ~ tolerance^x", "axis error / tolerance", "least error"]
         made.append(Table("Errors of adaptive methods against their tolerance", header, list(_tolerance_rows(data))))
     return [*(table for table in short if table.rows), *made]
@@ -39,7 +39,7 @@ def tables(data: xr.Dataset) -> list[Table]:
 
 def _tolerance_rows(data: xr.Dataset) -> Iterable[list[str]]:
     for (scene, name), fit in tolerance_fits(data).items():
-        cell = data.sel(scene=scene, integrator=name)
+        cell = data.sel(scene=scene, variant=name)
         ratio = (cell[MAIN] / cell["tolerance"]).values[fit.used]
         span = f"{ratio.min():.2g} to {ratio.max():.2g}" if ratio.size else ""
         least = float(cell[MAIN].min())
@@ -154,7 +154,7 @@ def by_tolerance(data: xr.Dataset) -> dict[str, Followed]:
     known: dict[str, Followed] = {}
     for (scene, name), fit in tolerance_fits(data).items():
         if np.isfinite(fit.slope):
-            cell, one = data.sel(scene=scene, integrator=name), known.setdefault(name, Followed([], []))
+            cell, one = data.sel(scene=scene, variant=name), known.setdefault(name, Followed([], []))
             one.slopes.append(fit.slope)
             one.ratios.extend(map(float, (cell[MAIN] / cell["tolerance"]).values[fit.used]))
     return known

@@ -53,8 +53,8 @@ def fates(histories: xr.Dataset, constant: str) -> dict[str, list[Fate]]:
     """The rows by what became of a constant on the scene where it fared worst, a key of `MEANING`."""
     groups: dict[str, list[Fate]] = {word: [] for word in MEANING}
     asked = histories[["outcome", *(f"{constant}_{part}" for part in ("largest", "exponent", "exponent_interval"))]]
-    for k, row in enumerate(map(str, histories["integrator"].values)):
-        cell = asked.isel(integrator=k)
+    for k, row in enumerate(map(str, histories["variant"].values)):
+        cell = asked.isel(variant=k)
         largest, rate = (float(cell[f"{constant}_{part}"].max()) for part in ("largest", "exponent"))
         groups[worst_behaviour(cell, constant)].append(Fate(largest, row, rate))
     return {word: sorted(group) for word, group in groups.items() if group}
@@ -90,8 +90,8 @@ def phases(histories: xr.Dataset) -> dict[str, list[Phase]]:
     above 1 by more on every scene. Phases below `SEEN_PHASE` are left out.
     """
     groups: dict[str, list[Phase]] = {STEADY: [], FASTER: [], UNCLEAR: []}
-    for row in map(str, histories["integrator"].values):
-        cell = histories.sel(integrator=row)
+    for row in map(str, histories["variant"].values):
+        cell = histories.sel(variant=row)
         seen = cell["phase_largest"].values > SEEN_PHASE
         sizes, slopes, doubts = (
             cell[f"phase_{part}"].values[seen] for part in ("largest", "exponent", "exponent_interval")
@@ -118,7 +118,7 @@ def phase_sentence(histories: xr.Dataset) -> str:
         parts.append(f"With {_rows(unclear)} no one power fits all scenes.")
     if parts and (unseen := _unseen(histories)):
         parts.append(f"With {counted(unseen)} none is seen.")
-    if parts and (rest := histories.sizes["integrator"] - sum(map(len, groups.values())) - unseen):
+    if parts and (rest := histories.sizes["variant"] - sum(map(len, groups.values())) - unseen):
         parts.append(f"With {counted(rest)} no power was fitted.")
     return " ".join(parts)
 
@@ -154,8 +154,8 @@ def faster_sentence(histories: xr.Dataset) -> str:
 def run_shares(histories: xr.Dataset) -> dict[str, float]:
     """The length of every row's run over that of the longest, on the scene where it is least."""
     ends = histories["sample_time"].max("sample")
-    shares = (ends / ends.max("integrator")).min("scene")
-    return dict(zip(map(str, histories["integrator"].values), map(float, shares.values), strict=True))
+    shares = (ends / ends.max("variant")).min("scene")
+    return dict(zip(map(str, histories["variant"].values), map(float, shares.values), strict=True))
 
 
 def _rows(group: Sequence[Phase]) -> str:
@@ -174,7 +174,7 @@ def tables(histories: xr.Dataset) -> list[Table]:
     shown = Table("What became of energy and momenta: largest relative change, on the scene where a row fares worst",
                   header, counts)  # fmt: skip
     grown = {one.row: (one, word) for word, group in phases(histories).items() for one in group}
-    cells: dict[str, list[str]] = {row: [row] for row in map(str, histories["integrator"].values)}
+    cells: dict[str, list[str]] = {row: [row] for row in map(str, histories["variant"].values)}
     for constant in CONSTANTS:
         for word, group in fates(histories, constant).items():
             for one in group:

@@ -42,12 +42,12 @@ def sizes(histories: xr.Dataset) -> Picture:
     for axis, constant in zip(axes[0], CONSTANTS, strict=True):
         lose = sum(len(names) for gone, names in groups.items() if constant in gone)
         for place, (_, names, gone) in enumerate(lines):
-            largest = data[f"{constant}_largest"].sel(integrator=names).max("scene").values
+            largest = data[f"{constant}_largest"].sel(variant=names).max("scene").values
             shift = np.linspace(-0.3, 0.3, len(names)) if len(names) > 1 else np.zeros(len(names))
             axis.plot(np.maximum(largest, SMALLEST), place + shift, "o", ms=4.0, mew=0.4, mec="white",
                       color=LOST if constant in gone else HELD)  # fmt: skip
         axis.axvline(ZERO, color=style.GREY, lw=0.8, ls=":", zorder=1)
-        whole = data.sizes["integrator"]
+        whole = data.sizes["variant"]
         axis.set_title(f"{LABELS[constant]}: {whole - lose} hold it, {lose} do not")
         axis.set_xlabel("largest relative change")
     _name_lines(axes[0, 0], lines)

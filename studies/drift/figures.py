@@ -46,13 +46,13 @@ def envelope(t: np.ndarray, r: np.ndarray) -> tuple[list[float], list[float]]:
 
 def _residuals(histories: xr.Dataset) -> Picture:
     small = rows.without_repeats(histories)
-    names = [name for name in small["integrator"].values if name in SHOWN]
-    data = small.sel(integrator=names) if names else small
+    names = [name for name in small["variant"].values if name in SHOWN]
+    data = small.sel(variant=names) if names else small
     figure, axes = panels(len(CONSTANTS), data.sizes["scene"], height=1.9, sharex="col", sharey="row")
     for row, constant in zip(axes, CONSTANTS, strict=True):
         for axis, scene in zip(row, data["scene"].values, strict=True):
-            for name in data["integrator"].values:
-                mark, cell = look(str(name)), data.sel(scene=scene, integrator=name)
+            for name in data["variant"].values:
+                mark, cell = look(str(name)), data.sel(scene=scene, variant=name)
                 t, r = cell["sample_time"].values, np.abs(cell[f"{constant}_residual"].values)
                 good = np.isfinite(r) & np.isfinite(t) & (t > 0.0)
                 if good.any():
@@ -80,7 +80,7 @@ def _residuals(histories: xr.Dataset) -> Picture:
         "momenta, relative to the larger. Dots are samples, markers the largest in a window of time (at 1e-17 "
         f"if less); the dashed line rises as t; open markers are rows in angles. {rows.setting(data)} On every scene "
         f"the energy stays at rounding or within bounds with {len(words.holding(data))} of these "
-        f"{data.sizes['integrator']} rows, which does not bound the error of the motion."
+        f"{data.sizes['variant']} rows, which does not bound the error of the motion."
     )
     alt = (
         "Log-log plots of residuals over time: level for discrete Lagrangians and splittings, rising for explicit or "
@@ -90,7 +90,7 @@ def _residuals(histories: xr.Dataset) -> Picture:
 
 
 def _windows(data: xr.Dataset) -> Picture:
-    figure, axes = panels(len(BANDS), data.sizes["integrator"], height=2.0, sharex=True, sharey="row")
+    figure, axes = panels(len(BANDS), data.sizes["variant"], height=2.0, sharex=True, sharey="row")
     moves = messages.shifts(data.isel(scene=0)).isel(window=-1)
     for row, quantity in zip(axes, BANDS, strict=True):
         size = float(np.abs(data[f"{quantity}_largest"]).max()) or 1.0  # what every method keeps exactly has none
@@ -104,7 +104,7 @@ def _windows(data: xr.Dataset) -> Picture:
             axis.axhline(next(iter(middle), np.nan), color=BLACK, lw=0.8, ls=(0, (4, 3)), zorder=3)
             axis.set_xscale("log")
             if quantity == BANDS[0]:
-                moved = f"{100.0 * float(moves.sel(integrator=name)):+.1g}".replace("-", "\N{MINUS SIGN}")
+                moved = f"{100.0 * float(moves.sel(variant=name)):+.1g}".replace("-", "\N{MINUS SIGN}")
                 axis.set_title(f"{name}\nlast \N{MINUS SIGN} first: {moved}%", fontsize=7.5)
         row[0].set_ylabel(f"{LABELS[quantity]}\nchange / {number(scale)}")
     for axis in axes[-1]:

@@ -21,10 +21,8 @@ def holds(cell: xr.Dataset, constant: str) -> bool:
 
 def residuals(data: xr.Dataset) -> str:
     """Who keeps the energy best, and who loses most of it, of the rows that are drawn."""
-    largest = {
-        str(name): float(data["energy_largest"].sel(integrator=name).max()) for name in data["integrator"].values
-    }
-    behaviour = {name: worst_behaviour(data.sel(integrator=name), "energy") for name in largest}
+    largest = {str(name): float(data["energy_largest"].sel(variant=name).max()) for name in data["variant"].values}
+    behaviour = {name: worst_behaviour(data.sel(variant=name), "energy") for name in largest}
     held = [name for name in largest if behaviour[name] in HELD]
     lost = sorted((name for name in largest if behaviour[name] == "drift"), key=lambda name: -largest[name])
     text = f"{len(held)} of these {len(largest)} methods keep the energy or bound its error"
@@ -40,15 +38,15 @@ def lost(data: xr.Dataset) -> dict[tuple[str, ...], list[str]]:
     """
     groups: dict[tuple[str, ...], list[str]] = {}
     energies = data["energy_largest"].max("scene")
-    for name in map(str, data["integrator"].values[np.argsort(energies.values, kind="stable")]):
-        cell = data.sel(integrator=name)
+    for name in map(str, data["variant"].values[np.argsort(energies.values, kind="stable")]):
+        cell = data.sel(variant=name)
         groups.setdefault(tuple(one for one in CONSTANTS if not holds(cell, one)), []).append(name)
     return dict(sorted(groups.items(), key=lambda one: (bool(one[0]), -len(one[0]), one[0])))
 
 
 def sizes(data: xr.Dataset) -> str:
     """How many rows hold all three constants."""
-    names, held = data.sizes["integrator"], len(lost(data).get((), []))
+    names, held = data.sizes["variant"], len(lost(data).get((), []))
     rest = names - held
     return f"{held} of {names} methods hold the energy and both momenta, at rounding or with a bounded error" + (
         f"; {rest} lose{'s' * (rest == 1)} at least one" if rest else ""
@@ -61,8 +59,8 @@ ENERGIES = {"bounded": "a bounded energy error", "lost": "an energy that drifts 
 def by_energy(data: xr.Dataset) -> dict[str, np.ndarray]:
     """Growth exponents of the phase error of all runs, by what the row's energy does: a key of `ENERGIES`."""
     groups: dict[str, list[float]] = {word: [] for word in ENERGIES}
-    for name in data["integrator"].values:
-        cell = data.sel(integrator=name)
+    for name in data["variant"].values:
+        cell = data.sel(variant=name)
         word = worst_behaviour(cell, "energy")
         slopes = cell["phase_exponent"].values.ravel()
         if word != FAILED:

@@ -21,9 +21,9 @@ APART = 2.0  # times: two charts of one method differ by more than this, one of 
 
 def without_repeats(histories: xr.Dataset) -> xr.Dataset:
     """The rows that are drawn and told of: no attitude chart beside an axis chart, whose numbers it repeats."""
-    names = list(map(str, histories["integrator"].values))
+    names = list(map(str, histories["variant"].values))
     repeats = {name.replace("[axis]", "[attitude]") for name in names if name.endswith("[axis]")}
-    return histories.sel(integrator=[name for name in names if name not in repeats])
+    return histories.sel(variant=[name for name in names if name not in repeats])
 
 
 def setting(histories: xr.Dataset) -> str:
@@ -48,7 +48,7 @@ def _tolerances(histories: xr.Dataset) -> tuple[dict[str, float], dict[str, floa
     own: dict[str, float] = {}
     given: dict[str, float] = {}
     columns = (histories[name].max("scene").values for name in ("tolerance", "own_tolerance"))
-    for name, value, default in zip(map(str, histories["integrator"].values), *columns, strict=True):
+    for name, value, default in zip(map(str, histories["variant"].values), *columns, strict=True):
         if math.isfinite(value):
             (own if default > 0.0 else given)[name] = float(value)
     return own, given
@@ -77,7 +77,7 @@ class Pair(NamedTuple):
 def pairs(histories: xr.Dataset) -> Iterator[Pair]:
     """Every two charts of a method for every constant; runs that ended early are left out."""
     rows: dict[str, list[str]] = {}
-    every = list(map(str, histories["integrator"].values))
+    every = list(map(str, histories["variant"].values))
     for name, whole in zip(every, (histories["outcome"] == "ok").all("scene").values, strict=True):
         if whole:
             rows.setdefault(split_name(name)[0], []).append(name)
@@ -129,14 +129,14 @@ def _size(value: float) -> str:
 def charts_table(histories: xr.Dataset) -> list[Table]:
     """Every method and constant for which the chart matters, with the largest change in each chart; none if none."""
     losing = dict.fromkeys((one.constant, split_name(one.worse)[0]) for one in _apart(histories))
-    names = list(map(str, histories["integrator"].values))
+    names = list(map(str, histories["variant"].values))
     lines = []
     for constant, method in losing:
         cells = []
         for chart in CHARTS:
             row = f"{method}[{chart}]"
             largest = histories[f"{constant}_largest"].max("scene")
-            cells.append(_size(float(largest.sel(integrator=row))) if row in names else "")
+            cells.append(_size(float(largest.sel(variant=row))) if row in names else "")
         lines.append([constant, method, *cells])
     title = f"The chart alone: largest relative change where two charts of a method differ more than {APART:g} times"
     return [Table(title, ["constant", "method", *CHARTS], lines)] if lines else []

@@ -8,7 +8,7 @@ import xarray as xr
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import Scene, scene
 from symtop.run.long_run import PER_NUTATION
-from symtop.runner.grid import grid_rows, grid_scenes
+from symtop.runner.grid import grid_scenes, grid_variants
 from symtop.runner.study import Case, Study
 
 from . import figures, words
@@ -59,11 +59,11 @@ def grid(
     long_run = {"steps": longest, "per_nutation": PER_NUTATION}
     ensemble = {"steps": walk, "per_nutation": PER_NUTATION, "count": members}
     loss = {"short": share * SHORT, "target": share * TARGET, "most": share * MOST_STEPS}
-    rows = grid_rows("nutation")
+    rows = grid_variants("nutation")
     return [
         *(Case(name, row.name, history_settings(scene(name), row, steps), group=HISTORIES)
           for name in grid_scenes(left_out, lambda one: math.isfinite(one.nutation_period))
-          for row in grid_rows("nutation", attitude=True)),
+          for row in grid_variants("nutation", attitude=True)),
         *(Case(LONG, row.name, settings, group=group) for row in rows if row.modified_energy
           for group, settings in ((WINDOWS, long_run), (ROUNDINGS, ensemble))),
         *(Case(LONG, row.name, loss, group=HORIZONS) for row in rows if row.fixed_step),

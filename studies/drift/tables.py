@@ -22,7 +22,7 @@ BEHAVIOURS = ("kept", "bounded", "random walk", "growing", "drift")  # each is w
 
 def by_integrator(data: xr.Dataset) -> dict[str, xr.Dataset]:
     """The parts of a group that ran on one scene."""
-    return {str(name): data.isel(scene=0).sel(integrator=name) for name in data["integrator"].values}
+    return {str(name): data.isel(scene=0).sel(variant=name) for name in data["variant"].values}
 
 
 def losses(horizons: xr.Dataset) -> dict[str, xr.Dataset]:

@@ -61,8 +61,8 @@ def _residual_table(histories: xr.Dataset) -> Table:
         header += [f"largest {name} residual", f"trend of {name} over the run", f"exponent, law of {name}"]
     ends = histories["sample_time"].max("sample")
     histories = histories.drop_dims("sample")  # a cell is chosen of the few numbers of a run, not of its series
-    for scene, integrator in product(histories["scene"].values, histories["integrator"].values):
-        cell, end = (part.sel(scene=scene, integrator=integrator) for part in (histories, ends))
+    for scene, integrator in product(histories["scene"].values, histories["variant"].values):
+        cell, end = (part.sel(scene=scene, variant=integrator) for part in (histories, ends))
         row = [str(scene), str(integrator), used(cell), f"{cell['nutations']:.4g}", str(cell["outcome"].item())]
         for name in CONSTANTS:
             doubt = cell[f"{name}_interval"] * end  # 95%, of the rise over the whole run
@@ -111,8 +111,8 @@ def law(cell: xr.Dataset, name: str) -> str:
 
 def holding(histories: xr.Dataset) -> list[str]:
     """Integrators whose energy error is at rounding or bounded on every scene."""
-    names = [str(name) for name in histories["integrator"].values]
-    fates = {name: worst_behaviour(histories.sel(integrator=name), "energy") for name in names}
+    names = [str(name) for name in histories["variant"].values]
+    fates = {name: worst_behaviour(histories.sel(variant=name), "energy") for name in names}
     return [name for name, word in fates.items() if word in ("kept", "bounded")]
 
 
@@ -196,13 +196,13 @@ def verdict(data: xr.DataTree) -> list[str]:
         ]
         held = [setting(told), shortened(told)]
     if WINDOWS in groups:
-        steps, names = float(groups[WINDOWS]["steps"].max()), list(map(str, groups[WINDOWS]["integrator"].values))
+        steps, names = float(groups[WINDOWS]["steps"].max()), list(map(str, groups[WINDOWS]["variant"].values))
         ran = f"{few(names)} ran {steps:.0e} steps, {PER_NUTATION:.0f} a nutation of {_scene(groups[WINDOWS])}."
         sentences.append(f"{ran} {moved(groups[WINDOWS]).capitalize()}")
     if ROUNDINGS in groups:
         sentences.append(walks(by_integrator(groups[ROUNDINGS])))
     if HORIZONS in groups:
         foretold = losses(groups[HORIZONS])
-        left = [name for name in map(str, groups[HORIZONS]["integrator"].values) if name not in foretold]
+        left = [name for name in map(str, groups[HORIZONS]["variant"].values) if name not in foretold]
         sentences.append(predictions(foretold, f" on {_scene(groups[HORIZONS])}", left))
     return list(filter(None, [*sentences, *held]))

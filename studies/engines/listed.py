@@ -84,7 +84,7 @@ def same_cost(data: xr.DataTree) -> Table:
     ]  # fmt: skip
     rows = []
     for row in words.rows(data):
-        forces = float(data["tops"]["forces_a_step"].sel(scene=words.SLOW, integrator=row))
+        forces = float(data["tops"]["forces_a_step"].sel(scene=words.SLOW, variant=row))
         off = [
             words.level(data, row, rate, scene=scene, long=long)
             for scene in SCENES for rate in FREQUENCIES for long in (False, True)

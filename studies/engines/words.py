@@ -46,7 +46,7 @@ class Facts(NamedTuple):
 
 def rows(data: xr.DataTree) -> list[str]:
     """All rows, in the order of the study."""
-    return [str(name) for name in data["tops"]["integrator"].values]
+    return [str(name) for name in data["tops"]["variant"].values]
 
 
 def of_catalogue(row: str) -> bool:
@@ -61,7 +61,7 @@ def single(row: str) -> bool:
 
 def curve(data: xr.DataTree, row: str, scene: str = SLOW) -> tuple[np.ndarray, np.ndarray]:
     """Steps a nutation, and the axis error there."""
-    one = data["tops"]["axis"].sel(scene=scene, integrator=row)
+    one = data["tops"]["axis"].sel(scene=scene, variant=row)
     good = np.isfinite(one.values)
     return one["per_nutation"].values[good], one.values[good]
 
@@ -77,13 +77,13 @@ def facts(data: xr.DataTree, row: str) -> Facts:
 
 def frame(data: xr.DataTree, row: str, variable: str, rate: float, *, scene: str = SLOW, long: bool = False) -> float:
     """A number at the step of so many a second, after the short time or the long one."""
-    cell = data["tops"][f"frame_{variable}"].sel(scene=scene, integrator=row, rate=rate)
+    cell = data["tops"][f"frame_{variable}"].sel(scene=scene, variant=row, rate=rate)
     return float(cell.isel(horizon=int(long)))
 
 
 def share(data: xr.DataTree, row: str) -> float:
     """The share of the population whose axis is within `NEAR` at the end."""
-    off = data["population"]["off"].sel(scene="population", integrator=row).values
+    off = data["population"]["off"].sel(scene="population", variant=row).values
     return float(np.mean(off <= NEAR))
 
 
@@ -196,7 +196,7 @@ def spherical(data: xr.DataTree) -> str:
 
 def level(data: xr.DataTree, row: str, rate: float, *, scene: str = SLOW, long: bool = False) -> float:
     """The axis error at so many evaluations of the torque a second."""
-    cell = data["tops"]["level_axis"].sel(scene=scene, integrator=row, rate=rate)
+    cell = data["tops"]["level_axis"].sel(scene=scene, variant=row, rate=rate)
     return float(cell.isel(horizon=int(long)))
 
 

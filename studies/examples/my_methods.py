@@ -12,7 +12,7 @@ import symtop
 from symtop.methods.framework.angles import chart_outcome, reduced
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.loop import driver
-from symtop.methods.splitting.splitting_angles import force_angles
+from symtop.methods.splitting.angles import force_angles
 
 # A discrete Lagrangian is a quadrature rule: nodes and weights. Two Gauss points:
 left, right = 0.5 - 3**0.5 / 6, 0.5 + 3**0.5 / 6

@@ -2,7 +2,7 @@
 
     method        a scheme: the same coefficients in every chart and language
     chart         angles, axis, attitude                                        see
-    `symtop.methods.framework.formulations` language      compiled        the whole loop, by numba or heyoka
+    `symtop.methods.framework.equations` language      compiled        the whole loop, by numba or heyoka
                   scipy-numba     SciPy's loop in Python, the right-hand side compiled
                   scipy-python    SciPy's loop, the right-hand side in Python on floats
                   numpy           a loop in Python over NumPy arrays            see `plain_numpy`
@@ -18,13 +18,12 @@ top and gravity), with the same coefficients. The implicit midpoint rule is `mid
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from symtop.methods.framework.angles import BareTop
-from symtop.methods.framework.euler_lagrange import sampled_momenta, to_angles
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.angles import BareTop, sampled_momenta, to_angles
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Integrator, integrators
 from symtop.methods.library.scipy_ivp import RightHandSide, scipy_method
-from symtop.methods.taylor import taylor
+from symtop.methods.taylor import heyoka
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
 from symtop.run.simulation import make_plan, simulate
@@ -85,16 +84,16 @@ def cells(schemes: Sequence[str] | None = None) -> list[Cell]:
     for scheme, methods in COMPILED_SCHEMES.items():
         for name in methods:
             if name in known:  # taylor needs heyoka
-                grid += [Cell(scheme, chart, COMPILED, known[name].row(chart)) for chart in known[name].charts()]
+                grid += [Cell(scheme, chart, COMPILED, known[name].variant(chart)) for chart in known[name].charts()]
     if "taylor" in known:
         grid.append(Cell("Taylor", "angles", COMPILED, taylor_in_angles()))
     for scheme, name in SCIPYS.items():
         for chart in FORMULATIONS:
             if scheme == DORMAND_PRINCE:
-                grid.append(Cell(scheme, chart, SCIPY_NUMBA, scipy_method(name, compiled=True).row(chart)))
-            grid.append(Cell(scheme, chart, SCIPY_PYTHON, known[name.lower()].row(chart)))
+                grid.append(Cell(scheme, chart, SCIPY_NUMBA, scipy_method(name, compiled=True).variant(chart)))
+            grid.append(Cell(scheme, chart, SCIPY_PYTHON, known[name.lower()].variant(chart)))
     for scheme, method in (("rk4", plain_numpy.RK4), ("Strang", plain_numpy.STRANG)):
-        grid += [Cell(scheme, chart, NUMPY, method.row(chart)) for chart in method.charts()]
+        grid += [Cell(scheme, chart, NUMPY, method.variant(chart)) for chart in method.charts()]
     return [cell for cell in grid if schemes is None or cell.scheme in schemes]
 
 
@@ -105,7 +104,7 @@ def taylor_in_angles() -> Integrator:
         par = BareTop(top.I1, top.I3, top.mgl)
         return to_angles(par, times, states), *sampled_momenta(par, states)
 
-    method, solvers = integrators()["taylor"], {"angles": taylor.solver("angles", "double", read)}
+    method, solvers = integrators()["taylor"], {"angles": heyoka.solver("angles", "double", read)}
     return replace(method, name="taylor[angles]", solvers=solvers)
 
 

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from symtop.methods.framework.formulations import FORMULATIONS, as_run
-from symtop.methods.framework.outcomes import NOT_FINITE, OK
-from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.equations import FORMULATIONS, as_run
+from symtop.methods.framework.plan import NOT_FINITE, OK, Array, Plan, Run
 from symtop.methods.framework.registry import Integrator, Solver
 from symtop.model.top import Angles, SymmetricTop
 

@@ -138,12 +138,12 @@ def factorial(
         for (cell, call), timing in timed(scene, good, goal.calls, rounds, batch, further).items():
             place = (grid.index(cell), *at, CALLS.index(call))
             samples[place][: len(timing.samples)] = timing.samples
-    dims = ("integrator", "horizon", "target")
+    dims = ("variant", "horizon", "target")
     table = xr.Dataset(
         {name: (dims, values) for name, values in numbers.items()}
         | {Column.REASON: (dims, reasons.astype(str)), Column.SAMPLES: ((*dims, "call", "batch"), samples)},
         coords={
-            "integrator": [cell.name for cell in grid], "horizon": horizons, "target": targets, "call": list(CALLS),
+            "variant": [cell.name for cell in grid], "horizon": horizons, "target": targets, "call": list(CALLS),
         },
     )  # fmt: skip
     best = table[Column.SAMPLES].min("batch")
@@ -179,9 +179,9 @@ def _by_name() -> dict[str, Cell]:
 
 def times(data: xr.Dataset) -> list[Timed]:
     """Every time of one scene, horizon and target (a dataset over integrator and call)."""
-    names, known = [str(name) for name in data["integrator"].values], _by_name()
+    names, known = [str(name) for name in data["variant"].values], _by_name()
     errors, forces = (data[name].values.tolist() for name in (Column.AXIS, Column.FORCES))
-    taken = data[[Column.SECONDS, Column.SPREAD]].transpose("integrator", "call")
+    taken = data[[Column.SECONDS, Column.SPREAD]].transpose("variant", "call")
     taken = taken.sel(call=list(CALLS))  # once: to select a number of a Dataset takes a millisecond
     seconds, spreads = (taken[name].values.tolist() for name in (Column.SECONDS, Column.SPREAD))
     return [

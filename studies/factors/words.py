@@ -236,7 +236,7 @@ def accuracy_sentence(data: xr.Dataset) -> str:
     """How equal the accuracy is."""
     share = (data[Column.AXIS] / data["target"]).where(np.isfinite(data[Column.SECONDS]).any("call"))
     values, least = share.values[np.isfinite(share.values)], least_share(data)
-    loosest = str(share["integrator"].values[np.argwhere((share.transpose("integrator", ...) == least).values)[0][0]])
+    loosest = str(share["variant"].values[np.argwhere((share.transpose("variant", ...) == least).values)[0][0]])
     return (
         f"Every timed run meets its target; {np.mean(values >= LEAST):.0%} of them have an error above {LEAST:g} of "
         f"it, and the least is {least:.2g} of it, with {loosest}."
@@ -329,7 +329,7 @@ def _families(data: xr.Dataset) -> Table:
 
 def _factorial(part: xr.Dataset, taken: Sequence[Timed]) -> list[list[str]]:
     rows = []
-    for name in map(str, part["integrator"].values):
+    for name in map(str, part["variant"].values):
         mine = {one.call: one for one in taken if one.name == name}
         if mine:
             first = next(iter(mine.values()))
@@ -338,6 +338,6 @@ def _factorial(part: xr.Dataset, taken: Sequence[Timed]) -> list[list[str]]:
             rows.append(
                 [first.method, name, first.language, f"{first.error:.1e}", f"{first.forces:.0f}", *seconds, noise]
             )
-        elif reason := str(part[Column.REASON].sel(integrator=name).values):
+        elif reason := str(part[Column.REASON].sel(variant=name).values):
             rows.append(["", name, "", reason, "", "", "", "", ""])
     return rows

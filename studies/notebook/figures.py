@@ -34,7 +34,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 def draw_motion(data: xr.Dataset) -> Picture:
     """Inclination by the notebook's solver, and its difference from the closed form."""
     figure, (motion, difference) = style.grid(2, 2, ("time (s)", ""), height=2.0)
-    first = data.sel(scene="spheroid", integrator=SOLVER)
+    first = data.sel(scene="spheroid", variant=SOLVER)
     time = first[Column.PATH_TIME].values
     for solver, true, label, color, line in (
         (Column.SOLVER_THETA, Column.TRUE_THETA, r"$\theta$ (rad)", style.BLUE, "-"),
@@ -69,7 +69,7 @@ def draw_derivations(data: xr.Dataset) -> Picture:
         (Column.ENERGY_GAP, style.BLACK, "-.", r"$E_1 + p_\psi^2/(2 I_3)$ against $E$ (relative)"),
     )
     for axis, (name, part) in zip(axes, PARTS.items(), strict=True):
-        solver = data.sel(scene=name, integrator=SOLVER)
+        solver = data.sel(scene=name, variant=SOLVER)
         for column, color, line, label in lines:
             gap, over = largest_so_far(solver[column])[1:], 4.0 if line == ":" else 2.0  # the dotted one is on top
             gap[gap <= SMALLEST] = np.nan  # no difference yet
@@ -94,7 +94,7 @@ def draw_derivations(data: xr.Dataset) -> Picture:
 def draw_residuals(data: xr.Dataset) -> Picture:
     """Energy and momenta: the solver's as the notebook drew them, and those of every discrete method."""
     figure, axes = style.panels(3, 3, height=1.6, sharex="col")
-    solver = data.sel(scene="spheroid", integrator=SOLVER)
+    solver = data.sel(scene="spheroid", variant=SOLVER)
     for line, name in zip(axes, CONSTANTS, strict=True):
         values = solver[name] - (solver[name].mean() if name == "energy" else solver[name][0])
         power = math.floor(math.log10(float(np.abs(values).max()) or 1.0))
@@ -104,8 +104,8 @@ def draw_residuals(data: xr.Dataset) -> Picture:
         line[0].set_ylabel(f"{LABELS[name]} \N{MINUS SIGN} its {REFERENCES[name]}\n({unit})")
         drawn = data[[Column.SAMPLE_TIME, f"{name}_residual"]]  # of these alone: a dataset has dozens
         for axis, part in zip(line[1:], PARTS, strict=True):
-            for method in data["integrator"].values:
-                _residual_line(axis, drawn.sel(scene=part, integrator=method), name)
+            for method in data["variant"].values:
+                _residual_line(axis, drawn.sel(scene=part, variant=method), name)
             axis.set(yscale="log")
     titles = ("lsoda on spheroid, as\nthe notebook drew it",
               *(f"{part}: largest\nrelative change so far" for part in PARTS))  # fmt: skip
@@ -118,7 +118,7 @@ def draw_residuals(data: xr.Dataset) -> Picture:
     for axis in axes[:, 1:].flat:
         axis.set_ylim(bottom=1e-3 * SMALLEST)
     for axis, constant, part in ((axes[k, m], CONSTANTS[k], part) for k in (1, 2) for m, part in enumerate(PARTS, 1)):
-        most = float(data[f"{constant}_largest"].sel(scene=part).drop_sel(integrator=SOLVER).max())
+        most = float(data[f"{constant}_largest"].sel(scene=part).drop_sel(variant=SOLVER).max())
         axis.annotate("drawn here: exactly 0", (0.98, SMALLEST), (0, -4), xycoords=axis.get_yaxis_transform(),
                       va="top", textcoords="offset points", **note)  # fmt: skip
         axis.text(
@@ -151,7 +151,7 @@ def draw_residuals(data: xr.Dataset) -> Picture:
 
 
 def _residual_line(axis: Any, run: xr.Dataset, constant: str) -> None:
-    method, values = str(run["integrator"].item()), largest_so_far(run[f"{constant}_residual"])
+    method, values = str(run["variant"].item()), largest_so_far(run[f"{constant}_residual"])
     good = np.isfinite(values)
     time, values = run[Column.SAMPLE_TIME].values[good][1:], values[good][1:]  # all are zero at the start
     grey = {"color": "#BBBBBB", "lw": 0.7, "zorder": 2, "label": "other discrete methods"}
@@ -165,8 +165,8 @@ def draw_hope(data: xr.Dataset) -> Picture:
     figure, axes = style.grid(2, 2, ("time (s)", "largest relative\nenergy error so far"), height=2.7, sharey=True)
     ring = {"color": style.BLACK, "mfc": "none", "ms": 8.0, "mew": 1.3, "lw": 0.0, "zorder": 5}
     for axis, (name, part) in zip(axes, PARTS.items(), strict=True):
-        for method in (row for row in NAMED if row in data["integrator"].values):
-            run = data.sel(scene=name, integrator=method)
+        for method in (row for row in NAMED if row in data["variant"].values):
+            run = data.sel(scene=name, variant=method)
             line = style.line(method, 0.8) | {"markevery": 0.12, "label": method}
             wide = line | {"marker": "", "lw": 2.4, "ls": "-"}
             axis.plot(run[Column.LONG_TIME], run[Column.LONG_ENERGY], **(wide if method == SOLVER else line))
@@ -202,7 +202,7 @@ def draw_spheres(data: xr.Dataset) -> Picture:
     turn = np.linspace(0.0, 2.0 * math.pi, 181)
     for axis, name in zip(axes.flat, PARTS, strict=True):
         drawn, true = words.paths(data, name)
-        early = data[Column.PATH_TIME].sel(scene=name, integrator=SOLVER).values <= NUTATIONS * scene(
+        early = data[Column.PATH_TIME].sel(scene=name, variant=SOLVER).values <= NUTATIONS * scene(
             name).nutation_period  # fmt: skip
         axis.plot(np.cos(turn), np.sin(turn), color="#BBBBBB", lw=0.8, zorder=0)
         for path, color, label in ((drawn, style.look(SOLVER).color, "as the notebook drew it"),
@@ -238,7 +238,7 @@ def draw_spheres(data: xr.Dataset) -> Picture:
 
 def draw_film(data: xr.Dataset) -> Picture:
     """The turning triad, and the true one."""
-    frames = data.sel(scene="spheroid", integrator=FILMED).dropna("frame", subset=[Column.FRAME_TIME])
+    frames = data.sel(scene="spheroid", variant=FILMED).dropna("frame", subset=[Column.FRAME_TIME])
     attitudes = [frames[name].values for name in (Column.FRAME_ATTITUDE, Column.TRUE_ATTITUDE)]
     last, true = (solid.columns_of(quaternions[-1])[2] for quaternions in attitudes)
     return Picture(
@@ -254,7 +254,7 @@ def draw_film(data: xr.Dataset) -> Picture:
 
 def draw_alpha(data: xr.Dataset) -> Picture:
     """What the printed alpha means: the cubic and the motion, against those of a release at rest."""
-    second = data.sel(scene="goldstein", integrator=SOLVER)
+    second = data.sel(scene="goldstein", variant=SOLVER)
     rest, rate = float(second[Column.ALPHA_AT_REST]), float(second[Column.ALPHA_RATE])
     figure, (cubic, motion) = style.grid(2, 2, height=2.6)
     u, start = second[Column.COSINE], math.cos(math.radians(43.0))
@@ -301,7 +301,7 @@ def draw_alpha(data: xr.Dataset) -> Picture:
 def draw_modified_energy(data: xr.Dataset) -> Picture:
     """Energy and modified energy of two discrete methods, over time and against the step."""
     figure, axes = style.panels(1, 3, height=2.2)
-    midpoint = data.sel(scene="spheroid", integrator=MIDPOINT)
+    midpoint = data.sel(scene="spheroid", variant=MIDPOINT)
     kinds = ((Column.ENERGY_CHANGE, "energy", "-"), (Column.MODIFIED_CHANGE, "modified energy", "--"))
     for (column, kind, _), color in zip(kinds, (style.BLUE, style.BLACK), strict=True):
         values = midpoint[f"{column}_history"]
@@ -309,7 +309,7 @@ def draw_modified_energy(data: xr.Dataset) -> Picture:
     axes[0, 0].set(title="spheroid, 40 steps\na nutation", xlabel="time (s)", ylabel="relative change")
     for axis, name in zip(axes[0, 1:], PARTS, strict=True):
         for method in MODIFIED:
-            run, look = data.sel(scene=name, integrator=method), style.look(method)
+            run, look = data.sel(scene=name, variant=method), style.look(method)
             h = run[Column.MODIFIED_STEP]
             for column, kind, line in kinds:
                 face = look.color if line == "-" else "white"

@@ -42,8 +42,8 @@ def better_from(data: xr.Dataset, scene: str, name: str) -> float:
     0 means that it is smaller at every stored time.
     """
     cell = data.sel(scene=scene)
-    ours = cell[Column.LONG_ENERGY].sel(integrator=name).values
-    times, solver = (cell[column].sel(integrator=SOLVER).values for column in (Column.LONG_TIME, Column.LONG_ENERGY))
+    ours = cell[Column.LONG_ENERGY].sel(variant=name).values
+    times, solver = (cell[column].sel(variant=SOLVER).values for column in (Column.LONG_TIME, Column.LONG_ENERGY))
     worse = np.flatnonzero(~(ours < solver))
     if not worse.size:
         return 0.0
@@ -57,5 +57,5 @@ def notebook_end(data: xr.Dataset, scene: str) -> float:
 
 def energy_until(data: xr.Dataset, scene: str, name: str, time: float) -> float:
     """The largest energy error of a row up to a time."""
-    cell = data.sel(scene=scene, integrator=name)
+    cell = data.sel(scene=scene, variant=name)
     return float(cell[Column.LONG_ENERGY].values[np.searchsorted(cell[Column.LONG_TIME].values, time)])

@@ -18,10 +18,10 @@ def answer(data: xr.Dataset, named: tuple[str, ...]) -> list[str]:
     """Whether the discrete methods that are `named` keep the energy better than the solver, and from when on."""
     sentences = []
     for scene in map(str, data["scene"].values):
-        shown = [name for name in named if name in data["integrator"].values]
+        shown = [name for name in named if name in data["variant"].values]
         largest = data["energy_largest"].sel(scene=scene)
-        limit = float(largest.sel(integrator=SOLVER))
-        values = {name: float(largest.sel(integrator=name)) for name in shown}
+        limit = float(largest.sel(variant=SOLVER))
+        values = {name: float(largest.sel(variant=name)) for name in shown}
         worse, better = ([n for n in shown if (values[n] < limit) is wanted] for wanted in (False, True))
         parts = [
             f"{word} than {_listed(values, part, most)}"
@@ -66,7 +66,7 @@ def long_table(data: xr.Dataset, named: Sequence[str]) -> Table:
     last, lines = float(data[Column.LONG_TIME].max()), []
     for scene in map(str, data["scene"].values):
         end = notebook_end(data, scene)
-        for name in (row for row in (SOLVER, *named) if row in data["integrator"].values):
+        for name in (row for row in (SOLVER, *named) if row in data["variant"].values):
             since = better_from(data, scene, name)
             better = "" if name == SOLVER else f"{since:.3g}" if math.isfinite(since) else "not to the end"
             errors = (energy_until(data, scene, name, time) for time in (end, last))

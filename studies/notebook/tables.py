@@ -19,7 +19,7 @@ from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.run.modified_energy import modified_energy
 from symtop.run.simulation import simulate
-from symtop.runner.grid import grid_rows
+from symtop.runner.grid import grid_variants
 
 from .derivations import easy_way, energies, hard_way, nutation_cubic, six_variables, with_alpha
 
@@ -63,7 +63,7 @@ class Column:
 
 def discrete_methods() -> list[str]:
     """Rows of the discrete Lagrangians and splittings of the registry, in the angles or the axis chart."""
-    return [row.name for row in grid_rows("nutation") if row.family in ("discrete-lagrangian", "splitting")]
+    return [row.name for row in grid_variants("nutation") if row.family in ("discrete-lagrangian", "splitting")]
 
 
 def residual_history(scene: Scene, name: str, setting: float, samples: int = SAMPLES) -> xr.Dataset:

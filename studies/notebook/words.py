@@ -42,8 +42,8 @@ MATCHED = (
 
 def largest_momenta(data: xr.Dataset) -> dict[str, float]:
     """The largest relative residual of a momentum on any scene, by discrete method."""
-    largest = data[list(MOMENTA)].drop_sel(integrator=SOLVER).to_dataarray().max(("variable", "scene"), skipna=False)
-    return dict(zip(largest["integrator"].values.tolist(), largest.values.tolist(), strict=True))
+    largest = data[list(MOMENTA)].drop_sel(variant=SOLVER).to_dataarray().max(("variable", "scene"), skipna=False)
+    return dict(zip(largest["variant"].values.tolist(), largest.values.tolist(), strict=True))
 
 
 def momenta(data: xr.Dataset) -> str:
@@ -53,7 +53,7 @@ def momenta(data: xr.Dataset) -> str:
     step = f"at the step measured, {STEPS_A_NUTATION:.0f} a nutation"
     kept = f"all {count}" if not lost else f"{count - len(lost)} of {count}"
     rest = f", not with {few(lost)}" if lost else " (theory: at any step)"
-    solver = data[list(MOMENTA)].sel(scene="spheroid", integrator=SOLVER)
+    solver = data[list(MOMENTA)].sel(scene="spheroid", variant=SOLVER)
     return (
         f"With {kept} discrete Lagrangians and splittings both momenta are constant to rounding {step}{rest}. The "
         f"largest relative change is {max(largest.values()):.0e}, against {float(solver.to_dataarray().max()):.0e} "
@@ -68,11 +68,11 @@ def hopes(data: xr.Dataset) -> list[str]:
 
 def hope_message(data: xr.Dataset) -> str:
     """Beside how many methods of order two the solver keeps the energy better at the notebook's end, and at last."""
-    shown = [method for method in DRAWN if method in data["integrator"].values]
+    shown = [method for method in DRAWN if method in data["variant"].values]
     parts, kept = [], True
     for scene in PARTS:
         largest = data["energy_largest"].sel(scene=scene)
-        ahead = int((largest.sel(integrator=shown) > float(largest.sel(integrator=SOLVER))).sum())
+        ahead = int((largest.sel(variant=shown) > float(largest.sel(variant=SOLVER))).sum())
         kept = kept and all(math.isfinite(better_from(data, scene, method)) for method in shown)
         parts.append((ahead, scene))
     (first, one), *others = parts
@@ -87,13 +87,13 @@ def hope_message(data: xr.Dataset) -> str:
 def worse_energies(data: xr.Dataset, scene: str) -> tuple[int, int]:
     """How many discrete methods change the energy by more than the solver over the notebook's time, and of how many."""
     largest = data["energy_largest"].sel(scene=scene)
-    discrete = largest.drop_sel(integrator=SOLVER).values
-    return int((discrete > float(largest.sel(integrator=SOLVER))).sum()), len(discrete)
+    discrete = largest.drop_sel(variant=SOLVER).values
+    return int((discrete > float(largest.sel(variant=SOLVER))).sum()), len(discrete)
 
 
 def residuals_message(data: xr.Dataset) -> str:
     """What the discrete methods keep better than the solver, and with how many the energy is worse."""
-    lost = float(data[list(MOMENTA)].sel(integrator=SOLVER).to_dataarray().max())
+    lost = float(data[list(MOMENTA)].sel(variant=SOLVER).to_dataarray().max())
     counts = {scene: worse_energies(data, scene) for scene in PARTS}
     return (
         f"Discrete methods keep both momenta to {number(max(largest_momenta(data).values()))}, lsoda to "
@@ -104,7 +104,7 @@ def residuals_message(data: xr.Dataset) -> str:
 
 def paths(data: xr.Dataset, scene: str) -> tuple[Array, Array]:
     """The path that the notebook drew and that of the axis, shape (times, 3)."""
-    run = data.sel(scene=scene, integrator=SOLVER)
+    run = data.sel(scene=scene, variant=SOLVER)
     drawn = axis_from_angles(run[Column.SOLVER_THETA].values, run[Column.SOLVER_PHI].values + 0.5 * math.pi)
     return drawn, axis_from_angles(run[Column.TRUE_THETA].values, run[Column.TRUE_PHI].values)
 
@@ -117,7 +117,7 @@ def turned(data: xr.Dataset, scene: str) -> float:
 
 def modified_message(data: xr.Dataset) -> str:
     """The powers of the step with which energy and modified energy change, of one method, as a title."""
-    run = data.sel(scene="spheroid", integrator=MODIFIED[0])
+    run = data.sel(scene="spheroid", variant=MODIFIED[0])
     slopes = [power_law(run[Column.MODIFIED_STEP].values, run[column].values).slope
               for column in (Column.ENERGY_CHANGE, Column.MODIFIED_CHANGE)]  # fmt: skip
     return (
@@ -129,9 +129,9 @@ def modified_message(data: xr.Dataset) -> str:
 def energy(data: xr.Dataset) -> str:
     """The energy of the discrete methods: bounded, and smaller than the solver's or not."""
     largest = data["energy_largest"].sel(scene="spheroid")
-    errors = dict(zip(largest["integrator"].values.tolist(), largest.values.tolist(), strict=True))
+    errors = dict(zip(largest["variant"].values.tolist(), largest.values.tolist(), strict=True))
     limit = errors.pop(SOLVER)
-    midpoint = data.sel(scene="spheroid", integrator=MIDPOINT)
+    midpoint = data.sel(scene="spheroid", variant=MIDPOINT)
     gain = float(midpoint[Column.ENERGY_CHANGE][0] / midpoint[Column.MODIFIED_CHANGE][0])
     return (
         "The energy error of discrete Lagrangians and splittings is bounded, not small: "
@@ -144,7 +144,7 @@ def energy(data: xr.Dataset) -> str:
 def verdict(data: xr.Dataset) -> list[str]:
     """What was reproduced, what was matched or corrected, and why the discrete methods win."""
     top, (polar, equatorial) = notebook_top()
-    second = data.sel(scene="goldstein", integrator=SOLVER)
+    second = data.sel(scene="goldstein", variant=SOLVER)
     reproduced = (
         f"Reproduced: a spheroid of polar radius {polar:.5f} and equatorial radius {equatorial:.5f} has I1 = "
         f"{top.I1:g}, I3 = {top.I3:g} and mgl = {top.mgl:.4f}, and these inertias give the radii back; both "
@@ -168,8 +168,8 @@ def modified_orders(data: xr.Dataset) -> dict[tuple[str, str], tuple[float, floa
     """Slopes of the energy change and of the modified energy's change against the step, by scene and row."""
     slopes = {}
     for scene in map(str, data["scene"].values):
-        for name in (row for row in MODIFIED if row in data["integrator"].values):
-            run = data.sel(scene=scene, integrator=name)
+        for name in (row for row in MODIFIED if row in data["variant"].values):
+            run = data.sel(scene=scene, variant=name)
             plain, modified = (
                 power_law(run[Column.MODIFIED_STEP].values, run[column].values).slope
                 for column in (Column.ENERGY_CHANGE, Column.MODIFIED_CHANGE)
@@ -192,8 +192,8 @@ def tables(data: xr.Dataset) -> list[Table]:
     """The energy far beyond the notebook's end, and the largest residuals of every integrator."""
     rows = []
     for scene in data["scene"].values:
-        for name in data["integrator"].values:
-            run = data.sel(scene=scene, integrator=name)
+        for name in data["variant"].values:
+            run = data.sel(scene=scene, variant=name)
             largest = [f"{float(run[f'{constant}_largest']):.1e}" for constant in CONSTANTS]
             since = better_from(data, str(scene), str(name))
             better = "" if name == SOLVER else f"{since:.3g}" if math.isfinite(since) else "not to the end"

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.euler_lagrange import accelerations, with_rates
+from symtop.methods.framework.angles import accelerations, with_rates
 from symtop.methods.framework.loop import March, Marks, driver
 from symtop.methods.lagrangian.quadrature import RULES, quadrature
 from symtop.methods.lagrangian.unreduced import begin, observe, unreduced_step, with_momenta

@@ -36,7 +36,7 @@ def draw_notebook(data: xr.Dataset) -> Picture:
         (Column.GUESS, "--", {"color": style.VERMILLION, "lw": 1.0, "label": "the notebook's guess at the forces"}),
     )
     for axis, (name, oscillator) in zip(axes, OSCILLATORS.items(), strict=True):
-        run = data.sel(scene=name, integrator="midpoint")
+        run = data.sel(scene=name, variant="midpoint")
         for column, line, options in lines:
             axis.plot(run[Column.NOTEBOOK_TIME], run[column], line, **options)
         axis.set(title=words.title(oscillator), ylim=(-1.3, 8.5))
@@ -63,7 +63,7 @@ def draw_orders(data: xr.Dataset) -> Picture:
     figure, axes = style.panels(1, len(ORDERS), height=2.9, sharex=True, sharey=True)
     for axis, (name, error, what) in zip(axes[0], ORDERS, strict=True):
         for line, (method, marker) in enumerate(SYMBOLS.items()):
-            run = data.sel(scene=name, integrator=method)
+            run = data.sel(scene=name, variant=method)
             color = style.PURPLE if method == ONE_SIDED else style.look(method).color
             marks = {"mfc": "none", "ms": 3.4} if method == "trapezoidal" else {"mfc": color, "ms": 4.6}
             errors = run[error].where(run[error] > 1e-13)  # above rounding
@@ -98,7 +98,7 @@ def draw_decay(data: xr.Dataset) -> Picture:
     figure, axes = style.grid(len(AGAINST_RK45), 2, (TIME, "largest |E/E(exact) - 1| so far"), sharey=True)
     for axis, name in zip(axes, AGAINST_RK45, strict=True):
         for method in (*RULES, RK45):
-            run = data.sel(scene=name, integrator=method)
+            run = data.sel(scene=name, variant=method)
             time, error = run[Column.TIME].values, largest_so_far(run[Column.ENERGY_ERROR])
             axis.plot(time[1:], error[1:], **style.line(method, 0.8), markevery=0.1, label=method)
         axis.set(xscale="log", yscale="log", title=words.title(OSCILLATORS[name]))
@@ -118,14 +118,14 @@ def draw_tops(data: xr.Dataset) -> Picture:
     names = tops(data)
     figure, axes = style.panels(3, len(names), height=1.6, sharex="col")
     for (theta, momenta, balance), name in zip(axes.T, names, strict=True):
-        first = data.sel(scene=name, integrator="midpoint")
+        first = data.sel(scene=name, variant="midpoint")
         time = first[Column.TOP_TIME].values
         theta.plot(time, np.degrees(first[Column.THETA]), color=style.BLUE, label=r"$\theta$, midpoint")
         theta.plot(time, np.degrees(first[Column.TRUE_THETA]), ":", color=style.BLACK, label=r"$\theta$, truth")
         momenta.plot(time, first[Column.P_PHI], color=style.GREEN, label=r"$p_\varphi$")
         momenta.plot(time, first[Column.P_PSI], "--", color=style.PURPLE, label=r"$p_\psi$")
         for method in (*RULES, RK45):
-            run, color = data.sel(scene=name, integrator=method), style.look(method).color
+            run, color = data.sel(scene=name, variant=method), style.look(method).color
             phi, psi = largest_so_far(run[Column.BALANCE_PHI]), largest_so_far(run[Column.BALANCE_PSI])
             wide = 2.4 if method == RULES[0] else 1.1  # it lies below the other rule's
             balance.plot(time[1:], phi[1:], color=color, lw=wide, label=f"balance, {method}")
@@ -162,7 +162,7 @@ def draw_top_orders(data: xr.Dataset) -> Picture:
     orders = []
     for axis, name in zip(axes, tops(data), strict=True):
         for method in RULES:
-            run = data.sel(scene=name, integrator=method)
+            run = data.sel(scene=name, variant=method)
             h, error = run[Column.TOP_STEP], run[Column.THETA_ERROR]
             axis.plot(h, error, **style.line(method), label=method)
             orders.append(f"{method} on {name} {order(data, name, method, Column.THETA_ERROR)}")

@@ -33,8 +33,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.methods.lagrangian.exact_map import one_oscillator
-from symtop.methods.lagrangian.oscillators import on_oscillators
+from symtop.methods.lagrangian.oscillators import on_oscillators, one_oscillator
 from symtop.model.charts import Array
 from symtop.model.exact.weierstrass import differences, half_period, roots
 from symtop.model.scenes import Scene

@@ -28,23 +28,23 @@ def draw_errors(data: xr.Dataset) -> Picture:
     figure, axes = style.grid(len(QUARTICS), 3, labels, height=1.9, sharex=True, sharey=True)
     for axis, name in zip(axes, QUARTICS, strict=True):
         for method in MAPS:
-            cell, look = data.sel(scene=name, integrator=method), LOOKS[method]
+            cell, look = data.sel(scene=name, variant=method), LOOKS[method]
             errors = np.maximum(cell[quartic.ERROR], SMALLEST)
             axis.plot(cell[quartic.STEP], errors, look.marker, ls=look.dash, color=look.color, ms=3, label=method)
         style.slope_guide(axis, 2.0, (1e-2, 0.4), 1e-5, "$h^2$")
         axis.axvline(0.5, color=style.GREY, lw=0.9, ls=":")
         axis.set(xscale="log", yscale="log", title=name)
-        ended = [m for m in MAPS if not np.isfinite(data[quartic.ERROR].sel(scene=name, integrator=m)).all()]
+        ended = [m for m in MAPS if not np.isfinite(data[quartic.ERROR].sel(scene=name, variant=m)).all()]
         if ended:
             note = "lost at longer steps:\n" + "\n".join(ended)
             axis.annotate(note, (0.03, 0.28), xycoords="axes fraction", color="#444444", fontsize=style.LEAST_TEXT)
-    top = float(data[quartic.ERROR].sel(scene=list(QUARTICS), integrator=list(MAPS)).max())
+    top = float(data[quartic.ERROR].sel(scene=list(QUARTICS), variant=list(MAPS)).max())
     axes[0].set_ylim(1e-17, 10.0 * top)
     for axis in axes:
         axis.annotate("T/2 ", (0.5, 1e-9), color="#444444", fontsize=style.LEAST_TEXT, ha="right", va="center")
     style.few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
-    exact = float(data[quartic.ERROR].sel(scene=list(QUARTICS), integrator=MAPS[0]).max())
+    exact = float(data[quartic.ERROR].sel(scene=list(QUARTICS), variant=MAPS[0]).max())
     style.headline(figure, f"{MAPS[0]} is the motion at any step, to {style.number(exact)}; mcmillan, the same map "
                            "with constants to second order, has order 2 as the others")  # fmt: skip
     return Picture(
@@ -67,12 +67,12 @@ def draw_orbits(data: xr.Dataset) -> Picture:
     least, most = (pick(MAPS[1:], key=lambda method: far[method]) for pick in (min, max))
     for axis, name in zip(axes[0], DRAWN, strict=True):
         cell = data.sel(scene=name).isel(quartic_shown=-1)
-        true = cell.sel(integrator=MAPS[0])
+        true = cell.sel(variant=MAPS[0])
         axis.plot(true[quartic.CURVE_HERE], true[quartic.CURVE_AHEAD], **curve)
         low, high = float(true[quartic.CURVE_HERE].min()), float(true[quartic.CURVE_HERE].max())
         ends = low - 0.25 * (high - low), high + 0.25 * (high - low)
         for method in MAPS:
-            squares, look = cell[quartic.ORBIT].sel(integrator=method).values, LOOKS[method]
+            squares, look = cell[quartic.ORBIT].sel(variant=method).values, LOOKS[method]
             dots = {"color": look.color, "mfc": "none" if method == MAPS[0] else look.color, "lw": 0, "ms": 3.2}
             axis.plot(squares[:-1], squares[1:], look.marker, label=method, zorder=2 + (method != MAPS[0]), **dots)
         axis.set(xlim=ends, ylim=ends, aspect="equal", xlabel="$|x_n|^2$ / largest $|x|^2$")
@@ -80,7 +80,7 @@ def draw_orbits(data: xr.Dataset) -> Picture:
         axis.text(0.5, 0.4, _outside(cell, *ends), transform=axis.transAxes, ha="center", va="center",
                   color="#444444", fontsize=style.LEAST_TEXT)  # fmt: skip
     for method, corner in ((least, (0.16, 0.07)), (most, (0.53, 0.55))) if least != most else ():
-        squares = data[quartic.ORBIT].sel(scene=DRAWN[0], integrator=method).values[-1]
+        squares = data[quartic.ORBIT].sel(scene=DRAWN[0], variant=method).values[-1]
         worst = int(np.argmax(quartic.distances(data, DRAWN[0], method)))
         place, color = squares[worst : worst + 2], style.ink(LOOKS[method].color)
         axes[0, 0].plot(*place, "o", color=style.BLACK, mfc="none", ms=9.0, mew=1.2, zorder=5)
@@ -119,7 +119,7 @@ def _outside(orbits: xr.Dataset, low: float, high: float) -> str:
     """Which maps have points outside a panel, as a note; empty if none has."""
     parts = []
     for method in MAPS:
-        values = orbits[quartic.ORBIT].sel(integrator=method).values
+        values = orbits[quartic.ORBIT].sel(variant=method).values
         inside = (values >= low) & (values <= high)
         out = int(np.sum(~(inside[:-1] & inside[1:])))  # a point is two values
         if out:
@@ -130,7 +130,7 @@ def _outside(orbits: xr.Dataset, low: float, high: float) -> str:
 def draw_constants(data: xr.Dataset) -> Picture:
     """A of the exact map against the step, and that of stormer-verlet, its limit of small steps."""
     figure, axes = style.panels(1, 1, height=2.5)
-    axis, true = axes[0, 0], data.sel(scene=quartic.CHI[0], integrator=MAPS[0])
+    axis, true = axes[0, 0], data.sel(scene=quartic.CHI[0], variant=MAPS[0])
     steps, A = true[quartic.STEP].values, true[quartic.A].values
     limit = quartic.oscillator_of(quartic.CHI[0])
     leaves = 2.0 / (np.sqrt(-3.0 * limit.b) * limit.period)  # where 1 + 3 b h^2/2 = -1, in periods

@@ -96,14 +96,14 @@ def _curves(oscillator: Quartic, largest: float) -> dict[str, object]:
 
 def quartic_order(data: xr.Dataset, name: str, method: str, column: str = ERROR) -> Fit:
     """Slope of an error, or of a gap of a constant, against the step."""
-    cell = data.sel(scene=name, integrator=method)
+    cell = data.sel(scene=name, variant=method)
     steps, errors = cell[STEP].values, cell[column].values
     return power_law(steps, errors, (steps < ASYMPTOTIC) & (errors > ROUNDING))
 
 
 def distances(data: xr.Dataset, name: str, method: str) -> Array:
     """Distances of the points of a discrete orbit from the true curve, a polygon, at the larger of the steps shown."""
-    true, cell = data.sel(scene=name, integrator="exact-discrete"), data.sel(scene=name, integrator=method)
+    true, cell = data.sel(scene=name, variant="exact-discrete"), data.sel(scene=name, variant=method)
     curve = true[CURVE_HERE].values[-1] + 1j * true[CURVE_AHEAD].values[-1]
     begins, sides = curve[:-1], np.diff(curve)
     squares = cell[ORBIT].values[-1]

@@ -12,7 +12,7 @@ from .quartic_tables import ERROR, GAPS, MAPS, PERIODS, QUARTICS, STEPS, oscilla
 
 def sentences(data: xr.Dataset) -> list[str]:
     """What the four maps do, and what becomes of the exact one for small steps."""
-    worst = float(data[ERROR].sel(scene=list(QUARTICS), integrator="exact-discrete").max())
+    worst = float(data[ERROR].sel(scene=list(QUARTICS), variant="exact-discrete").max())
     slopes = [quartic_order(data, name, method).slope for name in QUARTICS for method in MAPS[1:]]
     limits = [quartic_order(data, name, MAPS[0], gap).slope for name in QUARTICS[1:] for gap in GAPS]
     line = (
@@ -38,7 +38,7 @@ def tables(data: xr.Dataset) -> list[Table]:
     for name in QUARTICS:
         oscillator = oscillator_of(name)
         for method in MAPS:
-            errors = data[ERROR].sel(scene=name, integrator=method).values
+            errors = data[ERROR].sel(scene=name, variant=method).values
             order = "exact" if method == MAPS[0] else f"{quartic_order(data, name, method).slope:.2f}"
             sizes = [f"{errors[STEPS.index(steps)]:.0e}" for steps in (160.3, 20.3, 4.37, 2.1)]
             rows.append([name, f"{oscillator.sigma:.3g}", f"{oscillator.b:.3g}", method, order, *sizes])

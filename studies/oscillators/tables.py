@@ -56,7 +56,7 @@ def tops(data: xr.Dataset) -> list[str]:
 def order(data: xr.Dataset, scene: str, method: str, error: str) -> Fit:
     """Slope of an error against the step, over the steps that are small enough and the errors above rounding."""
     step = Column.TOP_STEP if error == Column.THETA_ERROR else Column.STEP
-    cell = data.sel(scene=scene, integrator=method)
+    cell = data.sel(scene=scene, variant=method)
     steps, errors = cell[step].values, cell[error].values
     return power_law(steps, errors, (steps < ASYMPTOTIC[step]) & (errors > LEAST_JUDGED))
 

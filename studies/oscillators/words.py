@@ -26,7 +26,7 @@ def title(oscillator: Oscillator, between: str = ", ") -> str:
 
 def largest_balance(data: xr.Dataset, methods: tuple[str, ...]) -> float:
     """The largest relative defect of the momentum balance."""
-    runs = data.sel(scene=tops(data), integrator=list(methods))
+    runs = data.sel(scene=tops(data), variant=list(methods))
     return max(float(np.abs(runs[name]).max()) for name in (Column.BALANCE_PHI, Column.BALANCE_PSI))
 
 
@@ -34,7 +34,7 @@ def finest(data: xr.Dataset) -> str:
     """The finest step and the horizon of each damped top."""
     parts = []
     for name in tops(data):
-        cell = data.sel(scene=name, integrator=RULES[0])
+        cell = data.sel(scene=name, variant=RULES[0])
         step, end = float(cell[Column.TOP_STEP].min()), float(cell[Column.TOP_TIME].max())
         parts.append(f"step {step:.2g} s to t = {end:g} on {name}")
     return " and ".join(parts)
@@ -43,7 +43,7 @@ def finest(data: xr.Dataset) -> str:
 def cost(data: xr.Dataset) -> str:
     """Force evaluations of the discrete rules and of RK45."""
     evaluations = data[Column.EVALUATIONS].sel(scene=list(AGAINST_RK45))
-    rules, rk45 = float(evaluations.sel(integrator=RULES[0]).max()), evaluations.sel(integrator=RK45)
+    rules, rk45 = float(evaluations.sel(variant=RULES[0]).max()), evaluations.sel(variant=RK45)
     return (
         f"{rules:.0f} force evaluations for a rule (step {LONG / rules:g}), {float(rk45.min()):.0f} to "
         f"{float(rk45.max()):.0f} for RK45"
@@ -74,7 +74,7 @@ def energy_errors(data: xr.Dataset) -> dict[str, dict[str, float]]:
     """The largest relative error of the energy at equal cost, by scene and method."""
     largest = np.abs(data[Column.ENERGY_ERROR]).max("sample")
     return {
-        name: {method: float(largest.sel(scene=name, integrator=method)) for method in (*RULES, RK45)}
+        name: {method: float(largest.sel(scene=name, variant=method)) for method in (*RULES, RK45)}
         for name in AGAINST_RK45
     }
 
@@ -129,7 +129,7 @@ def tables(data: xr.Dataset) -> list[Table]:
             f"{oscillator.damping:g}", oscillator.regime, method,
             str(order(data, name, method, Column.POSITION_ERROR)),
             str(order(data, name, method, Column.EXPONENT_ERROR)),
-            f"{float(largest.sel(scene=name, integrator=method)):.1e}",
+            f"{float(largest.sel(scene=name, variant=method)):.1e}",
         ]
         for name, oscillator in OSCILLATORS.items()
         for method in (*RULES, ONE_SIDED)

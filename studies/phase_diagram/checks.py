@@ -89,7 +89,7 @@ def check(asked: Any) -> xr.Dataset:
     """Errors and ``work``, evaluations a nutation, of the runs that decide a cell, over ``rank`` and ``side``.
 
     The ranks are the winner and the next row, the sides the coarser and the finer setting. ``quantity``, ``target``,
-    ``horizon`` and ``row`` say which cell it is.
+    ``horizon`` and ``contender`` say which cell it is.
     """
     tops, far = tops_of(tables.SCENE, 1, 0), horizons()
     ends = far[far <= 1.0001 * asked["horizon"]]
@@ -104,7 +104,7 @@ def check(asked: Any) -> xr.Dataset:
             "errors": (("rank", "side"), shown),
             "work": (("rank", "side"), work),
             "setting_value": (("rank", "side"), np.array(asked["settings"])),
-            "row": ("rank", list(asked["integrators"])),
+            "contender": ("rank", list(asked["integrators"])),
             "quantity": ((), asked["quantity"]),
             "target": ((), asked["target"]),
             "checked_horizon": ((), asked["horizon"]),

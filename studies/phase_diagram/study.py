@@ -6,7 +6,7 @@ times a force evaluation of each row. A second round runs ten cells that were fo
 
 import xarray as xr
 
-from symtop.methods.framework.registry import integrator, rows
+from symtop.methods.framework.registry import integrator, variants
 from symtop.runner.study import Case, Study
 
 from ..population.prices import PROCESSES, prices
@@ -30,7 +30,7 @@ CHECKED = {False: 1e8, True: 4e6}  # force evaluations of one run of a check, by
 
 def candidates() -> list[str]:
     """The rows of `CANDIDATES` that this machine has: heyoka's Taylor series may be missing."""
-    there = {row.name for row in rows()}
+    there = {row.name for row in variants()}
     return [name for name in CANDIDATES if name in there]
 
 

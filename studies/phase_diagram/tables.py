@@ -54,14 +54,14 @@ def rows_of(data: xr.DataTree, scene: str, quantity: str) -> list[str]:
     """Rows of a panel: those that conserve the energy by construction keep it and the shape at any step."""
     group = data[LADDERS].to_dataset().sel(scene=scene)
     return [
-        str(name) for name in group["integrator"].values
-        if quantity == "axis" or float(group["conserves_energy"].sel(integrator=name)) != 1.0
+        str(name) for name in group["variant"].values
+        if quantity == "axis" or float(group["conserves_energy"].sel(variant=name)) != 1.0
     ]  # fmt: skip
 
 
 def cell(data: xr.DataTree, scene: str, name: str) -> xr.Dataset:
     """What was measured of a row: without padding, with errors of runs that failed or have no law infinite."""
-    one = data[LADDERS].to_dataset().sel(scene=scene, integrator=name)
+    one = data[LADDERS].to_dataset().sel(scene=scene, variant=name)
     ran = np.isfinite(one["setting_value"].values)
     one = one.isel(setting=np.flatnonzero(ran))
     there = one["error"].notnull().any(["quantity", "setting", "horizon"]).values

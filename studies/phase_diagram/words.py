@@ -69,9 +69,9 @@ def spots(data: xr.DataTree) -> list[Spot]:
         return []
     group, each = data[CHECKS].to_dataset().isel(scene=0), []
     panels = {name: diagram(data, SCENE, name) for name in QUANTITIES}
-    for name in group["integrator"].values:
-        one = group.sel(integrator=name)
-        quantity, rows = str(one["quantity"].values), [str(row) for row in one["row"].values]
+    for name in group["variant"].values:
+        one = group.sel(variant=name)
+        quantity, rows = str(one["quantity"].values), [str(name) for name in one["contender"].values]
         target, horizon = float(one["target"]), float(one["checked_horizon"])
         panel = panels[quantity]
         foretold = 1e9 * float(panel.costs[panel.names.index(rows[0]), *panel.place(target, horizon)])
@@ -187,7 +187,7 @@ def foretold_share(data: xr.DataTree, name: str) -> float:
 
 def taking_part(data: xr.DataTree) -> list[str]:
     """The rows of the diagram, those on the axis without their chart."""
-    rows = map(str, data[LADDERS].to_dataset()["integrator"].values)
+    rows = map(str, data[LADDERS].to_dataset()["variant"].values)
     return [row.removesuffix("[axis]") for row in rows]
 
 
@@ -202,7 +202,7 @@ def part_sentence(data: xr.DataTree) -> str:
 def parts_table(data: xr.DataTree) -> Table:
     """Every row that takes part, and in which panels."""
     tops = diagrams.tops_run(data)[0]
-    rows = [str(row) for row in data[LADDERS].to_dataset()["integrator"].values]
+    rows = [str(row) for row in data[LADDERS].to_dataset()["variant"].values]
     panels = {quantity: set(diagrams.rows_of(data, tops, quantity)) for quantity in QUANTITIES}
     marks = [[row, *("yes" if row in panels[quantity] else "no" for quantity in QUANTITIES)] for row in rows]
     names = [PANELS[quantity].partition(":")[0] for quantity in QUANTITIES]
@@ -221,11 +221,11 @@ def population_sentence(data: xr.DataTree) -> str:
     """What was run."""
     group = data[LADDERS].to_dataset()
     members = int(
-        group["error"].sel(scene=POPULATION).notnull().any(["integrator", "quantity", "setting", "horizon"]).sum()
+        group["error"].sel(scene=POPULATION).notnull().any(["variant", "quantity", "setting", "horizon"]).sum()
     )
     reach = float(group["reach"].max())
     return (
-        f"{group.sizes['integrator']} rows on {members} random tops (seed 1) and on {SCENE}: measured to "
+        f"{group.sizes['variant']} rows on {members} random tops (seed 1) and on {SCENE}: measured to "
         f"{reach:.2g} nutations, predicted to {float(group['horizon'].max()):.0e}."
     )
 
@@ -279,7 +279,7 @@ def _spots(data: xr.DataTree) -> Table:
 def _laws(data: xr.DataTree) -> Table:
     lines = []
     for name in diagrams.tops_run(data):
-        for row in map(str, data[LADDERS].to_dataset()["integrator"].values):
+        for row in map(str, data[LADDERS].to_dataset()["variant"].values):
             one = diagrams.cell(data, name, row)
             for k, value in enumerate(one["setting_value"].values):
                 part = one.isel(setting=k)

@@ -38,8 +38,7 @@ from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.fixed_step import inside
 from symtop.methods.framework.many import members_of
-from symtop.methods.framework.outcomes import OUTCOMES
-from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import DIMENSIONS, Array
 from symtop.model.scenes import Scene

@@ -150,7 +150,7 @@ def _guard(data: xr.DataTree) -> Table:
 def guarded_rows(data: xr.DataTree, horizon: str) -> dict[str, list[str]]:
     """The rows that the guard was asked about: all, and by what they have in common."""
     rows, group = verdicts.judged_rows(data, horizon), data[horizon].to_dataset().isel(scene=0)
-    control = dict(zip(map(str, group["integrator"].values), map(str, group["control"].values), strict=True))
+    control = dict(zip(map(str, group["variant"].values), map(str, group["control"].values), strict=True))
     fixed = [name for name in rows if control[name] == "step_size"]
     parts = {
         "fixed step, angles": [name for name in fixed if "[angles]" in name],
@@ -163,8 +163,8 @@ def guarded_rows(data: xr.DataTree, horizon: str) -> dict[str, list[str]]:
 def _prices(data: xr.DataTree) -> Table:
     group = of_processes(data["prices"].to_dataset())
     lines = []
-    for name in map(str, group["integrator"].values):
-        alone, together, spread = (float(group[key].sel(integrator=name)) for key in ("alone", "together", "spread"))
+    for name in map(str, group["variant"].values):
+        alone, together, spread = (float(group[key].sel(variant=name)) for key in ("alone", "together", "spread"))
         lines.append([name, f"{1e9 * alone:.3g}", f"{1e9 * together:.3g}", f"{alone / together:.2f}", f"{spread:.0%}"])
     title = (
         "Measured price of a force evaluation, without the call, in a run of one top and in one call for many; "
@@ -175,8 +175,8 @@ def _prices(data: xr.DataTree) -> Table:
 
 def _prices_by_tolerance(data: xr.DataTree) -> Table:
     group = of_processes(data["prices"].to_dataset())
-    by = group["alone_by"].transpose("integrator", "priced_at").values
-    names = [str(name) for name in group["integrator"].values]
+    by = group["alone_by"].transpose("variant", "priced_at").values
+    names = [str(name) for name in group["variant"].values]
     lines = [[name, *(f"{1e9 * price:.3g}" for price in row)]
              for name, row in zip(names, by, strict=True) if np.ptp(row)]  # fmt: skip
     header = ["row", *(f"{tolerance:.0e}" for tolerance in group["priced_at"].values)]

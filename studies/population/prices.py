@@ -148,17 +148,17 @@ def prices(names: Sequence[str], rounds: int, batch: float) -> xr.Dataset:
     }
     spreads = {name: max(long.spread for key, long in zip(each, taken[1::2], strict=True) if key[0] == name)
                for name in names}  # fmt: skip
-    columns: dict[str, Any] = {"spread": ("integrator", [spreads[name] for name in names])}
+    columns: dict[str, Any] = {"spread": ("variant", [spreads[name] for name in names])}
     for kind in KINDS:
         values = np.array([[_of(slopes, name, kind, tolerance) for tolerance in TOLERANCES] for name in names])
         same = values[:, TOLERANCES.index(TOLERANCE)]
         columns |= {
-            kind: ("integrator", same[:, 0]),
-            f"{kind}_half": (("integrator", "half"), same[:, 1:]),
-            f"{kind}_by": (("integrator", "priced_at"), values[..., 0]),
-            f"{kind}_by_half": (("integrator", "priced_at", "half"), values[..., 1:]),
+            kind: ("variant", same[:, 0]),
+            f"{kind}_half": (("variant", "half"), same[:, 1:]),
+            f"{kind}_by": (("variant", "priced_at"), values[..., 0]),
+            f"{kind}_by_half": (("variant", "priced_at", "half"), values[..., 1:]),
         }
-    return xr.Dataset(columns, coords={"integrator": list(names), "priced_at": list(TOLERANCES)})
+    return xr.Dataset(columns, coords={"variant": list(names), "priced_at": list(TOLERANCES)})
 
 
 def _of(slopes: dict[tuple[str, str, float], Array], name: str, kind: str, tolerance: float) -> Array:

@@ -7,7 +7,7 @@ for each target. A case is a row and a horizon; a last one, alone on the machine
 import numpy as np
 import xarray as xr
 
-from symtop.methods.framework.registry import Integrator, integrator, rows
+from symtop.methods.framework.registry import Integrator, integrator, variants
 from symtop.run.ensemble.population import STRATA
 from symtop.runner.study import Case, Study
 
@@ -30,7 +30,9 @@ def compiled_rows() -> list[Integrator]:
     """Every compiled row with a step or a tolerance, but those that are left out."""
     left = {name for names in words.LEFT_OUT.values() for name in names}
     return [
-        row for row in rows() if row.implementation == "compiled" and row.control is not None and row.method not in left
+        row
+        for row in variants()
+        if row.implementation == "compiled" and row.control is not None and row.method not in left
     ]
 
 

@@ -108,9 +108,9 @@ def price(data: xr.DataTree, names: list[str], unit: str, tolerances: Array) -> 
     """
     if unit == "evaluations":
         return np.ones((3, *tolerances.shape))
-    timed = of_processes(data["prices"].to_dataset()).sel(integrator=names)
-    halves = timed[f"{unit}_by_half"].transpose("half", "integrator", "priced_at").values
-    each = np.stack([timed[f"{unit}_by"].transpose("integrator", "priced_at").values, *halves])
+    timed = of_processes(data["prices"].to_dataset()).sel(variant=names)
+    halves = timed[f"{unit}_by_half"].transpose("half", "variant", "priced_at").values
+    each = np.stack([timed[f"{unit}_by"].transpose("variant", "priced_at").values, *halves])
     seconds = np.repeat(each[:, :, :1], tolerances.shape[1], axis=2)
     known, x = -np.log(timed["priced_at"].values), -np.log(tolerances)
     for part, row in zip(*np.nonzero(np.ptp(each, axis=2)), strict=True):
@@ -123,13 +123,13 @@ def price(data: xr.DataTree, names: list[str], unit: str, tolerances: Array) -> 
 def costs(data: xr.DataTree, cell: Cell, unit: str) -> Costs:
     """Costs of all rows that show a cell's quantity, on the tops that are asked."""
     group = data[cell.horizon].to_dataset()[["cost", "met_at"]].isel(scene=0)
-    asked = group.sel(quantity=cell.quantity, target=cell.target).transpose("integrator", "member")
+    asked = group.sel(quantity=cell.quantity, target=cell.target).transpose("variant", "member")
     values, met = asked["cost"].values, asked["met_at"].values
     if cell.stratum != ALL:
         among = stratum_of(data, cell.horizon) == strata(data).index(cell.stratum)
         values, met = values[:, among], met[:, among]
     rows, tops = ~np.isnan(values).all(axis=1), ~np.isnan(values).all(axis=0)
-    names = [str(name) for name in group["integrator"].values[rows]]
+    names = [str(name) for name in group["variant"].values[rows]]
     chosen = np.ix_(rows, tops)
     values, met = np.where(np.isnan(values), np.inf, values)[chosen], met[chosen]
     seconds = price(data, names, unit, np.where(met, 10.0 ** (-met.astype(float) / TENTHS), np.nan))
@@ -202,7 +202,7 @@ class Health(NamedTuple):
 def health(data: xr.DataTree, name: str, horizon: str = "short") -> Health:
     """Runs, wrong runs and silent failures of a row at the settings at which (nearly) all members were judged."""
     asked = data[horizon].to_dataset()[["runs", "wrong", "silent", "setting", "control"]]
-    group = asked.isel(scene=0).sel(integrator=name)
+    group = asked.isel(scene=0).sel(variant=name)
     count = float(data["tops"]["known"].values.ravel()[: members(data, horizon)].sum())
     judged = group["runs"].transpose("level", "stratum").values
     there = judged.sum(axis=1) >= WHOLE * count
@@ -225,7 +225,7 @@ def scored(
     run ("watched"). Runs between `EXPECTED` and `WRONG` are neither right nor wrong and are left out, and so are those
     that the guard's trial repeats whole: there it measures the error and forecasts nothing.
     """
-    group = data[horizon].to_dataset().isel(scene=0).sel(integrator=names or judged_rows(data, horizon))
+    group = data[horizon].to_dataset().isel(scene=0).sel(variant=names or judged_rows(data, horizon))
     values, errors = group[score].values.ravel(), group["measured"].values.ravel()
     told = ~np.isnan(values) & ((errors <= EXPECTED) | (errors > WRONG))
     asked = told & ~(group["whole"].values.ravel() > 0.0)
@@ -234,7 +234,7 @@ def scored(
 
 def repeated(data: xr.DataTree, horizon: str, names: list[str] | None = None) -> Share:
     """Of the wrong runs that the guard was asked about, those that its trial repeats whole."""
-    group = data[horizon].to_dataset().isel(scene=0).sel(integrator=names or judged_rows(data, horizon))
+    group = data[horizon].to_dataset().isel(scene=0).sel(variant=names or judged_rows(data, horizon))
     wrong = (group["measured"].values > WRONG) & ~np.isnan(group["foretold"].values)
     return Share(int((wrong & (group["whole"].values > 0.0)).sum()), int(wrong.sum()))
 

@@ -222,7 +222,7 @@ def effort_sentence(data: xr.DataTree) -> str:
     """How much was run."""
     parts = [data[horizon] for horizon in verdicts.horizons(data)]
     made, evaluated = (sum(float(np.nansum(part[name].values)) for part in parts) for name in ("made", "evaluated"))
-    rows = len({str(name) for part in parts for name in part["integrator"].values})
+    rows = len({str(name) for part in parts for name in part["variant"].values})
     drawn = joined([span(data, horizon) for horizon in verdicts.horizons(data)])
     return f"{rows} rows made {made:,.0f} runs of {evaluated:.2g} force evaluations in all, on {drawn}."
 

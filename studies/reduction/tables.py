@@ -64,7 +64,7 @@ def chart_table(
     taken = np.array([(timing.best, timing.spread) for timing in timings(runs, batches, BATCH)])
     tables = []
     for chart, (seconds, spread) in zip(charts, taken.reshape(len(charts), -1, 2).swapaxes(1, 2), strict=True):
-        errors = error_table(scene, method.row(chart), settings, horizon, observe="axis")[columns].astype(float)
+        errors = error_table(scene, method.variant(chart), settings, horizon, observe="axis")[columns].astype(float)
         tables.append(errors.assign({Column.SECONDS: ("setting", seconds), Column.SPREAD: ("setting", spread)}))
     return xr.concat(tables, "chart").assign_coords(chart=list(charts)).reindex(chart=list(CHARTS))
 

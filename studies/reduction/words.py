@@ -35,7 +35,7 @@ HOW_TO_READ = (
 )
 
 PHI, PSI = "\N{GREEK SMALL LETTER PHI}", "\N{GREEK SMALL LETTER PSI}"  # of titles
-CHARTS = ["scene", "integrator", "chart", "against", "time (ratio)", "axis error (ratio)"]
+CHARTS = ["scene", "variant", "chart", "against", "time (ratio)", "axis error (ratio)"]
 COSTS = [
     "scene", "rule", "step (s)", "ns a step", "ns a step, unreduced", "ratio", "iterations a step",
     "iterations a step, unreduced", "ratio of the iterations", "ratio of the time of an iteration",
@@ -50,9 +50,9 @@ def cells(data: xr.Dataset, variable: str) -> list[tuple[str, str, xr.Dataset]]:
     if variable not in data:
         return []
     every = [
-        (str(scene), str(method), data.sel(scene=scene, integrator=method))
+        (str(scene), str(method), data.sel(scene=scene, variant=method))
         for scene in data["scene"].values
-        for method in data["integrator"].values
+        for method in data["variant"].values
     ]
     return [(scene, method, cell) for scene, method, cell in every if np.isfinite(cell[variable]).any()]
 

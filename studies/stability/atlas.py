@@ -136,13 +136,13 @@ def maps(data: xr.Dataset, scene: str) -> dict[str, OutcomeMap]:
     if scene not in data["scene"].values or Column.OUTCOME not in data:
         return {}
     part = data[[Column.OUTCOME, Column.PARAMETER, Column.SETTING, Column.CONTROL]].sel(scene=scene)
-    read = {str(name): map_of(part.sel(integrator=name)) for name in data["integrator"].values}
+    read = {str(name): map_of(part.sel(variant=name)) for name in data["variant"].values}
     return {name: one for name, one in read.items() if one is not None}
 
 
 def methods_of(data: xr.Dataset) -> dict[str, Integrator]:
     """The integrators of a dataset that are registered, by the names of their rows."""
-    names = map(str, data["integrator"].values)
+    names = map(str, data["variant"].values)
     return {name: integrator(name) for name in names if split_name(name)[0] in integrators()}
 
 

@@ -153,7 +153,7 @@ def _limits(axis: Any, cell: xr.Dataset, one: OutcomeMap, over: str) -> list[str
     """The lines that belong on a map; returns the names of those that were drawn."""
     if over == "gap":  # the fall at 1.1 gap past the pole takes one step
         at = 1.1 * one.parameter / FALL_SPEED / FALL_PERIOD, one.parameter
-        angles = split_name(str(cell["integrator"].values))[1] == "angles"  # other charts have no pole
+        angles = split_name(str(cell["variant"].values))[1] == "angles"  # other charts have no pole
         return _line(axis, *at, "passage") if angles and one.control == "step_size" else []
     if Column.LINEAR_LIMIT not in cell:
         return []
@@ -203,7 +203,7 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
         if one.control != "none":
             axis.set_xticks(*_ticks(inner, 3))
             axis.set_yticks(*_ticks(upwards, 3))
-        drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, integrator=name), one, over))
+        drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, variant=name), one, over))
         bold = name in alike or (name in judged and f"{one.shares[0]:.0%}" in ends)
         weight = "bold" if bold else "normal"
         axis.set_title(titles[name], fontsize=LEAST_TEXT, pad=2.0, linespacing=1.0, weight=weight)
@@ -258,7 +258,7 @@ def enlarged(data: xr.Dataset, family: str, name: str, message: str) -> Any:
         drawn |= dict.fromkeys(VERDICTS[index] for index in np.unique(sampled(one.outcome, *RASTER["enlarged"])))
         draw_map(axis, one)
         drawn |= {} if one.made.all() else {SETTLED[one.control]: None}
-        drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, integrator=name), one, over))
+        drawn |= dict.fromkeys(_limits(axis, data.sel(scene=scene, variant=name), one, over))
         axis.set(xlabel=CONTROLS[one.control], ylabel=AXES[over])
         axis.set_title(f"scene {scene}, {'its spin changed' if over == 'spin' else 'a fall past a pole'}")
     headline(figure, message)

@@ -202,7 +202,7 @@ def _limit(data: xr.Dataset, family: str, name: str) -> str:
     """The least step, in nutation periods, beyond which small nutations grow at some spin; empty if not known."""
     if Column.LINEAR_LIMIT not in data:
         return ""
-    cell = data.sel(scene=family, integrator=name)
+    cell = data.sel(scene=family, variant=name)
     limits, thirds = cell[Column.LINEAR_LIMIT].values, cell[Column.THIRD_TURN].values
     if np.isfinite(limits).any():
         return f"{np.nanmin(limits):.2g}"

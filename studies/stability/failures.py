@@ -22,8 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.outcomes import OUTCOMES
-from symtop.methods.framework.plan import Array, Plan
+from symtop.methods.framework.plan import OUTCOMES, Array, Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form

@@ -12,7 +12,7 @@ import xarray as xr
 from matplotlib.ticker import NullLocator
 
 from symtop.methods.framework.registry import split_name
-from symtop.methods.splitting.splitting_space import cayley_sleeps_from, strang_sleeps_from
+from symtop.methods.splitting.space import cayley_sleeps_from, strang_sleeps_from
 from symtop.report.figures import name_ends
 from symtop.report.style import BLUE, GREEN, GREY, LEAST_TEXT, VERMILLION, headline, line, panels
 from symtop.runner.study import Picture
@@ -57,8 +57,8 @@ def _picture(data: xr.Dataset, scene: str, name: str, draw: Callable[[Any, xr.Da
 
 def _each(data: xr.Dataset, variable: str, names: Sequence[str] = SHOWN) -> list[tuple[str, xr.Dataset]]:
     """The rows of those names that have a value of a variable, with their cells."""
-    known = [name for name in names if name in data["integrator"].values]
-    cells = [(name, data.sel(integrator=name)) for name in known]
+    known = [name for name in names if name in data["variant"].values]
+    cells = [(name, data.sel(variant=name)) for name in known]
     return [(name, cell) for name, cell in cells if np.isfinite(cell[variable].values).any()]
 
 
@@ -91,7 +91,7 @@ def _pole(axis: Any, data: xr.Dataset) -> None:
 def _resonance(axis: Any, data: xr.Dataset) -> None:
     """Rows whose step can turn the nutation by a third; those that lose a small displacement there have a ring."""
     ends, ringed = {}, resonant(data)
-    tried = [str(row) for row in data["integrator"].values[np.isfinite(data[Column.THIRD_TURN_PHASE].values)]]
+    tried = [str(row) for row in data["variant"].values[np.isfinite(data[Column.THIRD_TURN_PHASE].values)]]
     for name, cell in _each(data, Column.SURVIVING, tried):
         # the resonance lies between two points of the grid
         x = np.append(cell[Column.PHASE].values, float(cell[Column.THIRD_TURN_PHASE]))
@@ -136,7 +136,7 @@ def _side(others: Sequence[float]) -> str:
 
 
 def _sleep(axis: Any, data: xr.Dataset) -> None:
-    rows = [str(name) for name in data["integrator"].values if split_name(str(name))[0] in messages.SLEEPERS]
+    rows = [str(name) for name in data["variant"].values if split_name(str(name))[0] in messages.SLEEPERS]
     for name, cell in _each(data, Column.SLEEPING_THRESHOLD, rows):
         x, y = cell[Column.SLEEPING_STEP].values, cell[Column.SLEEPING_THRESHOLD].values
         axis.plot(x, y, **(line(name, 1.4) | {"ls": "none"}), label=name)
@@ -151,8 +151,8 @@ def _sleep(axis: Any, data: xr.Dataset) -> None:
 
 
 def _separatrix(axis: Any, data: xr.Dataset) -> None:
-    for name in map(str, data["integrator"].values):
-        x, y = (data[key].sel(integrator=name).values for key in (Column.EARLY_ERROR, Column.HORIZON))
+    for name in map(str, data["variant"].values):
+        x, y = (data[key].sel(variant=name).values for key in (Column.EARLY_ERROR, Column.HORIZON))
         marks = line(name)
         named = name in PLACED and np.isfinite(y).any()
         other = {"color": GREY, "alpha": 0.5, "ms": 2.0, "zorder": 2}
@@ -164,7 +164,7 @@ def _separatrix(axis: Any, data: xr.Dataset) -> None:
     axis.set(xscale="log", xlabel=rf"axis error $e$ at the time ${SEEN:g}/\lambda$ (rad), $\lambda = \sqrt{{mgl/I_1}}$")
     axis.set(ylabel=f"time to an error of {LOST:g} rad ($1/\\lambda$)")
     if apart := outlasting(data):
-        late = data[Column.HORIZON].sel(integrator=apart)
+        late = data[Column.HORIZON].sel(variant=apart)
         listed = textwrap.fill(", ".join(apart), 40)
         axis.annotate(f"longer than predicted:\n{listed}", (0.98, float(late.max())), (0, -14), va="top", ha="right",
                       xycoords=axis.get_yaxis_transform(), textcoords="offset points", **NOTE)  # fmt: skip
@@ -173,8 +173,8 @@ def _separatrix(axis: Any, data: xr.Dataset) -> None:
 
 def _sampling(axis: Any, data: xr.Dataset) -> None:
     worst, hidden = messages.worst_sampled(data), messages.hidden_sampled(data)
-    for name in map(str, data["integrator"].values):
-        once, every = (float(data[key].sel(integrator=name)) for key in (Column.ENERGY_ONCE, Column.ENERGY_EVERY))
+    for name in map(str, data["variant"].values):
+        once, every = (float(data[key].sel(variant=name)) for key in (Column.ENERGY_ONCE, Column.ENERGY_EVERY))
         marks = line(name)
         if not np.isfinite(once + every):
             continue
@@ -200,7 +200,7 @@ def _sampling(axis: Any, data: xr.Dataset) -> None:
 def _solver(axis: Any, data: xr.Dataset) -> None:
     """The midpoint rule, solved by the textbook's iteration and by this package's kernel."""
     energy = data[Column.TEXTBOOK_ENERGY]
-    cell = data.isel(integrator=int(np.argmax(energy.notnull().any("tolerance_setting").values)))
+    cell = data.isel(variant=int(np.argmax(energy.notnull().any("tolerance_setting").values)))
     x = cell[Column.SOLVER_TOLERANCE].values
     x = np.where(np.isfinite(x), x, 10.0 * np.nanmax(np.where(np.isfinite(x), x, np.nan)))
     ends = {}
@@ -213,7 +213,7 @@ def _solver(axis: Any, data: xr.Dataset) -> None:
         axis.plot(x, y, marker=marker, color=color, ls=dash)
         last = int(np.argmax(x))
         ends[label] = float(x[last]), float(y[last]), color
-    axis.set(xscale="log", yscale="log", xlabel=f"solver tolerance of {cell['integrator'].values}, step fixed")
+    axis.set(xscale="log", yscale="log", xlabel=f"solver tolerance of {cell['variant'].values}, step fixed")
     axis.set_ylabel("largest absolute change")
     loose = x[np.isclose(cell[Column.TEXTBOOK_ENERGY].values, float(cell[Column.ONE_ITERATION_ENERGY]), rtol=1e-3)]
     if loose.size:

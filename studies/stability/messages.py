@@ -30,7 +30,7 @@ def at_pole(part: xr.Dataset) -> dict[str, tuple[Array, Array]]:
     """Gaps, growing, and errors of every row of fixed step that is judged next to a pole and away from it."""
     rows = {}
     for name, method in methods_of(part).items():
-        cell = part.sel(integrator=name)
+        cell = part.sel(variant=name)
         gaps, errors = cell[Column.PARAMETER].values, cell[Column.GRAZING_ERROR].values
         there = np.isfinite(gaps)
         near, far = errors[gaps <= NEAR], errors[gaps >= FAR]
@@ -73,8 +73,8 @@ def _resonances(part: xr.Dataset) -> str:
 
 def _sleeping(part: xr.Dataset) -> str:
     measured = part[Column.SLEEPING_THRESHOLD]
-    rows = [str(name) for name in part["integrator"].values if split_name(str(name))[0] in SLEEPERS]
-    curves = {name: measured.sel(integrator=name).dropna("rung").values for name in rows}
+    rows = [str(name) for name in part["variant"].values if split_name(str(name))[0] in SLEEPERS]
+    curves = {name: measured.sel(variant=name).dropna("rung").values for name in rows}
     ends = {name: float(curve[np.argmax(np.abs(curve - 2.0))]) for name, curve in curves.items() if curve.size}
     far = sorted((name for name in ends if abs(ends[name] - 2.0) > SHIFTED), key=lambda name: -ends[name])
     listed = ", ".join(f"{ends[name]:.2f} with {name}" for name in far)
@@ -98,7 +98,7 @@ def _separatrix(part: xr.Dataset) -> str:
 def _sampled(part: xr.Dataset) -> dict[str, tuple[float, float]]:
     """Energy errors above rounding, sampled once a nutation and at every step, by row."""
     once, every = part[Column.ENERGY_ONCE].values, part[Column.ENERGY_EVERY].values
-    rows = zip(map(str, part["integrator"].values), once, every, strict=True)
+    rows = zip(map(str, part["variant"].values), once, every, strict=True)
     return {name: (float(a), float(b)) for name, a, b in rows if np.isfinite(a) and b > LEAST_ASKED}
 
 

@@ -32,8 +32,7 @@ from numpy.typing import NDArray
 from symtop.measure.many_verdicts import Judged, judge_runs, truths
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.outcomes import OUTCOMES
-from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model import charts, scenes
 from symtop.model.charts import Array

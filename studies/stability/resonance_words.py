@@ -26,9 +26,9 @@ REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dea
 def rows_with(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
     """The integrators that have a value of a variable, by name."""
     return {
-        str(name): part.isel(integrator=k)
-        for k, name in enumerate(part["integrator"].values)
-        if np.isfinite(part[variable].isel(integrator=k).values).any()
+        str(name): part.isel(variant=k)
+        for k, name in enumerate(part["variant"].values)
+        if np.isfinite(part[variable].isel(variant=k).values).any()
     }
 
 

@@ -7,7 +7,7 @@ import xarray as xr
 
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.registry import Integrator, integrator
-from symtop.runner.grid import grid_rows, grid_scenes
+from symtop.runner.grid import grid_scenes, grid_variants
 from symtop.runner.study import Case, Study
 
 from . import figures, words
@@ -86,11 +86,11 @@ def cases(quick: bool) -> list[Case]:
     grid, left = [], {name for names in NOT_SLEEPING.values() for name in names}
     for name in grid_scenes(LEFT_OUT):
         coarser = 1 if quick or name == FAMILY else 3
-        for method in grid_rows("axis"):
+        for method in grid_variants("axis"):
             ladder, parameters = axes(method, steps[::coarser], spins[::coarser], quick)
             settings = {"parameters": parameters, "ladder": ladder, "periods": PERIODS, "limits": limits}
             grid.append(Case(name, method.name, settings))
-    for method in grid_rows("axis"):
+    for method in grid_variants("axis"):
         ladder, parameters = axes(method, passes, gaps, quick)
         settings = {"parameters": parameters, "ladder": ladder, "periods": 1.0}
         grid.append(Case("grazing", method.name, settings | {"shown": 0.005 if method.fixed_step else 1e-6}))

@@ -69,7 +69,7 @@ def halved_at_pole(part: xr.Dataset) -> dict[bool, list[bool]]:
     """Of every row of fixed step, whether a pole halves its accurate step; by: does it work in angles?"""
     halved: dict[bool, list[bool]] = {True: [], False: []}
     for name, method in methods_of(part).items():
-        effect = pole_effect(map_of(part.sel(integrator=name)))
+        effect = pole_effect(map_of(part.sel(variant=name)))
         if effect is not None and method.control == "step_size":
             halved[method.charts() == ("angles",)].append(effect.halves)
     return halved
@@ -106,8 +106,8 @@ def sleepers(part: xr.Dataset) -> str:
 
 def outlasting(part: xr.Dataset) -> list[str]:
     """The rows with a run that stays accurate next to the separatrix longer than foreseen, by more than `OUTLASTS`."""
-    longer = (part[Column.HORIZON] - part[Column.PREDICTED_HORIZON]).transpose("integrator", ...).values
-    rows = zip(map(str, part["integrator"].values), longer, strict=True)
+    longer = (part[Column.HORIZON] - part[Column.PREDICTED_HORIZON]).transpose("variant", ...).values
+    rows = zip(map(str, part["variant"].values), longer, strict=True)
     return [name for name, values in rows if np.max(values[np.isfinite(values)], initial=0.0) > OUTLASTS]
 
 
@@ -117,9 +117,9 @@ def lawful(part: xr.Dataset) -> xr.DataArray:
     methods, apart = methods_of(part), outlasting(part)
     conserving = [
         name in apart or (name in methods and "energy" in (methods[name].conserves or ()))
-        for name in map(str, part["integrator"].values)
+        for name in map(str, part["variant"].values)
     ]
-    return (early < EARLY[1]) & (early > EARLY[0]) & ~xr.DataArray(conserving, dims="integrator")
+    return (early < EARLY[1]) & (early > EARLY[0]) & ~xr.DataArray(conserving, dims="variant")
 
 
 def misses(part: xr.Dataset) -> NDArray[np.float64]:
@@ -143,8 +143,8 @@ def horizons(part: xr.Dataset) -> str:
 def unreached(part: xr.Dataset) -> dict[str, int]:
     """How many runs of a row the law applies to that never reach the error of which it speaks."""
     without = lawful(part) & part[Column.HORIZON].isnull()
-    count = without.sum([dim for dim in without.dims if dim != "integrator"]).values
-    return {str(name): int(k) for name, k in zip(part["integrator"].values, count, strict=True) if k}
+    count = without.sum([dim for dim in without.dims if dim != "variant"]).values
+    return {str(name): int(k) for name, k in zip(part["variant"].values, count, strict=True) if k}
 
 
 def _unreached(part: xr.Dataset) -> str:
@@ -179,7 +179,7 @@ def sampling(part: xr.Dataset) -> str:
     good = np.isfinite(once) & (every > LEAST_ASKED)
     if not good.any():
         return ""
-    names, seen = part["integrator"].values, good & (once > LEAST_SAMPLED)
+    names, seen = part["variant"].values, good & (once > LEAST_SAMPLED)
     ratio = np.where(seen, every / np.where(seen, once, 1.0), 0.0)
     below, small, whole = good & ~seen, ratio > HIDDEN, seen & (ratio <= HIDDEN)
     parts = [f"{below.sum()} below rounding"] if below.any() else []
@@ -196,8 +196,8 @@ def sampling(part: xr.Dataset) -> str:
         )
     if tiny := int((np.isfinite(once) & ~good).sum()):
         text += f" {counted(tiny)} with errors up to {LEAST_ASKED:g} are not asked."
-    if VERLET in part["integrator"].values:
-        verlet = part.sel(integrator=VERLET)
+    if VERLET in part["variant"].values:
+        verlet = part.sel(variant=VERLET)
         true, shown = float(verlet[Column.ENERGY_EVERY]), float(verlet[Column.ENERGY_ONCE])
         text += f" With {VERLET} it is {true:.2g} and looks like {shown:.1g} ({absolute()})."
     return text
@@ -268,8 +268,8 @@ def tables(data: xr.Dataset) -> list[Table]:
     rows, limit = [], LIMITS[0]
     part = data.sel(scene=limit[0]) if limit in columns else None
     free = {} if part is None else unlimited(part) | dict.fromkeys(only_windows(part), SOUGHT_PHASE)
-    for name in map(str, data["integrator"].values):
-        last = [float(np.ravel(data[key].sel(scene=scene, integrator=name).values)[-1]) for scene, key, *_ in columns]
+    for name in map(str, data["variant"].values):
+        last = [float(np.ravel(data[key].sel(scene=scene, variant=name).values)[-1]) for scene, key, *_ in columns]
         if np.isfinite(last).any():
             texts = [one[3].format(x) if math.isfinite(x) else "" for one, x in zip(columns, last, strict=True)]
             if name in free:

@@ -21,8 +21,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     labels = ("time after the start (s)", "error of the axis (rad)")
     figure, axes = style.grid(data.sizes["scene"], 2, labels, height=2.0, sharex=True, sharey=True)
     for axis, scene in zip(axes, data["scene"].values, strict=True):
-        for source in map(str, data["integrator"].values):
-            cell = data.sel(scene=scene, integrator=source).dropna("horizon", subset=[ERROR])
+        for source in map(str, data["variant"].values):
+            cell = data.sel(scene=scene, variant=source).dropna("horizon", subset=[ERROR])
             color, marker = LOOKS[source]
             error = np.maximum(cell[ERROR].values, NEAREST)
             axis.plot(cell["horizon"], error, marker=marker, color=color, ls=DASHES[source],
@@ -34,7 +34,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     style.legend_below(figure, axes)
     figure.legends[0].set_title(words.measured_against(data))
     _, broken, ratio = bound_ratios(data)
-    flat = float(data[ERROR].sel(integrator="closed form").max())
+    flat = float(data[ERROR].sel(variant="closed form").max())
     style.headline(figure, words.message(data))
     caption = (
         "Error of each source, measured against the closed form in 45 digits, at horizons from "

@@ -28,9 +28,9 @@ def bounds(data: xr.Dataset) -> str:
 
 def message(data: xr.Dataset) -> str:
     """What the closed form keeps and an integration loses, each at its own longest time, as a title."""
-    said = f"The closed form in double is right to {number(float(data[ERROR].sel(integrator='closed form').max()))} rad"
-    names = [name for name in ("double, axis", "double, attitude") if name in data["integrator"].values]
-    integrated = data[ERROR].sel(integrator=names).stack(run=("scene", "integrator", "horizon")).dropna("run")
+    said = f"The closed form in double is right to {number(float(data[ERROR].sel(variant='closed form').max()))} rad"
+    names = [name for name in ("double, axis", "double, attitude") if name in data["variant"].values]
+    integrated = data[ERROR].sel(variant=names).stack(run=("scene", "variant", "horizon")).dropna("run")
     if not integrated.size:
         return f"{said} at every time"
     worst = integrated[int(np.argmax(integrated.values))]
@@ -43,10 +43,10 @@ def message(data: xr.Dataset) -> str:
 def measured_against(data: xr.Dataset) -> str:
     """What the errors are measured against, and how closely what was not made from it agrees."""
     text = f"Error: the distance from the closed form in {DIGITS} digits"
-    quad = [name for name in map(str, data["integrator"].values) if name.startswith("quadruple")]
-    if not quad or not np.isfinite(data[ERROR].sel(integrator=quad)).any():
+    quad = [name for name in map(str, data["variant"].values) if name.startswith("quadruple")]
+    if not quad or not np.isfinite(data[ERROR].sel(variant=quad)).any():
         return f"{text}."
-    agreed = number(float(data[ERROR].sel(integrator=quad).max()))
+    agreed = number(float(data[ERROR].sel(variant=quad).max()))
     return f"{text}; integration in quadruple precision, which knows nothing of it,\nagrees with it to {agreed} rad."
 
 
@@ -70,11 +70,11 @@ def published(values: list[Published]) -> list[str]:
 
 def closed_form(data: xr.Dataset) -> list[str]:
     """The error of the closed form on the first scene and why it is known; nothing without that scene and heyoka."""
-    if "spheroid" not in data["scene"].values or "quadruple, attitude" not in data["integrator"].values:
+    if "spheroid" not in data["scene"].values or "quadruple, attitude" not in data["variant"].values:
         return []
     errors = data[ERROR].sel(scene="spheroid")
-    last = errors.sel(integrator="closed form").dropna("horizon")[-1]
-    quadruple = float(errors.sel(integrator="quadruple, attitude").max())
+    last = errors.sel(variant="closed form").dropna("horizon")[-1]
+    quadruple = float(errors.sel(variant="quadruple, attitude").max())
     sentence = (
         f"On spheroid the closed form in double has an axis error of {float(last):.1e} rad at t = "
         f"{float(last['horizon']):g}, measured with the same formula in 45 digits, whose rounding cannot reach the "
@@ -96,8 +96,8 @@ def tables(data: xr.Dataset) -> list[Table]:
     ]  # fmt: skip
     header = ["source", "quantity", "published", "ours", "difference", "to the last digit", "kind", "tests", "remark"]
     costs = []
-    for scene, source in product(data["scene"].values, data["integrator"].values):
-        cell = data.sel(scene=scene, integrator=source).dropna("horizon", subset=[ERROR])
+    for scene, source in product(data["scene"].values, data["variant"].values):
+        cell = data.sel(scene=scene, variant=source).dropna("horizon", subset=[ERROR])
         if cell.sizes["horizon"]:
             last = cell.isel(horizon=-1)
             bound = f"{last[BOUND]:.1e}" if np.isfinite(last[BOUND]) else "none claimed"

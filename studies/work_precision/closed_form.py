@@ -29,10 +29,10 @@ class Beside(NamedTuple):
 
 def compared(data: xr.Dataset) -> list[Beside]:
     """Every problem that a compiled row solved and the closed form was timed on."""
-    names = [str(name) for name in data["integrator"].values if name not in ranking.ranked(data)]
+    names = [str(name) for name in data["variant"].values if name not in ranking.ranked(data)]
     if not names:
         return []
-    taken = data["seconds"].sel(integrator=names)
+    taken = data["seconds"].sel(variant=names)
     taken = taken.min([dim for dim in taken.dims if dim not in ("scene", "horizon")])
     pairs = []
     for (scene, far, target), won in ranking.winners(data).items():

@@ -60,15 +60,15 @@ def conserving(name: str) -> bool:
 def _all_in_chart(data: xr.Dataset, chart: str) -> tuple[list[str], list[str]]:
     """The classical compiled rows of a chart, and all that are symplectic or symmetric."""
     names = [str(name) for name in ranking.ranked(data)]
-    over = [dim for dim in data["structured"].dims if dim != "integrator"]
+    over = [dim for dim in data["structured"].dims if dim != "variant"]
     structured = data["structured"].max(over)
     kept = [
         name
         for name in names
-        if chart in data["chart"].sel(integrator=name) and "compiled" in data["implementation"].sel(integrator=name)
+        if chart in data["chart"].sel(variant=name) and "compiled" in data["implementation"].sel(variant=name)
     ]
     classic = [name for name in kept if split_name(name)[0] in CLASSIC]
-    return classic, [name for name in kept if name not in classic and float(structured.sel(integrator=name)) == 1.0]
+    return classic, [name for name in kept if name not in classic and float(structured.sel(variant=name)) == 1.0]
 
 
 def timed(data: xr.Dataset) -> list[str]:
@@ -84,7 +84,7 @@ def crossing(cell: xr.Dataset, first: str, second: str) -> Crossing | None:
     """
     curves = []
     for name in (first, second):
-        runs = cell.sel(integrator=name)
+        runs = cell.sel(variant=name)
         x, y = runs["seconds"].values, runs["energy"].values
         good = np.isfinite(x) & np.isfinite(y) & (runs["outcome"].values == "ok")
         order = np.argsort(x[good])
@@ -250,8 +250,8 @@ def at_equal_steps(data: xr.Dataset, names: Sequence[str], scene: str) -> str:
     """Energy errors of rows of one chart over the long horizon at the same steps; empty if they were not run there."""
     last = data.sel(scene=scene).isel(horizon=-1)
     periods = float(data["horizon"].values[-1])
-    known = [name for name in names if name in last["integrator"].values]
-    ends = {name: at_steps(last.sel(integrator=name), STEPS * periods) for name in known}
+    known = [name for name in names if name in last["variant"].values]
+    ends = {name: at_steps(last.sel(variant=name), STEPS * periods) for name in known}
     listed = [f"{error:.1e} with {name} ({work:.2g})" for name, (error, work) in ends.items() if np.isfinite(error)]
     if len(listed) < 2:
         return ""

@@ -43,7 +43,7 @@ def draw(data: xr.Dataset, chart: str) -> Picture:
     failed = [
         f"{name} on {bad} of {data.sizes['scene']} scenes"
         for name in classic
-        if (bad := int((~(last["outcome"].sel(integrator=name) == "ok").any("setting")).sum()))
+        if (bad := int((~(last["outcome"].sel(variant=name) == "ok").any("setting")).sum()))
     ]
     lost = f"No run ended well of {' and '.join(failed)}. " if failed else ""
     return Picture(
@@ -74,7 +74,7 @@ def _curves(axis: Any, cell: xr.Dataset, classic: list[str], structured: list[st
     )
     level, ends = error_band(axis, cell["energy_bound"].values), {}
     for name in [*structured, *classic]:
-        runs = cell.sel(integrator=name)
+        runs = cell.sel(variant=name)
         x, y = runs["seconds"].values, np.maximum(runs["energy"].values, 0.5 * level)
         good = np.isfinite(x) & np.isfinite(y)
         if name in structured:

@@ -42,7 +42,7 @@ def _parts(data: xr.Dataset) -> Picture:
         for k, part in enumerate(PARTS):
             marker, fill, color = MARKS[part]
             height = place + 0.22 * (k - 1)
-            ratios = energy.ratios_at_equal_settings(scene.sel(integrator=row), part)
+            ratios = energy.ratios_at_equal_settings(scene.sel(variant=row), part)
             label = PARTS[part].partition(" (")[0]
             if not ratios:
                 box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
@@ -62,7 +62,7 @@ def _parts(data: xr.Dataset) -> Picture:
     axis.grid(visible=False, axis="y")
     axis.tick_params(axis="y", length=0)
     legend_below(figure, axes)
-    growths = {part: [energy.growth_at_equal_settings(scene.sel(integrator=row), part) for row in rows]
+    growths = {part: [energy.growth_at_equal_settings(scene.sel(variant=row), part) for row in rows]
                for part in ("shape", "nutation_lag")}  # fmt: skip
     known = [[value for value in values if np.isfinite(value)] for values in growths.values()]
     if all(known):

@@ -48,14 +48,14 @@ def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     cells = {scene: data.sel(scene=scene).isel(horizon=far) for scene in scenes}
     compiled = [row for row in words.of_implementation(data, "compiled") if row in ranking.ranked(data)]
     floors = {scene: 0.5 * bound_of(cell["axis_bound"].values, LEAST) for scene, cell in cells.items()}
-    fronts = {scene: front(cell.sel(integrator=compiled), cost, floors[scene]) for scene, cell in cells.items()}
+    fronts = {scene: front(cell.sel(variant=compiled), cost, floors[scene]) for scene, cell in cells.items()}
     owners = Counter(owner for one in fronts.values() for owner in one.owners)
     most = [row for row, _ in owners.most_common(2)]
     figure, axes = grid(len(scenes), COLUMNS, (BELOW_AXIS[cost], ""), height=1.75, sharex=True, sharey=True)
     for axis, (scene, cell) in zip(axes, cells.items(), strict=True):
         error_band(axis, cell["axis_bound"].values, LEAST)
         for row in compiled:
-            axis.plot(*curve(cell.sel(integrator=row), "axis", cost, floors[scene]), **OTHERS)
+            axis.plot(*curve(cell.sel(variant=row), "axis", cost, floors[scene]), **OTHERS)
         if cost == "seconds":
             _closed_form(axis, cell)
         _front(axis, fronts[scene], most)
@@ -132,7 +132,7 @@ def front(cell: xr.Dataset, cost: str, floor: float) -> Front:
     x, y = cell[cost].values, np.maximum(cell["axis"].values, floor)
     on = pareto(x, y)
     order = np.argsort(x[on])
-    x, y, owners = (part[on][order] for part in (x, y, np.broadcast_to(cell["integrator"].values[:, None], x.shape)))
+    x, y, owners = (part[on][order] for part in (x, y, np.broadcast_to(cell["variant"].values[:, None], x.shape)))
     return Front(x, y, [str(owner) for owner in owners])
 
 
@@ -150,7 +150,7 @@ def _front(axis: Any, one: Front, most: Sequence[str]) -> None:
 
 def _closed_form(axis: Any, cell: xr.Dataset) -> None:
     """The time of what takes no steps, as a dotted line."""
-    for row in (name for name in map(str, cell["integrator"].values) if name not in ranking.ranked(cell)):
-        at = float(cell["seconds"].sel(integrator=row).min())
+    for row in (name for name in map(str, cell["variant"].values) if name not in ranking.ranked(cell)):
+        at = float(cell["seconds"].sel(variant=row).min())
         if np.isfinite(at):
             axis.axvline(at, color=look(row).color, ls=":", lw=1.0, zorder=1, label=CLOSED)

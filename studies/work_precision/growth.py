@@ -14,7 +14,7 @@ ROWS = ("midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]", "
 
 def rows_of(data: xr.Dataset) -> list[str]:
     """Those of the rows that a dataset has."""
-    return [row for row in ROWS if row in data["integrator"].values]
+    return [row for row in ROWS if row in data["variant"].values]
 
 
 def table(data: xr.Dataset) -> Table:
@@ -22,7 +22,7 @@ def table(data: xr.Dataset) -> Table:
     scene, spans = data[[*PARTS, "setting_value"]].isel(scene=0), data["horizon"].values
     lines = []
     for row in rows_of(data):
-        grown = [energy.growth_at_equal_settings(scene.sel(integrator=row), part) for part in PARTS]
+        grown = [energy.growth_at_equal_settings(scene.sel(variant=row), part) for part in PARTS]
         lines.append([row, *(f"{value:.3g}" if np.isfinite(value) else "not judged" for value in grown)])
     title = (
         f"Growth of the parts of the axis error on {scene['scene'].item()} from {spans[0]:g} to {spans[-1]:g} nutation "

@@ -28,14 +28,14 @@ def opening(data: xr.Dataset) -> Opening:
     names = [name for name in ranking.ranked(data) if name in compiled]
     ahead: Counter[str] = Counter()
     for far, span in enumerate(spans(data)):
-        table = ranking.relative_costs(data.isel(horizon=[far]), names).sel(integrator=names)
+        table = ranking.relative_costs(data.isel(horizon=[far]), names).sel(variant=names)
         for target in table["target"].values:
             ratios = table.sel(target=[target]).dropna("problem", how="all")
             best = ranking.leaders(ratios, 3) if ratios.sizes["problem"] else []
             ahead.update(best[:1])
             row = [span, f"{target:.0e}", "none", "", "", ""]
             if best:
-                first = ratios.sel(integrator=best[0]).values.ravel()
+                first = ratios.sel(variant=best[0]).values.ravel()
                 met = first[np.isfinite(first)]
                 time = f"{np.median(met):.2g} (worst {met.max():.2g})"
                 row[2:] = [best[0], f"{met.size} of {first.size} scenes", time, ", ".join(best[1:])]
@@ -66,14 +66,14 @@ SHOWN = ("seconds", "force_evaluations", "axis", "step_size", "tolerance", "outc
 
 def charts(data: xr.Dataset) -> list[Chart]:
     """Axis error of every timed run against seconds, and of every run against work: one panel a scene and horizon."""
-    runs = data[list(SHOWN)].transpose("scene", "horizon", "integrator", "setting", ...)
+    runs = data[list(SHOWN)].transpose("scene", "horizon", "variant", "setting", ...)
     table = {name: runs[name].values for name in SHOWN}  # selecting a cell of a Dataset takes 10 ms
     cells = {
         f"{scene}, {span}": {name: values[place, far] for name, values in table.items()}
         for place, scene in enumerate(runs["scene"].values)
         for far, span in enumerate(spans(data))
     }
-    names = [str(name) for name in runs["integrator"].values]
+    names = [str(name) for name in runs["variant"].values]
     kinds = {"seconds": "Every timed run", "force_evaluations": "Every run, by its work"}
     return [
         Chart(

@@ -100,10 +100,10 @@ class Middle(NamedTuple):
 
 def middles(merged: xr.DataArray) -> tuple[int, list[Middle]]:
     """How many targets some row meets, and every row's share of them and median slowdown, in the order of `merged`."""
-    table = merged.transpose("integrator", ...).values.reshape(merged.sizes["integrator"], -1)
+    table = merged.transpose("variant", ...).values.reshape(merged.sizes["variant"], -1)
     table = table[:, np.isfinite(table).any(axis=0)]
     ratios = np.median(np.where(np.isfinite(table), table, np.inf), axis=1)
-    met, names = np.isfinite(table).sum(axis=1), map(str, merged["integrator"].values)
+    met, names = np.isfinite(table).sum(axis=1), map(str, merged["variant"].values)
     return table.shape[1], [Middle(name, int(n), float(r)) for name, n, r in zip(names, met, ratios, strict=True)]
 
 
@@ -112,9 +112,9 @@ def slowdown(data: xr.Dataset) -> Picture:
     compiled = words.of_implementation(data, "compiled")
     names = [name for name in ranking.ranked(data) if name in compiled]
     costs = [ranking.relative_costs(data.isel(horizon=[far]), names) for far in range(data.sizes["horizon"])]
-    merged = xr.concat(costs, "problem").sel(integrator=names)
+    merged = xr.concat(costs, "problem").sel(variant=names)
     order = ranking.leaders(merged, len(names))
-    asked, rows = middles(merged.sel(integrator=order))
+    asked, rows = middles(merged.sel(variant=order))
     shown = [row for row in rows if np.isfinite(row.ratio)]
     told = _told(rows)
     figure, axes = panels(1, 2, height=0.9 + 0.135 * len(shown), sharey=True)
@@ -140,7 +140,7 @@ def slowdown(data: xr.Dataset) -> Picture:
         axis.grid(visible=False, axis="y")
         axis.tick_params(axis="y", length=0)
     lengths = " or ".join(f"{span:g}" for span in data["horizon"].values)
-    left_out, slow = merged.isel(integrator=0).size - asked, len(names) - len(shown)
+    left_out, slow = merged.isel(variant=0).size - asked, len(names) - len(shown)
     figure.supxlabel(
         f"A target: an axis error of {number(TARGETS[0])} to {number(TARGETS[-1])} rad, on one of "
         f"{data.sizes['scene']} tops, over {lengths} nutations;\n{left_out} such targets, "
@@ -148,7 +148,7 @@ def slowdown(data: xr.Dataset) -> Picture:
         f"counts as infinite in its median; {slow} more methods, which meet at most half, have none.",
         fontsize=7.5, ha="left", x=0.01,
     )  # fmt: skip
-    headline(figure, slowdown_message(merged.sel(integrator=order)))
+    headline(figure, slowdown_message(merged.sel(variant=order)))
     return Picture(
         "slowdown",
         figure,

@@ -58,9 +58,9 @@ def timed_runs(data: xr.Dataset, compared: Collection[str] = ()) -> list[TimedRu
     `data` has dimensions integrator, horizon and setting.
     """
     runs = []
-    for name in map(str, data["integrator"].values):
+    for name in map(str, data["variant"].values):
         for far in range(data.sizes["horizon"]):
-            cell = data.sel(integrator=name).isel(horizon=far)
+            cell = data.sel(variant=name).isel(horizon=far)
             serves: dict[int, list[int]] = {}
             if name in compared and far == data.sizes["horizon"] - 1:
                 serves = {int(k): [] for k in np.flatnonzero(cell["outcome"].values == "ok")}
@@ -147,16 +147,16 @@ def timing_rounds(
     for run, seconds in foretold(cost, methods).items():
         forecast[row[run.name], run.far, run.place] = seconds
     beside = [_closed_form(scene, method, horizons[-1], further) for method in methods.values()]
-    dims = ("integrator", "horizon", "setting")
-    table = xr.Dataset({"seconds_samples": ((*dims, "batch"), samples)}, coords={"integrator": list(row)})
+    dims = ("variant", "horizon", "setting")
+    table = xr.Dataset({"seconds_samples": ((*dims, "batch"), samples)}, coords={"variant": list(row)})
     best = table["seconds_samples"].min("batch")
     return table.assign(
         seconds=best,
         spread=table["seconds_samples"].median("batch") / best - 1.0,
         seconds_forecast=(dims, forecast),
-        first_call=("integrator", [firsts[name] for name in row]),
-        set_up_seconds=("integrator", [before for before, _ in beside]),
-        sample_seconds=("integrator", [each for _, each in beside]),
+        first_call=("variant", [firsts[name] for name in row]),
+        set_up_seconds=("variant", [before for before, _ in beside]),
+        sample_seconds=("variant", [each for _, each in beside]),
     )
 
 

@@ -60,8 +60,8 @@ def seconds(value: float) -> str:
 
 def of_implementation(data: xr.Dataset, kind: str) -> list[str]:
     """The names of the compiled methods, or of those in plain Python."""
-    kinds = data["implementation"].transpose("integrator", ...).values.reshape(data.sizes["integrator"], -1)
-    return [str(name) for name, known in zip(data["integrator"].values, kinds, strict=True) if kind in known]
+    kinds = data["implementation"].transpose("variant", ...).values.reshape(data.sizes["variant"], -1)
+    return [str(name) for name, known in zip(data["variant"].values, kinds, strict=True) if kind in known]
 
 
 def lead(won: ranking.Win) -> str:
@@ -77,7 +77,7 @@ def lead(won: ranking.Win) -> str:
 def reasons(cell: xr.Dataset, target: float, names: Sequence[str] | None = None) -> str:
     """Why rows do not meet a target, the most frequent reason first; empty if all do."""
     rows = ranking.ranked(cell) if names is None else names
-    why = [str(value) for value in cell["reached"].sel(integrator=rows, target=target).values]
+    why = [str(value) for value in cell["reached"].sel(variant=rows, target=target).values]
     count = Counter(reason for reason in why if reason not in ("met", CAPPED, ""))
     return ", ".join(reason for reason, _ in count.most_common())
 
@@ -98,8 +98,8 @@ def beside(data: xr.Dataset) -> str:
     """What the rows without steps cost: they stand beside the ranking. Empty if there is none."""
     ranked = ranking.ranked(data)
     said = []
-    for name in (str(name) for name in data["integrator"].values if name not in ranked):
-        before, each = (data[key].sel(integrator=name).values for key in ("set_up_seconds", "sample_seconds"))
+    for name in (str(name) for name in data["variant"].values if name not in ranked):
+        before, each = (data[key].sel(variant=name).values for key in ("set_up_seconds", "sample_seconds"))
         if np.isfinite(before).any():
             said.append(
                 f"{name} is not ranked, because errors are measured by it. Whatever the run length, its constants take "
@@ -187,7 +187,7 @@ def tables(data: xr.Dataset) -> list[Table]:
         everything.append(
             Table(
                 f"Time of every row to the same errors {span}, {chart}; in brackets why an error is not reached",
-                ["scene", "integrator", *header],
+                ["scene", "variant", *header],
                 [[name, *row] for name, cell in here.items() for row in _every_time(cell)],
             )
         )
@@ -218,13 +218,13 @@ def _every_time(cell: xr.Dataset) -> list[list[str]]:
     rows, asked = ranking.ranked(cell), ranking.targets(cell)
     met = {target: {place.integrator: seconds(place.cost) for place in ranking.cheapest(cell, target)}
            for target in asked}  # fmt: skip
-    why = cell["reached"].sel(integrator=rows, target=list(TARGETS)).transpose("integrator", "target").values
+    why = cell["reached"].sel(variant=rows, target=list(TARGETS)).transpose("variant", "target").values
     shown = [
         [row, *(met.get(target, {}).get(row, f"({reason})") for target, reason in zip(TARGETS, reached, strict=True))]
         for row, reached in zip(rows, why, strict=True)
     ]
-    for row in (str(row) for row in cell["integrator"].values if row not in rows):
-        before, each = (float(cell[key].sel(integrator=row).min()) for key in ("set_up_seconds", "sample_seconds"))
+    for row in (str(row) for row in cell["variant"].values if row not in rows):
+        before, each = (float(cell[key].sel(variant=row).min()) for key in ("set_up_seconds", "sample_seconds"))
         if np.isfinite(before):
             text = f"set-up {seconds(before)}, each sample {seconds(each)}"
             shown.append([f"{row}, not ranked", text, *[""] * (len(TARGETS) - 1)])

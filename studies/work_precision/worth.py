@@ -17,7 +17,7 @@ from symtop.runner.study import Table
 
 from .timing_rounds import WITHIN
 
-HEADER = ["integrator", "fastest in", "tied with the fastest in", "met", "at its best", "median", "when to choose it"]
+HEADER = ["variant", "fastest in", "tied with the fastest in", "met", "at its best", "median", "when to choose it"]
 NEVER, NO_TARGET = "never", "never: it meets no target within its budget"
 
 
@@ -40,7 +40,7 @@ def choice(first: list[tuple[str, float]], ratios: np.ndarray) -> str:
 def table(data: xr.Dataset) -> Table:
     """Every compiled row: how often it wins, how far it is behind, and when to choose it."""
     kind = data["implementation"]
-    names = [row for row in ranking.ranked(data) if "compiled" in kind.sel(integrator=row).values]
+    names = [row for row in ranking.ranked(data) if "compiled" in kind.sel(variant=row).values]
     wins = {problem: won for problem, won in ranking.winners(data).items() if won is not None}
     costs, scenes = ranking.relative_costs(data, names), [str(scene) for scene in data["scene"].values]
 
@@ -50,7 +50,7 @@ def table(data: xr.Dataset) -> Table:
     rows = []
     for name in names:
         best = [problem for problem, won in wins.items() if won.best.integrator == name]
-        mine = costs.sel(integrator=name)
+        mine = costs.sel(variant=name)
         behind = {float(target): mine.sel(target=target).values for target in costs["target"].values}
         near = {problem for problem in wins if behind[problem[2]][place(*problem[:2])] <= WITHIN}
         level = [problem for problem, won in wins.items() if name in won.level and problem in near]

@@ -32,7 +32,7 @@ def cite(files: tuple[Path, ...]) -> None:
     symtop cite results/work_precision.nc run.nc
     """
     from symtop.core import netcdf
-    from symtop.methods.framework.citations import entries
+    from symtop.methods.framework.registry import bibliography
 
     keys: dict[str, None] = {}
     unknown: dict[str, None] = {}
@@ -42,7 +42,7 @@ def cite(files: tuple[Path, ...]) -> None:
             keys.update(dict.fromkeys(sources))
             if not sources:
                 unknown[name] = None
-    for text in [PACKAGE, *(entries()[key] for key in keys)]:
+    for text in [PACKAGE, *(bibliography()[key] for key in keys)]:
         click.echo(text + "\n")
     if unknown:
         click.echo(f"symtop: no source is known of {', '.join(unknown)}", err=True)
@@ -53,8 +53,8 @@ def _integrators(data: "xr.Dataset | xr.DataTree") -> Iterator[str]:
     from symtop.core import netcdf
 
     for group in netcdf.groups(data).values():
-        if "integrator" in group.variables:
-            yield from (str(name) for name in group["integrator"].values.ravel())
+        for name in {"variant", "integrator"} & group.variables.keys():  # files of version 0.2 have the latter
+            yield from map(str, group[name].values.ravel())
         if "integrator" in group.attrs:
             yield str(group.attrs["integrator"])
 
@@ -62,10 +62,9 @@ def _integrators(data: "xr.Dataset | xr.DataTree") -> Iterator[str]:
 def _keys(name: str) -> list[str]:
     """The entries of `citations.bib` that a method of the registry names; none for one that is not registered here."""
     from symtop.core.errors import SymtopError
-    from symtop.methods.framework.citations import keys
-    from symtop.methods.framework.registry import integrator
+    from symtop.methods.framework.registry import citation_keys, integrator
 
     try:
-        return keys(integrator(name))
+        return citation_keys(integrator(name))
     except SymtopError:
         return []

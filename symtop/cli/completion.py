@@ -32,21 +32,21 @@ def _stamp() -> str:
 
 
 def _listed() -> dict[str, list[str]]:
-    from symtop.methods.framework.registry import integrators, rows
+    from symtop.methods.framework.registry import integrators, variants
     from symtop.model.scenes import scenes
     from symtop.runner import scripts
 
-    every = [row.name for row in rows()]
+    every = [one.name for one in variants()]
     return {
         "scenes": list(scenes()),
         "integrators": list(integrators()),
-        "rows": every,
+        "variants": every,
         "studies": list(scripts.names()),
     }
 
 
 def names() -> dict[str, list[str]]:
-    """The names of each kind, "scenes", "integrators", "rows" and "studies", from the file if it is up to date."""
+    """The names of each kind, "scenes", "integrators", "variants" and "studies", from the file if it is up to date."""
     file, stamp = cache_root() / "names.json", _stamp()
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
         stored: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
@@ -62,10 +62,10 @@ def names() -> dict[str, list[str]]:
 
 
 def completing(kind: str) -> Completion:
-    """Shell completion of the names of all scenes, integrators or studies; after a bracket, of rows like rk4[axis]."""
+    """Shell completion of the names of scenes, integrators or studies; after a bracket, of variants like rk4[axis]."""
 
     def complete(_: click.Context, __: click.Parameter, prefix: str) -> list[str]:
-        wanted = "rows" if kind == "integrators" and "[" in prefix else kind
+        wanted = "variants" if kind == "integrators" and "[" in prefix else kind
         return [name for name in names()[wanted] if name.startswith(prefix)]
 
     return complete

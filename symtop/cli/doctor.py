@@ -104,7 +104,7 @@ def _heyoka() -> list[Finding]:
     if importlib.util.find_spec("heyoka") is None:
         advice = "heyoka has wheels for Linux only; elsewhere try conda-forge. The closed form works without it"
         return [Finding("precisions", "no Taylor series: heyoka is absent", False, advice)]
-    from symtop.methods.taylor.taylor import arithmetic, stepper
+    from symtop.methods.taylor.heyoka import arithmetic, stepper
 
     findings = []
     for precision in ("double", "longdouble", "quad"):

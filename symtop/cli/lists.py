@@ -89,7 +89,7 @@ def _described(method: "Integrator") -> Record:
 
 
 def _integrator_page(described: Record, width: int) -> str:
-    from symtop.methods.framework.citations import citation
+    from symtop.methods.framework.registry import citation
 
     lines = {key: value for key, value in described.items() if key not in ("name", "summary", "about")}
     paragraphs = [f"{described['name']}: {described['summary']}", *described.get("about", "").split("\n\n")]

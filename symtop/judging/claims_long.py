@@ -29,8 +29,7 @@ from symtop.measure.conservation import Changed, constant_of, residuals
 from symtop.measure.growth import behaviour, tops
 from symtop.measure.increments import Difference, from_increments
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.outcomes import sentence
-from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.plan import Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop

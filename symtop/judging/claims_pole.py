@@ -46,7 +46,7 @@ def passages(method: Integrator) -> list[Passage]:
     """What happens at a pole, in every chart of the method."""
     rows = []
     for chart in method.charts():
-        only = method.row(chart)
+        only = method.variant(chart)
         ends, errors_there = [], []
         for finer in (1.0, 2.0):
             step, tolerance = POLE.horizon / (POLE_STEPS * finer), max(10.0 ** (-5.0 - finer), method.least_tolerance)

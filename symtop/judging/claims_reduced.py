@@ -23,8 +23,7 @@ from symtop.judging.findings import Finding
 from symtop.measure.order import order as order_of
 from symtop.measure.step_map import SHARE, StepMap, angles_at, coarsest, generic_start, restart_gap
 from symtop.measure.step_series import step_series
-from symtop.methods.framework.outcomes import NOT_FINITE, OK, OUTCOMES, sentence
-from symtop.methods.framework.plan import Array, Run
+from symtop.methods.framework.plan import NOT_FINITE, OK, OUTCOMES, Array, Run, sentence
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, Momenta

@@ -14,9 +14,9 @@ from symtop.measure.order_conditions import Conditions, conditions, triangle
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.runge_kutta.runge_kutta import Tableau
+from symtop.methods.runge_kutta.explicit import Tableau
+from symtop.methods.splitting.loop import Composition
 from symtop.methods.splitting.rotor import EXACT
-from symtop.methods.splitting.splitting_loop import Composition
 from symtop.model.scenes import Scene
 
 

@@ -21,7 +21,7 @@ from symtop.judging.claims_series import ChartSeries
 from symtop.judging.findings import Finding, yes_no
 from symtop.measure.step_map import generic_start
 from symtop.measure.step_series import AGREES, SURE, compared
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form

@@ -17,8 +17,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.methods.framework.registry import Integrator
+from symtop.methods.splitting.loop import Stages
 from symtop.methods.splitting.rotor import ROTATIONS
-from symtop.methods.splitting.splitting_loop import Stages
 from symtop.model import charts
 from symtop.model.scenes import Scene
 from symtop.run.reference.independent_checks import have_heyoka

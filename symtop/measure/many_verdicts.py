@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT, DRIFTING, FEWEST, GROWING, NO_GAP, WRONG_REGIME, barriers
-from symtop.methods.framework.outcomes import NOT_FINITE
+from symtop.methods.framework.plan import NOT_FINITE
 from symtop.model import effective
 from symtop.model.exact import motion_samples
 from symtop.model.exact.closed_forms import ClosedForms

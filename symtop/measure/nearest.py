@@ -93,8 +93,8 @@ def _counted(data: xr.DataTree, numbers: np.ndarray, quantity: str, accuracy: fl
     if quantity not in group["quantity"]:
         return None
     target = min(group["target"].values.tolist(), key=lambda value: abs(math.log(value / accuracy)))
-    price = data["prices"].to_dataset()["alone"].min("scene").sel(integrator=group["integrator"].values)
-    cost = group["cost"].sel(quantity=quantity, target=target).transpose("integrator", "member").values
+    price = data["prices"].to_dataset()["alone"].min("scene").sel(variant=group["variant"].values)
+    cost = group["cost"].sel(quantity=quantity, target=target).transpose("variant", "member").values
     cost *= price.values[:, np.newaxis]
     rows = ~np.isnan(cost).all(axis=1)
     regimes = data["tops"].to_dataset()["regime"].transpose(..., "member", "number").values
@@ -107,7 +107,7 @@ def _counted(data: xr.DataTree, numbers: np.ndarray, quantity: str, accuracy: fl
     best = cost.min(axis=0)
     served = ((cost <= WITHIN * best) & np.isfinite(cost)).sum(axis=1)
     slow = np.median(np.where(np.isfinite(best), cost, np.inf) / np.where(np.isfinite(best), best, 1.0), axis=1)
-    names = group["integrator"].values[rows]
+    names = group["variant"].values[rows]
     order = np.lexsort((slow, -served))
     counts = {str(names[row]): int(served[row]) for row in order}
     return Near(counts, int(chosen.size), quantity, float(target), spans[span])

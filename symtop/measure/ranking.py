@@ -59,8 +59,8 @@ class Win(NamedTuple):
 
 def ranked(data: xr.Dataset) -> list[str]:
     """The rows that take steps."""
-    names = data["integrator"].values
-    control = data["control"].transpose("integrator", ...).values.reshape(len(names), -1)
+    names = data["variant"].values
+    control = data["control"].transpose("variant", ...).values.reshape(len(names), -1)
     return [
         str(name)
         for name, known in zip(names, control, strict=True)
@@ -80,16 +80,16 @@ def cheapest(cell: xr.Dataset, target: float, quantity: str = "axis", implementa
     `cell` is one scene and one horizon of the study's dataset.
     """
     few = cell[[quantity, "seconds", "seconds_forecast", "outcome", "seconds_samples", "implementation"]]
-    cell = few.sel(integrator=ranked(cell))  # of these alone: a dataset has dozens
-    table = cell[[quantity, "seconds", "seconds_forecast", "outcome"]].transpose("integrator", "setting")
+    cell = few.sel(variant=ranked(cell))  # of these alone: a dataset has dozens
+    table = cell[[quantity, "seconds", "seconds_forecast", "outcome"]].transpose("variant", "setting")
     seconds, forecast = table["seconds"].values, table["seconds_forecast"].values
     good = (table[quantity].values <= target) & (table["outcome"].values == "ok")
     price = np.where(good & np.isfinite(seconds), seconds, np.inf)
-    samples = cell["seconds_samples"].transpose("integrator", "setting", "batch").values
-    implementations = cell["implementation"].transpose("integrator", ...).values.reshape(len(price), -1)[:, 0]
+    samples = cell["seconds_samples"].transpose("variant", "setting", "batch").values
+    implementations = cell["implementation"].transpose("variant", ...).values.reshape(len(price), -1)[:, 0]
     places = [
         Place(float(price[row, k]), str(name), k, samples[row, k], float(forecast[row, k]))
-        for row, (name, k) in enumerate(zip(cell["integrator"].values, map(int, price.argmin(axis=1)), strict=True))
+        for row, (name, k) in enumerate(zip(cell["variant"].values, map(int, price.argmin(axis=1)), strict=True))
         if np.isfinite(price[row, k]) and implementation in (None, str(implementations[row]))
     ]
     return sorted(places, key=lambda place: place[:2])
@@ -170,8 +170,8 @@ def relative_costs(data: xr.Dataset, among: list[str]) -> xr.DataArray:
                 continue
             for place in cheapest(cell, target):
                 table[number, names.index(place.integrator), k] = place.cost
-    costs = xr.DataArray(table, {"target": list(TARGETS), "integrator": names}, ("target", "integrator", "problem"))
-    best = costs.sel(integrator=among).min("integrator")
+    costs = xr.DataArray(table, {"target": list(TARGETS), "variant": names}, ("target", "variant", "problem"))
+    best = costs.sel(variant=among).min("variant")
     return (costs / best.where(np.isfinite(best))).fillna(np.inf).where(costs.notnull())
 
 
@@ -180,7 +180,7 @@ def leaders(ratios: xr.DataArray, count: int) -> list[str]:
 
     How close a row comes is the mean of 1/ratio over problems and targets.
     """
-    met = np.isfinite(ratios.transpose("integrator", ...).values).reshape(ratios.sizes["integrator"], -1).sum(axis=1)
+    met = np.isfinite(ratios.transpose("variant", ...).values).reshape(ratios.sizes["variant"], -1).sum(axis=1)
     merit = (1.0 / ratios).mean(("target", "problem")).values
     order = np.lexsort((-merit, -met))
-    return [str(ratios["integrator"].values[k]) for k in order[:count] if met[k] > 0]
+    return [str(ratios["variant"].values[k]) for k in order[:count] if met[k] > 0]

@@ -16,7 +16,7 @@ from symtop.core.errors import SymtopError
 from symtop.measure.accuracy import error_row
 from symtop.measure.phase import FREQUENCIES
 from symtop.measure.timing import bare_run, timings
-from symtop.methods.framework.registry import Integrator, integrator, integrators, rows
+from symtop.methods.framework.registry import Integrator, integrator, integrators, variants
 from symtop.model.scenes import Scene
 from symtop.run.simulation import likely_step
 
@@ -47,7 +47,7 @@ def compared(observe: str) -> list[Integrator]:
     """
     return [
         row
-        for row in rows(observe)
+        for row in variants(observe)
         if not row.exact_steps
         and (observe == "attitude" or row.charts() != ("attitude",) or "axis" not in integrator(row.method).charts())
     ]

@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.framework.plan import OUTCOMES
 from symtop.model.scenes import Scene
 from symtop.run.guard.guard import EXPECTED
 

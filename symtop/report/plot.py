@@ -84,7 +84,9 @@ def _unit(data: xr.Dataset) -> str:
 
 def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
     one_of("quantity", quantity, [name for name in QUANTITIES if name in data])
-    for dim in ("scene", "integrator"):
+    if "integrator" in data.coords:  # a sweep of version 0.2
+        data = data.rename(integrator="variant")
+    for dim in ("scene", "variant"):
         if dim not in data.coords:
             raise SymtopError(f"a sweep must have the {dim}s that it compares, as sweep gives them, not lack {dim}")
         if dim not in data.dims:  # of one alone, as isel leaves it
@@ -93,8 +95,8 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
     x = x or (controls[0] if len(controls) == 1 else "force_evaluations")
     x = one_of("x", x, [str(name) for name, values in data.data_vars.items() if _can_be_x(values)])
     for number, scene in enumerate(data["scene"].values):
-        for name in data["integrator"].values:
-            cell = data.sel(scene=scene, integrator=name)
+        for name in data["variant"].values:
+            cell = data.sel(scene=scene, variant=name)
             across = cell[x].values
             good = np.isfinite(across) & np.isfinite(cell[quantity].values)
             if not good.any():
@@ -112,7 +114,7 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
 
 def _can_be_x(values: xr.DataArray) -> bool:
     """Has it a number for each run of a sweep?"""
-    return values.dtype.kind in "iuf" and {*values.dims} == {"scene", "integrator", "setting"}
+    return values.dtype.kind in "iuf" and {*values.dims} == {"scene", "variant", "setting"}
 
 
 def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None:

@@ -32,7 +32,7 @@ from symtop.core.progress import beating
 from symtop.core.signals import ending_on_sigterm
 from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.loop import Loop, Position
-from symtop.methods.framework.outcomes import OK, OUTCOMES, sentence
+from symtop.methods.framework.plan import OK, OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.view import View

@@ -19,8 +19,7 @@ from symtop.core.errors import SymtopError, SymtopWarning, one_of, positive, sho
 from symtop.core.numbers import GOLDEN
 from symtop.core.over_time import over_time
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.outcomes import sentence
-from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.plan import Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.continuous import continuous
 from symtop.model.readings import readings

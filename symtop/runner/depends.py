@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 from symtop.core import code_hash, netcdf
 from symtop.core.code_hash import Reasons, Walk
 from symtop.methods.framework import registry
-from symtop.methods.framework.registry import Integrator, integrators, rows, split_name
+from symtop.methods.framework.registry import Integrator, integrators, split_name, variants
 from symtop.model.scenes import scenes
 from symtop.run import simulation
 from symtop.runner import plugins
@@ -31,7 +31,7 @@ EVERY = "*"  # in place of an integrator's or a scene's name: all of them
 ASKING = {
     "integrator",
     "integrators",
-    "rows",
+    "variants",
     "registry",
     "simulate",
 }  # names whose import means that a file may run a method
@@ -56,7 +56,7 @@ def _may_run_any(file: Path) -> bool:
     and an argument of the function around it, which its caller chooses.
     """
     names = _asks_for(file)
-    if names & {"integrators", "rows", "registry"}:
+    if names & {"integrators", "variants", "registry"}:
         return True
     tree = _tree(file)
     imported = [alias for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names]
@@ -96,7 +96,7 @@ def basis(measure: Callable[..., Any]) -> Basis:
     walk.add(measure)
     asking = [file for file in code_hash.closure(walk.files, RESOLVERS) - RESOLVERS if _asks_for(file)]
     names = walk.strings.union(*map(_strings, asking)) & integrators().keys()
-    if {integrators, rows} & walk.functions or any(map(_may_run_any, asking)):
+    if {integrators, variants} & walk.functions or any(map(_may_run_any, asking)):
         names.add(EVERY)
     return Basis(walk.values(), walk.closure(), frozenset(names))
 

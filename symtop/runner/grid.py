@@ -7,7 +7,7 @@ whose question it suits. What a study leaves out, it names with the reason.
 from collections.abc import Callable, Iterable, Mapping
 
 from symtop.core.errors import SymtopError, one_of
-from symtop.methods.framework.registry import Integrator, integrator, rows
+from symtop.methods.framework.registry import Integrator, integrator, variants
 from symtop.model.scenes import Scene, scenes
 
 
@@ -26,13 +26,13 @@ def grid_scenes(left_out: Mapping[str, Iterable[str]], suits: Callable[[Scene], 
     return [name for name, scene in known.items() if name not in reasons and suits(scene)]
 
 
-def grid_rows(observe: str, *, attitude: bool = False) -> list[Integrator]:
+def grid_variants(observe: str, *, attitude: bool = False) -> list[Integrator]:
     """Every method in each of its charts that shows the "nutation" or the "axis": the rows ``method[chart]`` of a grid.
 
     Where a method has the axis chart, its attitude chart is left out unless `attitude` is true: it steps the same axis
     and angular momentum, and the rotation about the axis besides, which neither quantity depends on.
     """
     return [
-        row for row in rows(observe)
+        row for row in variants(observe)
         if attitude or row.charts() != ("attitude",) or "axis" not in integrator(row.method).charts()
     ]  # fmt: skip

@@ -149,7 +149,7 @@ def _dense(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
     scenes = list(dict.fromkeys(case.scene for case, _ in cases))
     methods = list(dict.fromkeys(case.integrator for case, _ in cases))
     sizes: dict[str, int] = {}
-    coordinates: dict[str, Any] = {"scene": scenes, "integrator": methods}
+    coordinates: dict[str, Any] = {"scene": scenes, "variant": methods}
     for case, data in cases:
         for name, size in data.sizes.items():
             if name in data.coords and name in coordinates and data[name].dtype.kind == "f":
@@ -168,7 +168,7 @@ def _dense(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
             if str(name) not in filled:
                 shape = (len(scenes), len(methods), *(sizes[dim] for dim in dims))
                 blank = np.full(shape, *_blank(variable.dtype))
-                filled[str(name)] = (("scene", "integrator", *dims), blank, dict(variable.attrs))
+                filled[str(name)] = (("scene", "variant", *dims), blank, dict(variable.attrs))
             corner = tuple(slice(0, size) for size in variable.shape)
             filled[str(name)][1][(*place, *corner)] = variable.values
     variables = {
@@ -193,10 +193,10 @@ def _check_apart(cases: list[tuple[Case, xr.Dataset]]) -> None:
 
 def _apart(case: Case, data: xr.Dataset) -> list[tuple[Case, xr.Dataset]]:
     """A case that measured several integrators, as one case for each of them."""
-    if "integrator" not in data.dims:
+    if "variant" not in data.dims:
         return [(case, data)]
-    names = [str(name) for name in data["integrator"].values]
-    return [(replace(case, integrator=name), data.sel(integrator=name, drop=True)) for name in names]
+    names = [str(name) for name in data["variant"].values]
+    return [(replace(case, integrator=name), data.sel(variant=name, drop=True)) for name in names]
 
 
 def _blank(kind: "np.dtype[Any]") -> tuple[Any, Any]:

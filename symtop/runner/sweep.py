@@ -108,10 +108,10 @@ def sweep(
     def combined() -> xr.Dataset:
         size = max(len(cell.settings) for cell in asked)
         tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in _rows(asked, len(methods))]
-        data = xr.concat([xr.concat(row, "integrator") for row in tables], "scene")
-        data = data.assign_coords(scene=[one.name for one in chosen], integrator=[one.name for one in methods])
+        data = xr.concat([xr.concat(row, "variant") for row in tables], "scene")
+        data = data.assign_coords(scene=[one.name for one in chosen], variant=[one.name for one in methods])
         data["chart"] = (
-            ("scene", "integrator"),
+            ("scene", "variant"),
             [[chart_of(method, one.observes, observe) for method in methods] for one in chosen],
         )
         units = chosen[0].units if len({one.units for one in chosen}) == 1 else ""
@@ -247,14 +247,16 @@ def _stored(file: Path) -> dict[tuple[str, str], _Stored]:
     data = netcdf.read(file)
     if "made_of" not in data:
         raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")
+    if "integrator" in data.coords:  # a file of version 0.2
+        data = data.rename(integrator="variant")
     cells = {}
     for s, scene in enumerate(data["scene"].values.tolist()):
-        for i, name in enumerate(data["integrator"].values.tolist()):
-            cell = data.isel(scene=s, integrator=i)
+        for i, name in enumerate(data["variant"].values.tolist()):
+            cell = data.isel(scene=s, variant=i)
             digest = str(cell["made_of"].values)
             run = cell["outcome"].values != "not_run"
             if digest and run.any():
-                own = cell.drop_vars(["scene", "integrator", "made_of", "chart"], errors="ignore")
+                own = cell.drop_vars(["scene", "variant", "made_of", "chart"], errors="ignore")
                 cells[scene, name] = _Stored(digest, own.isel(setting=np.flatnonzero(run)))
     return cells
 

@@ -14,7 +14,7 @@ import symtop
 from benchmarks import peers
 from benchmarks.peers import callbacks, common, measure, own
 from benchmarks.peers.adapters import sundae
-from symtop.methods.framework.euler_lagrange import field_angles, with_rates
+from symtop.methods.framework.angles import field_angles, with_rates
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.space import field_axis
 from symtop.run.simulation import make_plan

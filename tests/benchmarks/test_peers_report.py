@@ -25,7 +25,7 @@ def _stored(times, spread=0.01):
     wobble = 1.0 + spread * np.arange(batches) / batches
     samples = np.array([[[[pair[k] * wobble] for pair in times.values()]] for k in range(2)])
     flat = samples.min(axis=-1)
-    one, each = ("scene", "integrator", "setting"), ("call", "scene", "integrator", "setting")
+    one, each = ("scene", "variant", "setting"), ("call", "scene", "variant", "setting")
     words = {
         "package": [name.partition("[")[0] for name in names],
         "version": ["1"] * len(names),
@@ -40,9 +40,9 @@ def _stored(times, spread=0.01):
             "axis": (one, np.where(np.isfinite(flat[0]), 1e-10, np.nan)),
             **dict.fromkeys(("seconds", "first_call", "reliable"), (each, flat)),
             "seconds_samples": ((*each, "batch"), samples),
-            **{key: ("integrator", column) for key, column in words.items()},
+            **{key: ("variant", column) for key, column in words.items()},
         },
-        coords={"call": list(measure.CALLS), "scene": ["spheroid"], "integrator": [f"{name}-one" for name in names]},
+        coords={"call": list(measure.CALLS), "scene": ["spheroid"], "variant": [f"{name}-one" for name in names]},
     )
     facts = measured.circumstances() | {"measured": "2001-02-03", "processor": "an abacus"}
     return netcdf.describe(data, "peers").assign_attrs(facts)

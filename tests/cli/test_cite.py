@@ -8,7 +8,7 @@ from click.testing import CliRunner
 import symtop
 from symtop.cli.main import main
 from symtop.core import netcdf
-from symtop.methods.framework.citations import entries, keys
+from symtop.methods.framework.registry import bibliography, citation_keys
 
 
 def cited(*arguments):
@@ -27,10 +27,10 @@ def test_without_a_file_the_package_is_cited_with_its_version():
 def test_a_run_cites_the_sources_of_its_method(tmp_path, name):
     data = symtop.simulate("spheroid", name, step_size=0.01, horizon=0.1)
     text = cited(netcdf.write(data, tmp_path / "run.nc")).stdout
-    sources = keys(symtop.integrator(name))
+    sources = citation_keys(symtop.integrator(name))
     assert sources
     for key in sources:
-        assert entries()[key] in text
+        assert bibliography()[key] in text
     assert text.count("\n@") == len(sources)
 
 

@@ -15,7 +15,7 @@ from symtop.core.errors import SymtopError
 @pytest.fixture
 def stored(tmp_path):
     names = ["rk4", "strang", "gauss-4", "taylor"]  # text is what makes the other way of reading crash
-    part = xr.Dataset({"error": (("integrator", "step"), np.ones((4, 200)))}, {"integrator": names})
+    part = xr.Dataset({"error": (("variant", "step"), np.ones((4, 200)))}, {"variant": names})
     parts = dict.fromkeys(("long", "short"), part)
     tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"title": "two kinds"}), **parts})
     return tree, netcdf.write(tree, tmp_path / "tree.nc")

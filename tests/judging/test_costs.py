@@ -26,7 +26,9 @@ def forces_of_an_attempt(method: Integrator, chart: str) -> int:
     for k in range(ATTEMPTS):
         tolerance = max(10.0 ** (-4.0 - 0.4 * k), method.least_tolerance)
         horizon = (1.37 + 0.23 * k) * SPHEROID.nutation_period
-        run = symtop.simulate(SPHEROID, method.row(chart), tolerance=tolerance, horizon=horizon, samples=2, guard=False)
+        run = symtop.simulate(
+            SPHEROID, method.variant(chart), tolerance=tolerance, horizon=horizon, samples=2, guard=False
+        )
         assert run.attrs["outcome"] == "ok"
         costs.append(int(run.attrs["force_evaluations"]))
     assert len(set(costs)) > ATTEMPTS // 2

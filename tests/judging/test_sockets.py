@@ -44,7 +44,7 @@ def run_of(stepper, steps=200):
 def test_a_python_step_makes_the_steps_of_the_tableau_that_it_is(chart):
     tableau = symtop.runge_kutta("midpoint-tableau", ((), (0.5,)), (0.0, 1.0))
     ours = symtop.simulate(
-        SPHEROID, tableau.row(chart), step_size=0.004, horizon=0.8, samples=5, observe="axis", guard=False
+        SPHEROID, tableau.variant(chart), step_size=0.004, horizon=0.8, samples=5, observe="axis", guard=False
     )
     mine = run_of(PythonStep(midpoint, chart))
     np.testing.assert_allclose(mine["axis"].values, ours["axis"].values, rtol=0, atol=1e-12)

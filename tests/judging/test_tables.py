@@ -5,7 +5,7 @@ import pytest
 import symtop
 from symtop.judging.claims_series import order
 from symtop.judging.claims_table import table_of
-from symtop.methods.splitting import splitting
+from symtop.methods.splitting import composition
 
 SPHEROID = symtop.scene("spheroid")
 B = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
@@ -53,7 +53,7 @@ def test_a_splitting_that_is_off_is_refuted_before_any_run(off, verdict):
 
 
 def test_every_splitting_of_the_catalogue_has_the_order_that_it_claims():
-    orders = {method.name: (method.order, table_of(method)) for method in splitting.built_in()}
+    orders = {method.name: (method.order, table_of(method)) for method in composition.built_in()}
     claimed = {name: order for name, (order, table) in orders.items() if table is not None}
     assert {name: orders[name][1].order for name in claimed} == claimed
     assert set(orders) - set(claimed) == {"cayley", "cayley-tuned"}

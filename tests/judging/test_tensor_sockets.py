@@ -16,7 +16,7 @@ import pytest
 import symtop
 from symtop.judging.adapters.choice import opened
 from symtop.judging.adapters.tensors import field_of
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "studies" / "examples"

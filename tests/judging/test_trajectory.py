@@ -11,7 +11,7 @@ import symtop
 from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.judging.adapters.choice import opened
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 
 SPHEROID = symtop.scene("spheroid")
 H, STRIDE, SAMPLES = 0.01, 10, 1001

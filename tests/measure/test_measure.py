@@ -171,7 +171,7 @@ def test_combining_refuses_cases_with_different_coordinates():
         return Case("spheroid", name), data
 
     joined = store.combine([case("a", [8.0, 100.0]), case("b", [8.0, 100.0, 1000.0])])
-    assert np.isnan(joined["error"].sel(integrator="a", horizon=1000.0))
+    assert np.isnan(joined["error"].sel(variant="a", horizon=1000.0))
     with pytest.raises(symtop.SymtopError, match="coordinate horizon of spheroid--b differs"):
         store.combine([case("a", [8.0, 100.0]), case("b", [8.0, 1000.0])])
 

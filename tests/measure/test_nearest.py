@@ -33,14 +33,14 @@ def store(folder, costs, regimes, prices=None):
     """A study of one horizon, 10 nutations, with costs (tops,) of the axis at 1e-6 by row."""
     names, table = list(costs), np.array(list(costs.values()))
     short = xr.Dataset(
-        {"cost": (("scene", "integrator", "quantity", "target", "member"), table[np.newaxis, :, None, None]),
-         "nutations": (("scene", "integrator"), np.full((1, len(names)), 10.0))},
-        coords={"scene": ["population"], "integrator": names, "quantity": ["axis"], "target": [1e-6]},
+        {"cost": (("scene", "variant", "quantity", "target", "member"), table[np.newaxis, :, None, None]),
+         "nutations": (("scene", "variant"), np.full((1, len(names)), 10.0))},
+        coords={"scene": ["population"], "variant": names, "quantity": ["axis"], "target": [1e-6]},
     )  # fmt: skip
-    tops = xr.Dataset({"regime": (("scene", "integrator", "member", "number"), np.array(regimes)[None, None])})
+    tops = xr.Dataset({"regime": (("scene", "variant", "member", "number"), np.array(regimes)[None, None])})
     price = xr.Dataset(
-        {"alone": (("scene", "integrator"), np.array([prices or [1.0] * len(names)]))},
-        coords={"scene": ["population"], "integrator": names},
+        {"alone": (("scene", "variant"), np.array([prices or [1.0] * len(names)]))},
+        coords={"scene": ["population"], "variant": names},
     )
     tree = xr.DataTree.from_dict({"short": short, "tops": tops, "prices": price})
     tree.to_netcdf(folder / module.STORED, engine="netcdf4")

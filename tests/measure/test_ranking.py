@@ -50,11 +50,11 @@ def cell(samples, errors=None, implementations=None):
         "implementation": np.array(implementations or ["compiled"] * count), "nutation_lag": np.zeros(count),
         "seconds_forecast": np.full(count, np.nan), "control": np.full(count, "step_size"),
     }  # fmt: skip
-    data = xr.Dataset({name: (("integrator", "setting"), values[:, None]) for name, values in table.items()})
-    data["seconds_samples"] = (("integrator", "setting", "batch"), samples[:, None, :])
+    data = xr.Dataset({name: (("variant", "setting"), values[:, None]) for name, values in table.items()})
+    data["seconds_samples"] = (("variant", "setting", "batch"), samples[:, None, :])
     data["control"] = data["control"].isel(setting=0)
-    data["nutation_width"] = ("integrator", np.ones(count))
-    return data.assign_coords(integrator=list("abcdefg"[:count]))
+    data["nutation_width"] = ("variant", np.ones(count))
+    return data.assign_coords(variant=list("abcdefg"[:count]))
 
 
 def test_a_lead_is_sure_only_if_every_round_agrees_and_it_is_more_than_a_hair():
@@ -71,13 +71,13 @@ def test_a_lead_is_sure_only_if_every_round_agrees_and_it_is_more_than_a_hair():
 
 def test_the_cost_of_a_target_is_that_of_the_cheapest_timed_run_that_meets_it():
     rows = {"seconds": [0.5, 2.0, math.nan, 7.0], "axis": [1e-2, 1e-4, 1e-5, 1e-12], "outcome": ["ok"] * 4}
-    data = xr.Dataset({name: (("integrator", "setting"), [values]) for name, values in rows.items()})
+    data = xr.Dataset({name: (("variant", "setting"), [values]) for name, values in rows.items()})
     data = data.assign(
-        implementation=("integrator", ["compiled"]), seconds_samples=data["seconds"].expand_dims(batch=3),
-        control=("integrator", ["step_size"]), nutation_width=("integrator", [1.0]),
+        implementation=("variant", ["compiled"]), seconds_samples=data["seconds"].expand_dims(batch=3),
+        control=("variant", ["step_size"]), nutation_width=("variant", [1.0]),
         seconds_forecast=math.nan * data["seconds"],
     )  # fmt: skip
-    data = data.assign_coords(integrator=["a"])
+    data = data.assign_coords(variant=["a"])
     assert [ranking.cheapest(data, target)[0].cost for target in (1e-1, 1e-3, 3e-5, 1e-12)] == [0.5, 2.0, 7.0, 7.0]
     assert ranking.cheapest(data, 1e-13) == []
 
@@ -87,7 +87,7 @@ def test_the_closed_form_is_not_ranked_but_stands_beside_the_others():
     assert ranking.win(data, 1e-6).best.integrator == "a"
     data["control"][0] = ""
     data = data.assign(
-        set_up_seconds=("integrator", [0.1, np.nan, np.nan]), sample_seconds=("integrator", [6e-7, np.nan, np.nan])
+        set_up_seconds=("variant", [0.1, np.nan, np.nan]), sample_seconds=("variant", [6e-7, np.nan, np.nan])
     )
     assert ranking.ranked(data) == ["b", "c"]
     assert ranking.win(data, 1e-6).best.integrator == "b"
@@ -96,7 +96,7 @@ def test_the_closed_form_is_not_ranked_but_stands_beside_the_others():
     assert "a is not ranked" in said
     assert "100 ms" in said
     assert "600 us" not in said
-    assert work_words.beside(data.sel(integrator=["b", "c"])) == ""
+    assert work_words.beside(data.sel(variant=["b", "c"])) == ""
 
 
 def test_the_closed_form_is_compared_with_the_fastest_row():
@@ -113,7 +113,7 @@ def test_the_closed_form_is_compared_with_the_fastest_row():
     slow = data.assign(seconds=data["seconds"].where(data["control"] != "", 5.0))
     assert "in 0 of 2 combinations" in work_closed_form.headline(slow, ["over ten"])
     assert "is 0.2 to 0.2 (median of all 2: 0.2) over ten." in work_closed_form.headline(slow, ["over ten"])
-    assert work_closed_form.headline(data.sel(integrator=["b", "c"]), ["over ten"]) == ""
+    assert work_closed_form.headline(data.sel(variant=["b", "c"]), ["over ten"]) == ""
 
 
 def test_the_median_of_the_closed_form_is_over_all_combinations_and_not_those_that_it_wins():
@@ -127,7 +127,7 @@ def test_the_median_of_the_closed_form_is_over_all_combinations_and_not_those_th
 def test_own_rows_are_compared_with_taylor():
     """One is ahead at 1e-3 and alone at 1e-9; without taylor nothing is said, and a slower row is named as such."""
     data = cell([[0.5] * 3, [1.0] * 3, [2.0] * 3], errors=[1e-4, 1e-7, 1e-10])
-    data = data.assign_coords(integrator=["series[axis]", "taylor[axis]", "rk4[axis]"])
+    data = data.assign_coords(variant=["series[axis]", "taylor[axis]", "rk4[axis]"])
     data = data.expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
     (row,) = against_taylor.table(data, ["over ten"]).rows
     assert row == ["x", "over ten", "0.50 (series[axis])", "2.00 (rk4[axis])", "rk4[axis] alone", "neither"]
@@ -136,7 +136,7 @@ def test_own_rows_are_compared_with_taylor():
         "The fastest own row takes no more time than heyoka's taylor[axis] (double precision) in 1 of 2 combinations "
         "of scene, run length and error that both meet; own rows meet 1 more, it none."
     )
-    only = data.sel(integrator=["series[axis]", "rk4[axis]"])
+    only = data.sel(variant=["series[axis]", "rk4[axis]"])
     assert (against_taylor.compared(only), against_taylor.headline(only, ["over ten"])) == ({}, "")
 
 
@@ -144,7 +144,7 @@ def test_the_rival_is_taylor_in_double_precision_and_its_longer_forms_are_told_w
     """In longer arithmetic taylor is slower at 1e-9, and alone at 1e-12; a row of another name is no rival."""
     names = ["series[axis]", "taylor[axis]", "taylor-longdouble[axis]", "taylor-mine[axis]"]
     data = cell([[1.0] * 3, [3.0] * 3, [20.0] * 3, [0.5] * 3], errors=[1e-10, 1e-10, 1e-13, 1e-4])
-    data = data.assign_coords(integrator=names).expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
+    data = data.assign_coords(variant=names).expand_dims(scene=["x"]).expand_dims(horizon=[10.0])
     said = against_taylor.headline(data, ["over ten"])
     assert "in 3 of 3 combinations" in said
     assert "own rows meet 0 more, it none." in said
@@ -153,12 +153,12 @@ def test_the_rival_is_taylor_in_double_precision_and_its_longer_forms_are_told_w
     (row,) = against_taylor.table(data, ["over ten"]).rows
     assert row[2:] == ["0.17 (taylor-mine[axis])", "0.33 (series[axis])", "0.33 (series[axis])",
                        "taylor-longdouble[axis] alone"]  # fmt: skip
-    loose = data.assign(axis=data["axis"].where(data["integrator"] != "taylor[axis]", 1e-4))
+    loose = data.assign(axis=data["axis"].where(data["variant"] != "taylor[axis]", 1e-4))
     said = against_taylor.headline(loose, ["over ten"])  # 20 times faster than the longer form, which is no rival
     assert "in 1 of 1 combinations" in said
     assert "own rows meet 2 more, it none." in said
     assert "times faster" not in said
-    only = data.sel(integrator=[names[0], names[2]])
+    only = data.sel(variant=[names[0], names[2]])
     assert against_taylor.headline(only, ["over ten"]) == ""
 
 
@@ -199,11 +199,11 @@ def test_a_target_wider_than_the_nutation_has_no_winner_and_does_not_count():
 def test_a_time_that_misses_its_forecast_leads_only_if_the_forecast_does():
     data = cell([[1.0] * 3, [2.8] * 3])
     assert ranking.win(data, 1e-6).level == ()
-    data["seconds_forecast"] = (("integrator", "setting"), [[1.0], [1.05]])  # the second was unlucky in every round
+    data["seconds_forecast"] = (("variant", "setting"), [[1.0], [1.05]])  # the second was unlucky in every round
     assert ranking.win(data, 1e-6).level == ("b",)
-    data["seconds_forecast"] = (("integrator", "setting"), [[1.0], [2.9]])
+    data["seconds_forecast"] = (("variant", "setting"), [[1.0], [2.9]])
     assert ranking.win(data, 1e-6).level == ()
-    data["seconds_forecast"] = (("integrator", "setting"), [[2.7], [2.9]])  # the first was timed too short
+    data["seconds_forecast"] = (("variant", "setting"), [[2.7], [2.9]])  # the first was timed too short
     assert ranking.win(data, 1e-6).level == ("b",)
 
 
@@ -221,9 +221,7 @@ def test_the_margin_of_a_lead_grows_with_the_noise_of_the_times():
 
 def test_a_row_that_meets_an_error_on_more_scenes_comes_before_a_faster_one():
     table = np.array([[1.0, 1.0, math.inf, math.inf], [9.0, 9.0, 1.0, 1.0], [10.0, 12.0, 8.0, 9.0]])
-    ratios = xr.DataArray(
-        table[None], {"target": [1e-12], "integrator": list("abc")}, ("target", "integrator", "problem")
-    )
+    ratios = xr.DataArray(table[None], {"target": [1e-12], "variant": list("abc")}, ("target", "variant", "problem"))
     assert ranking.leaders(ratios, 3) == ["b", "c", "a"]
     assert ranking.leaders(ratios.isel(problem=[0, 1]), 3) == ["a", "b", "c"]
 

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 import symtop
 from symtop.cli.main import main
 from symtop.measure.verdicts import VERDICTS, barriers, judge, judgement, verdict
-from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.framework.plan import OUTCOMES
 from symtop.model import charts
 from symtop.model.scenes import closed_form, grazing
 

@@ -6,9 +6,8 @@ import pytest
 from scipy import integrate
 
 import symtop
-from symtop.methods.framework.about import paragraphs
-from symtop.methods.framework.citations import entries
 from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.registry import bibliography, paragraphs
 
 NAMES = tuple(symtop.integrators())
 COUNTED = """zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen
@@ -77,15 +76,15 @@ def test_every_integrator_names_sources_that_are_known_and_its_paragraph_their_y
     method = symtop.integrator(name)
     keys = method.reference.split()
     assert keys
-    assert set(keys) <= set(entries())
+    assert set(keys) <= set(bibliography())
     for key in keys:
-        year = re.search(r"^  year = \{(\d{4})\},$", entries()[key], re.MULTILINE)[1]
+        year = re.search(r"^  year = \{(\d{4})\},$", bibliography()[key], re.MULTILINE)[1]
         assert f"({year})" in method.about
-        assert symtop.citation(name).count(entries()[key]) == 1
+        assert symtop.citation(name).count(bibliography()[key]) == 1
 
 
 def test_entries_are_bibtex_with_balanced_braces_and_an_author():
-    for key, text in entries().items():
+    for key, text in bibliography().items():
         assert text.startswith("@")
         assert text.count("{") == text.count("}")
         assert re.search(r"^  author = \{.+\},$", text, re.MULTILINE), key
@@ -93,7 +92,7 @@ def test_entries_are_bibtex_with_balanced_braces_and_an_author():
 
 
 def test_no_entry_is_cited_by_nobody():
-    assert set(entries()) == {key for name in NAMES for key in symtop.integrator(name).reference.split()}
+    assert set(bibliography()) == {key for name in NAMES for key in symtop.integrator(name).reference.split()}
 
 
 def test_an_integrator_of_ones_own_says_what_its_author_says():

@@ -8,14 +8,13 @@ import pytest
 import symtop
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.many import members_of
-from symtop.methods.framework.outcomes import OUTCOMES
-from symtop.methods.framework.plan import Plan
-from symtop.methods.framework.registry import rows
+from symtop.methods.framework.plan import OUTCOMES, Plan
+from symtop.methods.framework.registry import variants
 from symtop.run.ensemble.inputs import read_members
 from symtop.run.sampling import nutation_periods
 
 SOLVERS = {
-    row.name: row.solvers[row.charts()[0]] for row in rows() if isinstance(row.solvers[row.charts()[0]], Adaptive)
+    row.name: row.solvers[row.charts()[0]] for row in variants() if isinstance(row.solvers[row.charts()[0]], Adaptive)
 }
 COUNTS = 7
 BUDGET = 900.0
@@ -56,7 +55,7 @@ def test_members_have_the_bits_of_runs_alone(name, budget):
     assert "ok" in outcomes
 
 
-@pytest.mark.parametrize("row", [row for row in rows() if row.control == "tolerance"], ids=lambda row: row.name)
+@pytest.mark.parametrize("row", [row for row in variants() if row.control == "tolerance"], ids=lambda row: row.name)
 def test_an_infinite_budget_ends_no_run(row):
     """Of a Taylor method it was no number of steps: an OverflowError."""
     scene, times = symtop.scene("goldstein"), np.linspace(0.0, 0.5, 3)

@@ -17,7 +17,7 @@ from symtop.methods.framework.many import members_of
 from symtop.methods.framework.plan import Plan
 from symtop.model import charts
 from symtop.model.top import flat
-from symtop.runner.grid import grid_rows
+from symtop.runner.grid import grid_variants
 from tests.conftest import random_scenes
 from tests.methods import engine_formulas
 
@@ -246,7 +246,7 @@ def test_comparisons_and_recommendations_leave_engines_out():
     assert {entry.family for entry in engines.values()} == {"engine"}
     assert not set(engines) & set(registry.methods())
     assert set(engines) | set(registry.methods()) == set(symtop.integrators())
-    for rows in (registry.rows(), compared("axis"), compared("attitude"), grid_rows("nutation", attitude=True)):
+    for rows in (registry.variants(), compared("axis"), compared("attitude"), grid_variants("nutation", attitude=True)):
         assert not {row.method for row in rows} & set(engines)
 
 

@@ -11,8 +11,7 @@ from benchmarks import exactness
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
 from symtop.methods.framework.fixed_step import inside
 from symtop.methods.framework.plan import Plan
-from symtop.methods.lagrangian.exact_map import Map, exact_map
-from symtop.methods.lagrangian.oscillators import momentum, on_oscillators
+from symtop.methods.lagrangian.oscillators import Map, exact_map, momentum, on_oscillators
 from symtop.model import charts
 from symtop.model.exact.precise_form import PreciseForm
 from symtop.model.scenes import closed_form

@@ -13,8 +13,7 @@ from symtop.methods.framework.angles import reduced
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.loop import driver
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lagrangian.discrete_lagrangian import march
-from symtop.methods.lagrangian.node_sums import forces, node_sums, opening
+from symtop.methods.lagrangian.discrete_lagrangian import forces, march, node_sums, opening
 from symtop.methods.lagrangian.quadrature import Quadrature
 from tests.conftest import random_scenes
 
@@ -183,7 +182,7 @@ def test_discrete_momenta_are_those_of_the_discrete_lagrangian(name, nodes, weig
 def test_rk45_is_scipys_to_the_bit():
     from scipy.integrate import solve_ivp
 
-    from symtop.methods.framework.euler_lagrange import field_angles, with_rates
+    from symtop.methods.framework.angles import field_angles, with_rates
     from symtop.methods.library.scipy_ivp import RightHandSide
 
     where = symtop.scene("spheroid")

@@ -7,21 +7,19 @@ import pytest
 
 import symtop
 from symtop.measure.timing import timings
-from symtop.methods.framework import blocks, lanes, loop as loops
-from symtop.methods.framework.blocks import ALIKE, LEAST, divided, turns
+from symtop.methods.framework import lanes, loop as loops, many
 from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.lanes import W
-from symtop.methods.framework.many import Many, in_turn, members_of
-from symtop.methods.framework.outcomes import OUTCOMES
-from symtop.methods.framework.plan import Plan
-from symtop.methods.framework.registry import rows
+from symtop.methods.framework.many import ALIKE, LEAST, Many, divided, in_turn, members_of, turns
+from symtop.methods.framework.plan import OUTCOMES, Plan
+from symtop.methods.framework.registry import variants
 from symtop.methods.framework.space import on_axis
-from symtop.methods.runge_kutta.runge_kutta import runge_kutta
-from symtop.methods.splitting.splitting import composition
-from symtop.methods.splitting.splitting_space import march_axis
+from symtop.methods.runge_kutta.explicit import runge_kutta
+from symtop.methods.splitting.composition import composition
+from symtop.methods.splitting.space import march_axis
 from symtop.model.top import flat
 
-SOLVERS = {row.name: solver for row in rows() for solver in filter(None, map(inside, row.solvers.values()))}
+SOLVERS = {row.name: solver for row in variants() for solver in filter(None, map(inside, row.solvers.values()))}
 IN_LANES = [name for name, solver in SOLVERS.items() if solver.in_lanes]
 A_FEW = ("strang[axis]", "takahashi-imada[attitude]", "cayley[axis]", "srkn-14-6[attitude]", "stormer-verlet[angles]",
          "rk4[attitude]", "exact-discrete[attitude]", "series[axis]", "series[attitude]")  # fmt: skip
@@ -93,7 +91,7 @@ def test_members_of_every_method_with_lanes_have_the_bits_of_runs_alone(name):
 
 
 def test_methods_that_have_lanes():
-    splitting = {row.name for row in rows() if row.family == "splitting"}
+    splitting = {row.name for row in variants() if row.family == "splitting"}
     assert splitting - set(IN_LANES) == {"stormer-verlet-reversible[angles]"}  # of steps that differ between members
     assert {"rk4[angles]", "rk4[axis]", "rk4[attitude]"} <= set(IN_LANES)
     assert {f"{name}[{chart}]" for name in ("exact-discrete", "series") for chart in ("axis", "attitude")} <= set(
@@ -172,7 +170,7 @@ def test_runs_of_a_few_steps_at_a_time_are_the_same(monkeypatch):
     solver = SOLVERS["takahashi-imada[attitude]"]
     whole = solver.many(*given)
     monkeypatch.setattr(loops, "BLOCK", 250)  # back to Python eight steps of a block at a time
-    monkeypatch.setattr(blocks, "BATCH", 2 * W)
+    monkeypatch.setattr(many, "BATCH", 2 * W)
     for one, other in zip(whole, solver.many(*given), strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -186,7 +184,7 @@ def test_a_long_run_in_which_lanes_are_given_up_between_samples():
 
 @pytest.mark.parametrize("count", [1, 8, 31, 32, 1000, 100_003])
 def test_what_lanes_step_begins_with_a_line_of_the_cache(count):
-    room = blocks.aligned(count)
+    room = many.aligned(count)
     assert room.shape == (count,)
     assert room.ctypes.data % 64 == 0
     assert room.flags.c_contiguous

@@ -15,9 +15,9 @@ from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.preparation import Body
 from symtop.methods.framework.registry import integrator
 from symtop.methods.framework.space import SpaceTop, field_axis, on_axis
-from symtop.methods.lie_group import lie_variational
+from symtop.methods.lie_group import variational
 from symtop.methods.lie_group.generalised_alpha import generalised_alpha
-from symtop.methods.lie_group.lie_runge_kutta import lie_runge_kutta
+from symtop.methods.lie_group.runge_kutta import lie_runge_kutta
 from symtop.model import charts
 from tests.conftest import random_scenes
 from tests.slopes import assert_order, measured_order
@@ -208,7 +208,7 @@ def test_the_scalar_equations_are_solved_for_every_shape_and_size():
         top = Body(1.0, random.uniform(0.02, 1.98), 1.0)
         size = 10.0 ** random.uniform(-8, 4)
         A, square = size * random.normal(), size**2 * random.exponential()
-        _, i, x, work, converged = lie_variational._euler_poincare(top, A, square)
+        _, i, x, work, converged = variational._euler_poincare(top, A, square)
         k, bent = i - top.I1, (top.I3 - top.I1) * x
         assert converged
         assert work <= 60

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from symtop.methods.framework.lanes import W
-from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.lie_group.generalised_alpha import generalised_alpha
-from symtop.methods.lie_group.lie_runge_kutta import LieTable, lie_runge_kutta
-from symtop.methods.lie_group.lie_variational import EULER_POINCARE, Variational, lie_variational
+from symtop.methods.lie_group.runge_kutta import LieTable, lie_runge_kutta
+from symtop.methods.lie_group.variational import EULER_POINCARE, Variational, lie_variational
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from tests.methods.test_lanes import FAR, SOLVERS, assert_runs_alone, left_alone, members, times_faster
 from tests.methods.test_newton_lanes import spread

@@ -11,15 +11,14 @@ import symtop
 from symtop.methods.framework import loop as loops
 from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.many import groups, members_of
-from symtop.methods.framework.outcomes import OUTCOMES
-from symtop.methods.framework.plan import Plan
-from symtop.methods.framework.registry import rows
+from symtop.methods.framework.plan import OUTCOMES, Plan
+from symtop.methods.framework.registry import variants
 from symtop.methods.framework.space import on_axis
-from symtop.methods.splitting import splitting_space
+from symtop.methods.splitting import space
 from symtop.model.top import flat
 
 SCENES = ("spheroid", "grazing", "fast", "simo-wong", "kinon-betsch", "steady")
-SOLVERS = {row.name: solver for row in rows() for solver in filter(None, map(inside, row.solvers.values()))}
+SOLVERS = {row.name: solver for row in variants() for solver in filter(None, map(inside, row.solvers.values()))}
 
 
 def members(count=12, samples=5):
@@ -89,7 +88,7 @@ def test_a_member_that_fails_fails_alone():
 def test_functions_of_python_and_single_members_do_as_well():
     numbers, h, marks = members()
     strang = SOLVERS["strang[axis]"]
-    python = FixedStep(splitting_space.march_axis, strang.rule.__call__, on_axis, 1, implicit=False)
+    python = FixedStep(space.march_axis, strang.rule.__call__, on_axis, 1, implicit=False)
     assert python.in_python
     assert not strang.in_python
     for one, other in zip(python.many(numbers, h, marks), strang.many(numbers, h, marks), strict=True):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from symtop.methods.framework.lanes import W
-from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.lagrangian.discrete_lagrangian import discrete_lagrangian
 from symtop.methods.lagrangian.unreduced import built_in as unreduced
 from symtop.model.scenes import scene

@@ -9,7 +9,7 @@ import pytest
 import symtop
 from symtop.core.multiprecision import context
 from symtop.methods.runge_kutta.gauss import gauss_rule
-from symtop.methods.taylor import taylor
+from symtop.methods.taylor import heyoka
 
 pytest.importorskip("heyoka")
 SCENES = ("spheroid", "goldstein")
@@ -44,7 +44,7 @@ def coefficients():
 def numbers(name):
     """A start in quadruple precision, from scratch, in 60 digits."""
     scene = symtop.scene(name)
-    return str(taylor.start_numbers.__wrapped__("attitude", "quad", scene.top, scene.start))
+    return str(heyoka.start_numbers.__wrapped__("attitude", "quad", scene.top, scene.start))
 
 
 def disturbed(times):

@@ -11,17 +11,17 @@ import pytest
 import symtop
 from symtop.core.jit import compile_kernel
 from symtop.methods.framework import fixed_step, loop as loops
-from symtop.methods.framework.angles import reduced, require_chart
-from symtop.methods.framework.euler_lagrange import with_rates
+from symtop.methods.framework.angles import reduced, require_chart, with_rates
 from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.many import refused
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.space import on_attitude, on_axis, on_frame
 from symtop.methods.lagrangian.unreduced import with_momenta
-from symtop.methods.splitting import splitting_angles, splitting_space
-from symtop.methods.splitting.coefficients import METHODS, exact_sum
-from symtop.methods.splitting.splitting import composition
+from symtop.methods.splitting import angles, space
+from symtop.methods.splitting.coefficients import METHODS
+from symtop.methods.splitting.composition import composition
+from symtop.methods.splitting.loop import exact_sum
 from symtop.model.top import Angles, SymmetricTop, flat
 
 PREPARATIONS = [reduced, with_rates, with_momenta, on_axis, on_attitude, on_frame]
@@ -171,7 +171,7 @@ def test_functions_of_python_still_make_a_solver():
         seen.append(h)
         return strang.rule(top, start, h)
 
-    solver = FixedStep(splitting_space.march_axis, rule, on_axis, 1, implicit=False)
+    solver = FixedStep(space.march_axis, rule, on_axis, 1, implicit=False)
     plan = Plan.steps(0.01, [0, 10])
     np.testing.assert_array_equal(
         solver(scene.top, scene.start, plan).states, strang(scene.top, scene.start, plan).states
@@ -201,9 +201,9 @@ def test_a_tuned_drift_hangs_on_the_start():
     solver = entry.solvers["axis"]
     top, at = SymmetricTop(2.0, 1.0, 2.0), Angles(0.5, psi_dot=20.0)
     half = solver.rule(top, at, 0.1).drift[0]
-    assert half == 0.5 * 0.1 / 2.0 * splitting_space.tangent_scale(top, at, 0.1)
+    assert half == 0.5 * 0.1 / 2.0 * space.tangent_scale(top, at, 0.1)
     assert not math.isclose(half, 0.5 * 0.1 / 2.0, rel_tol=1e-6)
-    assert splitting_angles.march is not splitting_space.march_axis
+    assert angles.march is not space.march_axis
 
 
 def test_a_composition_travels_as_an_array_and_arrives_whole():

@@ -14,8 +14,8 @@ from symtop.measure.order import power_law
 from symtop.measure.step_map import one_step, return_miss, step_map, symplectic_defect
 from symtop.methods.framework.angles import reduced
 from symtop.methods.framework.plan import Plan
-from symtop.methods.splitting import reversible_steps
-from symtop.methods.splitting.reversible_steps import Reversible
+from symtop.methods.splitting import reversible
+from symtop.methods.splitting.reversible import Reversible
 from symtop.model import charts
 from symtop.model.effective import effective_force, effective_potential
 from symtop.model.scenes import closed_form, grazing
@@ -93,7 +93,7 @@ def test_samples_move_no_step_and_are_counted():
 def test_blocks_of_steps_join_without_a_seam(monkeypatch):
     scene = symtop.scene("grazing")
     whole = run(scene, 0.02, [50, 200])
-    monkeypatch.setattr(reversible_steps, "BLOCK", 7)
+    monkeypatch.setattr(reversible, "BLOCK", 7)
     parts = run(scene, 0.02, [50, 200])
     assert np.array_equal(whole.states, parts.states)
     assert whole.steps == parts.steps > 200
@@ -230,7 +230,7 @@ def test_runs_that_fail_say_how(monkeypatch):
     too_large = run(grazing(1e-3), 1.0, [0, 4])
     assert too_large.outcome == "not_finite"
     assert run(grazing(1e-3), 0.1, [0, 40]).outcome == "ok"
-    monkeypatch.setattr(reversible_steps, "STEPS", 50)
+    monkeypatch.setattr(reversible, "STEPS", 50)
     too_long = run(grazing(1e-6), 1.0 / 3.0, [0, 1, 6])
     assert too_long.outcome == "out_of_budget"
     for done in (onto_the_pole, too_large, too_long):

@@ -12,14 +12,14 @@ import symtop
 from symtop.measure.conservation import residuals, trend
 from symtop.measure.errors import errors_against
 from symtop.measure.growth import growth
-from symtop.methods.framework import formulations
-from symtop.methods.framework.euler_lagrange import field_angles, to_angles, with_rates
-from symtop.methods.framework.formulations import FORMULATIONS
-from symtop.methods.framework.outcomes import OK, OUTCOMES
+from symtop.methods.framework import equations
+from symtop.methods.framework.angles import field_angles, to_angles, with_rates
+from symtop.methods.framework.equations import FORMULATIONS
+from symtop.methods.framework.plan import OK, OUTCOMES
 from symtop.methods.framework.registry import integrator
 from symtop.methods.library.scipy_ivp import RightHandSide, compiled_field, scipy_method
 from symtop.methods.runge_kutta import dormand_prince
-from symtop.methods.runge_kutta.runge_kutta import LOOPS, Tableau, runge_kutta
+from symtop.methods.runge_kutta.explicit import LOOPS, Tableau, runge_kutta
 from symtop.model.scenes import closed_form
 from symtop.model.top import flat
 from symtop.run.simulation import make_plan
@@ -161,7 +161,7 @@ def test_both_languages_of_the_right_hand_side_compute_the_same(chart):
     plain = RightHandSide(FORMULATIONS[chart].field, par)
     np.testing.assert_allclose(compiled_field(chart)(*par, y), plain(0.0, y), rtol=0.0, atol=4e-15 * np.max(np.abs(y)))
     runs = [
-        symtop.simulate(scene, scipy_method("RK45", compiled=compiled).row(chart), tolerance=1e-7, horizon=4.0)
+        symtop.simulate(scene, scipy_method("RK45", compiled=compiled).variant(chart), tolerance=1e-7, horizon=4.0)
         for compiled in (False, True)
     ]
     assert runs[0].attrs["steps"] == runs[1].attrs["steps"]
@@ -255,14 +255,14 @@ def test_the_chart_tables_count_of_operations_is_that_of_the_formulas(monkeypatc
             return Counted(-float(self))
 
     scene = symtop.scene("spheroid")
-    monkeypatch.setattr("symtop.methods.framework.euler_lagrange.math", SimpleNamespace(
+    monkeypatch.setattr("symtop.methods.framework.angles.math", SimpleNamespace(
         sin=lambda x: Counted(math.sin(x)), cos=lambda x: Counted(math.cos(x)), nan=math.nan
     ))  # fmt: skip
     for chart, form in FORMULATIONS.items():
         par, state = form.prepare(scene.top, scene.start)
         Counted.total = 0
         form.field(type(par)(*map(Counted, par)), tuple(map(Counted, state)))
-        row = re.search(rf"^    {chart} +(\d) +(\d+) ", formulations.__doc__, re.MULTILINE)
+        row = re.search(rf"^    {chart} +(\d) +(\d+) ", equations.__doc__, re.MULTILINE)
         assert (int(row[1]), int(row[2])) == (len(state), Counted.total)
         assert form.ended(state) == OK
 
@@ -410,7 +410,7 @@ def test_taylor_in_three_precisions():
 
 def test_extended_precision_is_not_lost_on_the_way():
     hy = pytest.importorskip("heyoka")
-    from symtop.methods.taylor.taylor import propagate
+    from symtop.methods.taylor.heyoka import propagate
     from symtop.model.view import space_momenta
 
     scene = symtop.scene("spheroid")

@@ -12,10 +12,7 @@ import symtop
 from symtop.core.errors import SymtopError
 from symtop.core.simd import Components, Vectors
 from symtop.methods.framework.plan import Plan
-from symtop.methods.taylor.attitude_series import attitude_sum
-from symtop.methods.taylor.axis_series import axis_sum
-from symtop.methods.taylor.series import series
-from symtop.methods.taylor.series_steps import ORDERS, order_for
+from symtop.methods.taylor.series import ORDERS, attitude_sum, axis_sum, order_for, series
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import closed_form

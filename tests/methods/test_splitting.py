@@ -14,8 +14,8 @@ from symtop.measure.order import power_law
 from symtop.measure.step_map import one_step, symplectic_defect
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.preparation import Scaled
-from symtop.methods.splitting import coefficients as tables, splitting_space as space
-from symtop.methods.splitting.splitting import built_in, composition
+from symtop.methods.splitting import coefficients as tables, space
+from symtop.methods.splitting.composition import built_in, composition
 from symtop.model import charts
 from symtop.model.scenes import closed_form
 
@@ -151,7 +151,7 @@ def extended_error(table, scene, steps):
     """Error of the axis at t = 8 of a table, in 64 bits of mantissa, against the closed form in 40 digits."""
     from mpmath import mp, workdps
 
-    from symtop.methods.taylor.taylor import start_numbers
+    from symtop.methods.taylor.heyoka import start_numbers
     from symtop.model.exact.precise_form import PreciseForm
 
     wide = np.longdouble
@@ -174,7 +174,7 @@ def extended_error(table, scene, steps):
 
 
 def tables_rule(table):
-    from symtop.methods.splitting.splitting_loop import closed
+    from symtop.methods.splitting.loop import closed
 
     return closed(table.drift, table.kick, [0.0] * len(table.kick))
 

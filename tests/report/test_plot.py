@@ -94,9 +94,9 @@ def test_what_is_no_number_of_each_run_is_no_x_of_a_sweep(sweep, x):
 
 def test_one_integrator_or_scene_of_a_sweep_is_drawn(sweep):
     whole = {line.get_label(): line for line in symtop.plot(sweep, plt.figure().gca(), x="steps").get_lines()}
-    for part in (sweep.isel(integrator=0), sweep.isel(scene=1), sweep.isel(integrator=0, scene=1)):
+    for part in (sweep.isel(variant=0), sweep.isel(scene=1), sweep.isel(variant=0, scene=1)):
         lines = symtop.plot(part, plt.figure().gca(), x="steps").get_lines()
-        assert len(lines) == (2 if "scene" in part.dims else 1) * (2 if "integrator" in part.dims else 1)
+        assert len(lines) == (2 if "scene" in part.dims else 1) * (2 if "variant" in part.dims else 1)
         labels = [line.get_label() for line in lines]
         if "scene" not in part.dims:
             labels = [f"{label} on goldstein" for label in labels]

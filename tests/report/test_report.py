@@ -247,7 +247,7 @@ def test_pointing_at_a_run_shows_what_it_was(browser, results):
     browser.resize(1280, 900)
     tip = browser.evaluate(POINT % (0, 0))
     name, error = re.fullmatch(r"(\S+) \(\S+\): .*error (\S+)", tip).groups()
-    cell = xr.load_dataset(results / "work_precision.nc").sel(scene="spheroid", integrator=name).isel(horizon=0)
+    cell = xr.load_dataset(results / "work_precision.nc").sel(scene="spheroid", variant=name).isel(horizon=0)
     assert any(f"{value:.1e}" == error for value in cell["axis"].values)
     assert browser.evaluate(POINT % (0, 100_000)) == ""  # far from every run: nothing
 

@@ -78,7 +78,7 @@ def test_every_method_runs_and_every_member_is_the_run_of_simulate():
     few = SOME.isel(member=slice(0, 5))
     for method in symtop.integrators().values():
         for chart in method.charts():
-            row = method.row(chart)
+            row = method.variant(chart)
             setting = {"tolerance": max(1e-6, row.least_tolerance)} if row.adaptive else {}
             asked = {"per_nutation": 30} if row.fixed_step else setting
             data = symtop.ensemble(few, row, nutations=1.3, samples=11, quiet=True, **asked)
@@ -103,7 +103,7 @@ def test_threads_and_pieces_change_nothing(monkeypatch):
 def test_pieces_are_shares_of_the_work_and_whole_blocks(n, steps, most):
     """What is worth more than a millisecond is shared evenly; a few short runs stay in one piece."""
     counts = None if steps is None else np.broadcast_to(steps, n)
-    method = symtop.integrator("strang" if steps is not None else "rk45-compiled").row("axis")
+    method = symtop.integrator("strang" if steps is not None else "rk45-compiled").variant("axis")
     job = chunks.Job(method, "axis", np.zeros((n, 9)), np.ones(n), counts, None, 11, None, ("axis",))
     cut = list(job.pieces())
     assert [piece.start for piece in cut] == [0, *(piece.stop for piece in cut[:-1])]

@@ -34,7 +34,7 @@ def test_the_energy_is_that_of_simulate_whether_or_not_the_momenta_are_kept(name
     steps, h = 3000, 0.002
     data = long_run(WHERE, name, steps=steps, step_size=h, quiet=True)
     chart = chart_of(symtop.integrator(name))[0]
-    row = symtop.integrator(name).row(chart)
+    row = symtop.integrator(name).variant(chart)
     dense = symtop.simulate(WHERE, row, step_size=h, horizon=steps * h, samples=steps + 1, guard=False)
     change = (dense["energy"] - dense["energy"][0]).values / WHERE.energy_scale
     seen = max(abs(float(data["energy_least"].min())), abs(float(data["energy_largest"].max())))

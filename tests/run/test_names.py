@@ -110,9 +110,9 @@ def test_a_chart_is_chosen_by_what_it_shows_and_a_row_has_one():
     strang = symtop.integrator("strang")
     assert [strang.chart_for(what) for what in ("nutation", "axis", "attitude")] == ["axis", "axis", "attitude"]
     assert strang.chart_for("axis", among=["attitude"]) == "attitude"
-    assert strang.row("attitude").charts() == ("attitude",)
+    assert strang.variant("attitude").charts() == ("attitude",)
     with pytest.raises(symtop.SymtopError, match="cannot show the attitude"):
-        strang.row("axis").chart_for("attitude")
+        strang.variant("axis").chart_for("attitude")
 
 
 def test_a_row_is_a_method_in_one_chart_and_every_table_can_name_it():
@@ -123,17 +123,17 @@ def test_a_row_is_a_method_in_one_chart_and_every_table_can_name_it():
     change = {name: float(abs(run["p_phi"] - run["p_phi"][0]).max()) for name, run in runs.items()}
     assert change["rk4[angles]"] > 1e-6  # the loss is the chart's and not the method's:
     assert change["rk4[axis]"] < 1e-13
-    assert on_axis.row("axis") is on_axis
-    names = [row.name for row in registry.rows()]
+    assert on_axis.variant("axis") is on_axis
+    names = [row.name for row in registry.variants()]
     assert len(names) == len(set(names)) == sum(len(entry.charts()) for entry in registry.methods().values())
-    assert {row.charts()[0] for row in registry.rows("attitude")} == {"angles", "attitude"}
+    assert {row.charts()[0] for row in registry.variants("attitude")} == {"angles", "attitude"}
 
 
 @pytest.mark.parametrize("name", ["strang[angles]", "rk4[nutation]", "rk5[axis]", "[axis]"])
 def test_a_row_that_does_not_exist_is_refused(name):
     with pytest.raises(symtop.SymtopError, match=r"is unknown; (known|did you mean)"):
         symtop.integrator(name)
-    with pytest.raises(symtop.SymtopError, match="one of its rows"):
+    with pytest.raises(symtop.SymtopError, match="one of its variants"):
         symtop.register(symtop.integrator("rk4[axis]"))
     with pytest.raises(symtop.SymtopError, match="needs one solver"):
         dataclasses.replace(symtop.integrator("strang"), name="strang[axis]")

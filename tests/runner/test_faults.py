@@ -384,10 +384,10 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
         assert len(found) == 2, err
         assert all(said in line for line in found), found
     data = netcdf.read(results / "probe.nc")
-    assert list(data["outcome"].sel(integrator="bad-nan").values) == ["not_finite", "not_finite"]
-    good = data.drop_sel(integrator="bad-nan")
+    assert list(data["outcome"].sel(variant="bad-nan").values) == ["not_finite", "not_finite"]
+    good = data.drop_sel(variant="bad-nan")
     assert set(good["outcome"].values.ravel()) == {"ok"}
-    assert good.sizes["integrator"] == 6
+    assert good.sizes["variant"] == 6
     records = [json.loads(path.read_text()) for path in results.rglob("*.failed.json")]
     assert len(records) == 10
     assert any("raise RuntimeError" in line for r in records for line in r["traceback"])

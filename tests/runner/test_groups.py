@@ -26,9 +26,9 @@ def test_a_group_covers_its_own_scenes_and_integrators_and_names_may_meet():
     data = tree()
     assert isinstance(data, xr.DataTree)
     assert not data.to_dataset().variables
-    assert dict(data["windows"].sizes) == {"scene": 2, "integrator": 1, "window": 3}
-    assert dict(data["phases"].sizes) == {"scene": 1, "integrator": 1, "sample": 4}
-    short = data["windows/energy"].sel(scene="goldstein", integrator="midpoint").values
+    assert dict(data["windows"].sizes) == {"scene": 2, "variant": 1, "window": 3}
+    assert dict(data["phases"].sizes) == {"scene": 1, "variant": 1, "sample": 4}
+    short = data["windows/energy"].sel(scene="goldstein", variant="midpoint").values
     np.testing.assert_array_equal(short, [4.0, np.nan, np.nan])
 
 

@@ -34,6 +34,6 @@ def test_a_plugins_method_and_scene_are_in_every_study(studies, plugin, tmp_path
     for study in studies:
         data = netcdf.groups(netcdf.read_any(tmp_path / "quick" / "only" / f"{study}.nc")).values()
         groups = [group for group in data if group.variables]
-        methods = {split_name(str(row))[0] for group in groups for row in group["integrator"].values}
+        methods = {split_name(str(row))[0] for group in groups for row in group["variant"].values}
         assert {"simpson-of-a-user", "strang"} <= methods, study
         assert any("mine" in group["scene"].values for group in groups), study

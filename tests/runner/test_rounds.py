@@ -28,11 +28,11 @@ def measure(case):
     if not case.timed:
         return xr.Dataset({"steps": float(len(case.integrator))})
     names, near = case.settings["integrators"], case.settings["effect"].near
-    later = {"later": ("integrator", [near] * len(names)), "process": ("integrator", [os.getpid()] * len(names))}
-    return xr.Dataset(later, coords={"integrator": names})
+    later = {"later": ("variant", [near] * len(names)), "process": ("variant", [os.getpid()] * len(names))}
+    return xr.Dataset(later, coords={"variant": names})
 
 def follow_up(data):
-    names = [str(name) for name in data["integrator"].values]
+    names = [str(name) for name in data["variant"].values]
     return [Case("spheroid", "together", {"integrators": names, "effect": PoleEffect(2.0, True, 0.1)}, timed=True)]
 
 STUDY = Study("rounds", "Rounds", "Both?", "", cases, measure, lambda data: [], lambda data: ["It ran."],

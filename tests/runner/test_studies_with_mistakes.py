@@ -157,7 +157,7 @@ def test_what_python_raises_is_kept_as_the_cause(tmp_path):
     with pytest.raises(SymtopError, match="verdict failed: ZeroDivisionError") as caught:
         runner.run(runner.load(str(script)), tmp_path / "results", jobs=1, quiet=True)
     assert isinstance(caught.value.__cause__, ZeroDivisionError)
-    assert xr.open_dataset(tmp_path / "results" / "mine.nc").sizes["integrator"] == 2
+    assert xr.open_dataset(tmp_path / "results" / "mine.nc").sizes["variant"] == 2
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ def measured(path: Path) -> list[xr.Dataset]:
 def test_every_study_leaves_a_dataset_figures_and_findings(quick_results):
     for name in runner.names():
         for data in measured(quick_results / f"{name}.nc"):
-            assert {"scene", "integrator"} <= set(data.dims)
+            assert {"scene", "variant"} <= set(data.dims)
             assert not {"method", "tolerance"} & set(data.dims)
         findings = json.loads((quick_results / f"{name}.json").read_text())
         assert findings["verdict"]
@@ -137,12 +137,12 @@ STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "
         ("methods/framework/newton.py", STRAIGHT | {"galerkin-simpson"}),
         ("methods/library/scipy_ivp.py", SCIPY),
         ("methods/runge_kutta/dormand_prince.py", {"rk45-compiled"}),
-        ("methods/runge_kutta/runge_kutta.py", {"rk4", "rk45-compiled"}),
-        ("methods/framework/formulations.py", {"rk4", "rk45-compiled"} | SCIPY),
-        ("methods/framework/euler_lagrange.py", {"rk4", "rk45-compiled"} | SCIPY),
+        ("methods/runge_kutta/explicit.py", {"rk4", "rk45-compiled"}),
+        ("methods/framework/equations.py", {"rk4", "rk45-compiled"} | SCIPY),
+        ("methods/framework/angles.py", {"rk4", "rk45-compiled"} | SCIPY),
         ("methods/library/exact.py", {"exact"}),
-        ("methods/splitting/splitting_loop.py", SPLITTING),
-        ("methods/taylor/taylor.py", {"taylor", "taylor-longdouble", "taylor-quad"}),
+        ("methods/splitting/loop.py", SPLITTING),
+        ("methods/taylor/heyoka.py", {"taylor", "taylor-longdouble", "taylor-quad"}),
         ("cli/main.py", set()),
         ("report/figures.py", set()),
         ("measure/accuracy.py", set()),
@@ -172,7 +172,7 @@ def test_what_all_cases_depend_on_makes_all_stale():
     convergence = runner.load("convergence")
     for edited in ("model/top.py", "model/scenes.py", "run/simulation.py", "methods/framework/registry.py"):
         assert stale_after(edited, of_everyone()) == set(symtop.integrators()), edited
-    for edited in ("run/reference/truth.py", "methods/taylor/taylor.py", "measure/accuracy.py"):
+    for edited in ("run/reference/truth.py", "methods/taylor/heyoka.py", "measure/accuracy.py"):
         assert stale_after(edited, convergence) == {case.integrator for case in convergence.cases(True)}, edited
 
 
@@ -427,7 +427,7 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
     assert found["failures"] == [
         "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
     ]
-    assert list(netcdf.read(tmp_path / "stability.nc")["integrator"].values) == ["midpoint[angles]"]
+    assert list(netcdf.read(tmp_path / "stability.nc")["variant"].values) == ["midpoint[angles]"]
     assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten
 
 

@@ -22,21 +22,21 @@ def data():
 
 
 def test_each_entry_is_that_of_one_run(data):
-    assert dict(data.sizes) == {"scene": 2, "integrator": 4, "setting": 3}
+    assert dict(data.sizes) == {"scene": 2, "variant": 4, "setting": 3}
     for scene in ("spheroid", "goldstein"):
         row = error_row(symtop.scene(scene), symtop.integrator("strang"), 0.01, 2.0)
-        cell = data.sel(scene=scene, integrator="strang").isel(setting=1)
+        cell = data.sel(scene=scene, variant="strang").isel(setting=1)
         for name in ("axis", "attitude_end", "energy_bound", "force_evaluations", "step_size", "outcome"):
             assert cell[name].values == row[name]
 
 
 def test_settings_belong_to_those_who_have_them(data):
-    adaptive, formula = (data.sel(integrator=name, scene="spheroid") for name in ("rk45-compiled", "exact"))
+    adaptive, formula = (data.sel(variant=name, scene="spheroid") for name in ("rk45-compiled", "exact"))
     assert adaptive["outcome"].values.tolist() == ["ok", "ok", "not_run"]
     assert adaptive["tolerance"].values[:2].tolist() == [1e-4, 1e-6]
     assert np.isnan(adaptive["step_size"].values[:2]).all()
     assert formula["outcome"].values.tolist() == ["ok", "not_run", "not_run"]
-    slope = np.diff(np.log(data.sel(integrator="rk4[axis]", scene="spheroid")["axis"].values)) / math.log(0.5)
+    slope = np.diff(np.log(data.sel(variant="rk4[axis]", scene="spheroid")["axis"].values)) / math.log(0.5)
     assert slope == pytest.approx([4.0, 4.0], abs=0.3)
     assert data["axis"].attrs["long_name"] == "angle between axes (rad), largest over the run"
 
@@ -115,7 +115,7 @@ def test_a_file_with_other_cells_is_refused_and_left_as_it_is(tmp_path, monkeypa
     more = symtop.sweep(["goldstein", "spheroid"], ["midpoint", "strang", "rk4[axis]"], path=file, **asked)
     xr.testing.assert_identical(netcdf.read(file).drop_attrs(), more.drop_attrs())
     for name in ("strang", "rk4[axis]"):
-        one = {"scene": "spheroid", "integrator": name}
+        one = {"scene": "spheroid", "variant": name}
         assert more["axis"].sel(one).values == turned["axis"].sel(one).values
 
 
@@ -138,8 +138,8 @@ def test_a_cell_that_raised_is_tried_again_and_one_that_ended_early_is_not(tmp_p
     ):
         asked = {"step_size": [1.0, 0.02], "path": file, "threads": 1, "quiet": True}
         data = symtop.sweep("spheroid", ["stormer-verlet", method], **asked)
-        assert data["outcome"].sel(integrator="moody").values[0].tolist() == outcomes
-        assert data["outcome"].sel(integrator="stormer-verlet").values[0].tolist() == ["left_chart", "ok"]
+        assert data["outcome"].sel(variant="moody").values[0].tolist() == outcomes
+        assert data["outcome"].sel(variant="stormer-verlet").values[0].tolist() == ["left_chart", "ok"]
         assert ran == again
         ran.clear()
         xr.testing.assert_identical(netcdf.read(file).drop_attrs(), data.drop_attrs())
@@ -186,7 +186,7 @@ def test_everything_can_be_drawn_on_given_axes(data):
     _, ax = plt.subplots()
     assert symtop.plot(data, ax) is ax
     assert ax.get_xlabel() == "force evaluations"  # steps and tolerances share no axis
-    assert symtop.plot(data.sel(integrator=["strang"]), quantity="energy").get_xlabel() == "step size"
+    assert symtop.plot(data.sel(variant=["strang"]), quantity="energy").get_xlabel() == "step size"
     run = symtop.simulate("spheroid", "strang", step_size=0.01)
     drawn = symtop.plot(run).get_lines()[0].get_ydata()
     assert drawn == pytest.approx(symtop.errors(run)["axis"].values[1:])
@@ -203,7 +203,7 @@ def test_everything_can_be_drawn_on_given_axes(data):
 
 
 def test_the_chart_of_each_run_is_said(data):
-    assert data["chart"].sel(scene="spheroid", integrator="rk4[axis]").item() == "axis"
+    assert data["chart"].sel(scene="spheroid", variant="rk4[axis]").item() == "axis"
     charts = symtop.sweep(["spheroid", "grazing"], ["rk4", "strang"], step_size=0.01, horizon=0.5, quiet=True)["chart"]
     for (scene, name), chart in zip([(s, n) for s in ("spheroid", "grazing") for n in ("rk4", "strang")],
                                     charts.values.ravel(), strict=True):  # fmt: skip

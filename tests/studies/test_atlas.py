@@ -258,7 +258,7 @@ def test_the_caption_of_a_page_names_the_methods_without_a_limit():
     for limit, said in ((math.nan, True), (0.3, False)):
         data = hand_made([[A, B, B]] * 4)
         for variable, value in ((Column.LINEAR_LIMIT, limit), (Column.THIRD_TURN, 0.55)):
-            data[variable] = (("scene", "integrator", "curve"), [[[value, value]]])
+            data[variable] = (("scene", "variant", "curve"), [[[value, value]]])
         caption = atlas_words.caption(data, "cusp", ["midpoint"])
         text = "With midpoint small nutations grow at no spin at any of 48 steps tried up to 1 nutation periods"
         assert (text in caption) is said
@@ -337,7 +337,7 @@ def test_a_threshold_holds_at_every_larger_step_and_says_in_how_many_starts():
 
 
 def test_the_two_charts_of_a_method_are_compared_and_one_alone_is_not():
-    cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", integrator="midpoint", drop=True))
+    cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", variant="midpoint", drop=True))
              for name, rows in (("rk4[angles]", [[A, L, L]] * 4), ("rk4[axis]", [[A, A, L]] * 4))]  # fmt: skip
     said = " ".join(atlas_words.summary(store.combine(cells), "cusp"))
     assert "matters most for rk4: accurate in 33% with rk4[angles] and 67% with rk4[axis] of the map of cusp" in said
@@ -351,7 +351,7 @@ def test_the_two_charts_of_a_method_are_compared_and_one_alone_is_not():
 
 def test_rows_that_reach_less_than_the_smallest_step_are_the_least_and_are_counted():
     """On slow tops (the first two rows of a map) one of two methods is inaccurate at the smallest step already."""
-    cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", integrator="midpoint", drop=True))
+    cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", variant="midpoint", drop=True))
              for name, rows in (("rk4[axis]", [[B, B, B]] * 2 + [[A, A, B]] * 2), ("strang[axis]", [[A, A, B]] * 4),
                                 ("gauss-2[axis]", [[A, B, B]] * 4))]  # fmt: skip
     said = atlas_words.summary(store.combine(cells), "cusp")[0]
@@ -360,13 +360,13 @@ def test_rows_that_reach_less_than_the_smallest_step_are_the_least_and_are_count
     never = store.combine([(Case("cusp", "rk4[axis]"), cells[0][1].isel(parameter=[0, 0, 1, 1]))])
     assert "is from below 0.01 (rk4[axis]) on slow tops" in atlas_words.summary(never, "cusp")[0]
     without = store.combine([*cells, (Case("cusp", "rk45[axis]"), hand_made([[A, B, B]] * 4, knob_name="tolerance").sel(
-        scene="cusp", integrator="midpoint", drop=True))])  # fmt: skip
+        scene="cusp", variant="midpoint", drop=True))])  # fmt: skip
     assert said.endswith("in nutation periods.")
     assert atlas_words.summary(without, "cusp")[0].endswith("Not counted: 1 row without a fixed step.")
 
 
 def test_a_row_without_an_inaccurate_run_has_no_share_of_them():
-    cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", integrator="midpoint", drop=True))
+    cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", variant="midpoint", drop=True))
              for name, rows in (("rk4[axis]", [[A, B, L]] * 4), ("strang[axis]", [[A, A, A]] * 4))]  # fmt: skip
     assert math.isnan(atlas.maps(store.combine(cells), "cusp")["strang[axis]"].silent)
     assert "With the median row 50% of inaccurate runs end" in atlas_words.summary(store.combine(cells), "cusp")[-1]
@@ -399,7 +399,7 @@ def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
     netcdf.write(data, symtop_file)
     again = netcdf.read(symtop_file)
     assert again["outcome"].dtype == np.uint8
-    assert (again["outcome"].sel(integrator="strang").values[0, 2] == NOT_RUN).all()
+    assert (again["outcome"].sel(variant="strang").values[0, 2] == NOT_RUN).all()
     shapes = {name: one.outcome.shape for name, one in atlas.maps(again, "grazing").items()}
     assert shapes == {"strang": (2, 2), "midpoint": (3, 3)}
 
@@ -423,7 +423,7 @@ def test_maps_can_be_read_without_colours(size):
 def two_maps():
     """A dataset of a method with steps and one with tolerances, the first accurate more often."""
     step, tolerance = hand_made([[A, A, B]] * 4), hand_made([[A, L, L]] * 4, knob_name="tolerance")
-    cells = [(Case("cusp", name), one.sel(scene="cusp", integrator="midpoint", drop=True))
+    cells = [(Case("cusp", name), one.sel(scene="cusp", variant="midpoint", drop=True))
              for name, one in (("rk4[axis]", step), ("strang[axis]", hand_made([[A, B, B]] * 4)),
                                ("rk45[axis]", tolerance))]  # fmt: skip
     return store.combine(cells)
@@ -445,16 +445,14 @@ def test_the_enlarged_map_is_that_of_a_familiar_row_and_names_its_regions():
     figure = next(figures.pictures(data)).figure
     assert figure.get_suptitle() == "rk4[axis] is accurate in 67% of the map of cusp"
     assert {text.get_text() for text in figure.axes[0].texts} == {"accurate", "bounded but wrong"}
-    renamed = data.assign_coords(integrator=["rk4[axis]", figures.FAMILIAR, "rk45[axis]"])
+    renamed = data.assign_coords(variant=["rk4[axis]", figures.FAMILIAR, "rk45[axis]"])
     assert next(figures.pictures(renamed)).figure.get_suptitle().startswith(figures.FAMILIAR)
 
 
 def test_the_message_of_a_mechanism_follows_from_its_numbers():
     def said(once, every):
-        columns = {Column.ENERGY_ONCE: ("integrator", once), Column.ENERGY_EVERY: ("integrator", every)}
-        return messages.of_mechanism(
-            "sampling", xr.Dataset(columns, coords={"integrator": ["rk4[axis]", "strang[axis]"]})
-        )
+        columns = {Column.ENERGY_ONCE: ("variant", once), Column.ENERGY_EVERY: ("variant", every)}
+        return messages.of_mechanism("sampling", xr.Dataset(columns, coords={"variant": ["rk4[axis]", "strang[axis]"]}))
 
     assert "up to 1000 times too small (rk4[axis])" in said([1e-7, 1e-6], [1e-4, 1e-6])
     assert "not seen" not in said([1e-7, 1e-6], [1e-4, 1e-6])
@@ -462,19 +460,19 @@ def test_the_message_of_a_mechanism_follows_from_its_numbers():
 
 
 def test_the_message_of_the_sleeping_top_says_where_the_threshold_goes_not_how_far():
-    columns = {Column.SLEEPING_THRESHOLD: (("integrator", "rung"), [[2.0, 1.92], [2.01, 2.24], [2.0, 2.0]])}
+    columns = {Column.SLEEPING_THRESHOLD: (("variant", "rung"), [[2.0, 1.92], [2.01, 2.24], [2.0, 2.0]])}
     names = ["strang[axis]", "cayley[axis]", "midpoint[angles]"]
-    said = messages.of_mechanism("sleeping", xr.Dataset(columns, coords={"integrator": names}))
+    said = messages.of_mechanism("sleeping", xr.Dataset(columns, coords={"variant": names}))
     assert "from 2 to 2.24 with cayley[axis], 1.92 with strang[axis]; 1 methods keep it" in said
 
 
 def test_the_message_of_the_pole_is_that_of_the_step_drawn():
     gaps, broken = [1e-6, 1e-5, 0.2], [math.nan, math.nan, 1e-3]
     columns = {
-        Column.PARAMETER: (("integrator", "parameter"), [gaps, gaps]),
-        Column.GRAZING_ERROR: (("integrator", "parameter"), [broken, [2e-4, 2e-4, 1e-4]]),
+        Column.PARAMETER: (("variant", "parameter"), [gaps, gaps]),
+        Column.GRAZING_ERROR: (("variant", "parameter"), [broken, [2e-4, 2e-4, 1e-4]]),
     }
-    part = xr.Dataset(columns, coords={"integrator": ["stormer-verlet[angles]", "strang[axis]"]})
+    part = xr.Dataset(columns, coords={"variant": ["stormer-verlet[angles]", "strang[axis]"]})
     said = messages.of_mechanism("pole", part)
     assert said.startswith("At one step 1 of 1 fixed-step methods in angles end early within 0.0001 rad of a pole")
     assert said.endswith("the 1 in other charts have errors that differ at most 2 times between all gaps")
@@ -484,11 +482,11 @@ def test_the_message_of_the_pole_is_that_of_the_step_drawn():
 
 def test_the_runs_that_outlast_the_law_of_the_separatrix_are_named_and_not_counted():
     columns = {
-        Column.EARLY_ERROR: (("integrator", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
-        Column.PREDICTED_HORIZON: (("integrator", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
-        Column.HORIZON: (("integrator", "setting"), [[29.5, 38.4], [72.0, 71.0]]),
+        Column.EARLY_ERROR: (("variant", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
+        Column.PREDICTED_HORIZON: (("variant", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
+        Column.HORIZON: (("variant", "setting"), [[29.5, 38.4], [72.0, 71.0]]),
     }
-    part = xr.Dataset(columns, coords={"integrator": ["rk4[axis]", "gauss-4[axis]"]})
+    part = xr.Dataset(columns, coords={"variant": ["rk4[axis]", "gauss-4[axis]"]})
     assert words.outlasting(part) == ["gauss-4[axis]"]
     assert words.misses(part) == pytest.approx([0.5, 0.2])
     assert messages.of_mechanism("separatrix", part).endswith("to 0.35/λ in the median; 1 method lasts longer")
@@ -496,7 +494,7 @@ def test_the_runs_that_outlast_the_law_of_the_separatrix_are_named_and_not_count
     assert "more run" not in words.horizons(part)
     part[Column.HORIZON][0, 1] = math.nan  # it never reaches the error of which the law speaks
     assert "1 more run (rk4[axis]) never did." in words.horizons(part)
-    part[Column.BROKEN] = ("integrator", "setting"), [[0.0, 1.0], [0.0, 0.0]]
+    part[Column.BROKEN] = ("variant", "setting"), [[0.0, 1.0], [0.0, 0.0]]
     assert "predicts when 1 runs reach" in words.horizons(part)
     assert "1 more run (rk4[axis]) ended before." in words.horizons(part)
     assert "; 1 method lasts longer, 1 run never got there" in messages.of_mechanism("separatrix", part)
@@ -539,7 +537,7 @@ def tolerances(*ladders):
     cells = []
     for name, ladder in zip(names, ladders, strict=False):
         cell = hand_made([[A if value < 2e-4 else B for value in ladder]] * 4, ladder, knob_name="tolerance")
-        cells.append((Case("cusp", name), cell.sel(scene="cusp", integrator="midpoint", drop=True)))
+        cells.append((Case("cusp", name), cell.sel(scene="cusp", variant="midpoint", drop=True)))
     return store.combine(cells)
 
 
@@ -575,8 +573,8 @@ def test_the_share_of_a_coarse_map_is_seen_beside_that_of_a_fine_one():
 
 
 def test_rows_that_are_accurate_everywhere_share_a_panel():
-    right = hand_made([[A, A, A]] * 4).sel(scene="cusp", integrator="midpoint", drop=True)
-    wrong = hand_made([[A, B, B]] * 4).sel(scene="cusp", integrator="midpoint", drop=True)
+    right = hand_made([[A, A, A]] * 4).sel(scene="cusp", variant="midpoint", drop=True)
+    wrong = hand_made([[A, B, B]] * 4).sel(scene="cusp", variant="midpoint", drop=True)
     names = ["yoshida-4[axis]", "suzuki-4[axis]", "strang[axis]", "rk4[axis]"]
     data = store.combine([(Case("cusp", name), wrong if name == "rk4[axis]" else right) for name in names])
     drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-steps"]
@@ -590,7 +588,7 @@ def test_the_page_of_the_pole_tells_charts_apart_and_names_an_exception():
             "stormer-verlet-reversible[angles]": [0, 0, 1]}  # fmt: skip
     axes = np.array([1e-6, 0.3]), np.array([0.001, 0.01, 0.1]), "step_size"
     shown = {name: atlas.OutcomeMap(np.array([row] * 2), *axes, np.full((2, 3), True)) for name, row in rows.items()}
-    data = xr.Dataset(coords={"integrator": list(rows)})
+    data = xr.Dataset(coords={"variant": list(rows)})
     assert atlas_words.page_message(data, "grazing", shown) == (
         "Past a pole methods on the axis are accurate in 67% to 100% of their maps, methods in angles in 33%, but for "
         "stormer-verlet-reversible (67%)"

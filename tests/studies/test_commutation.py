@@ -127,9 +127,9 @@ def test_an_unreduced_form_steps_the_same_rule_whatever_it_is_called(monkeypatch
 
 @pytest.mark.parametrize(("gap", "judged"), [(2e-13, "nothing but rounding"), (3e-4, "more than rounding")])
 def test_the_title_of_the_twins_says_which_order_and_whether_the_difference_is_rounding(gap, judged):
-    gaps = {name: (("scene", "integrator", "sample"), [[[0.0, value]]]) for name, value in
+    gaps = {name: (("scene", "variant", "sample"), [[[0.0, value]]]) for name, value in
             ((Column.THETA_GAP, 1e-15), (Column.PHI_GAP, gap), (Column.PSI_GAP, 1e-14))}  # fmt: skip
-    data = xr.Dataset(gaps, coords={"scene": ["spheroid"], "integrator": ["midpoint"]})
+    data = xr.Dataset(gaps, coords={"scene": ["spheroid"], "variant": ["midpoint"]})
     said = words.unreduced_message(data, ["midpoint"])
     assert f"after discretising changes {judged}: midpoint with and without it" in said
     assert said.endswith(f"{number(gap)} rad")
@@ -155,11 +155,11 @@ def test_what_a_larger_chart_costs_is_said_by_its_ends_and_listed_by_family(monk
 
 def timed_pair(time, iterations):
     """One rule on one scene at two steps: nanoseconds and iterations a step, reduced and unreduced."""
-    dims = ("scene", "integrator", "kernel", "twin_step")
+    dims = ("scene", "variant", "kernel", "twin_step")
     return xr.Dataset(
         {Column.SECONDS_A_STEP: (dims, [[np.array(time) * 1e-9]]), Column.ITERATIONS_A_STEP: (dims, [[iterations]]),
-         Column.COMPARED_STEP: (("scene", "integrator", "twin_step"), [[[0.1, 0.01]]])},
-        coords={"scene": ["spheroid"], "integrator": ["midpoint"], "kernel": ["reduced", "unreduced"]},
+         Column.COMPARED_STEP: (("scene", "variant", "twin_step"), [[[0.1, 0.01]]])},
+        coords={"scene": ["spheroid"], "variant": ["midpoint"], "kernel": ["reduced", "unreduced"]},
     )  # fmt: skip
 
 
@@ -175,7 +175,7 @@ def test_what_a_reduced_kernel_saves_is_told_by_iterations_and_by_the_time_of_on
     assert "each takes 2.00 to 3.00 times as long" in dearer
     (pair, _) = words.savings(timed_pair([[100.0, 100.0], [200.0, 300.0]], [[2.0, 1.5], [3.0, 4.5]]))
     assert (pair.time, pair.more, pair.each) == pytest.approx((2.0, 1.5, 4.0 / 3.0))
-    assert words.cheaper(xr.Dataset(coords={"scene": ["spheroid"], "integrator": ["midpoint"]})) == ""
+    assert words.cheaper(xr.Dataset(coords={"scene": ["spheroid"], "variant": ["midpoint"]})) == ""
 
 
 def test_the_title_of_the_charts_counts_comparisons_and_not_methods():
@@ -191,8 +191,8 @@ def test_the_title_of_the_charts_counts_comparisons_and_not_methods():
 def test_the_distance_of_a_kernel_from_its_unreduced_form_is_held_against_rounding(gap, judged):
     columns = dict.fromkeys((Column.THETA_GAP, Column.PSI_GAP, Column.P_PHI_DRIFT, Column.P_PSI_DRIFT), 1e-15)
     columns |= {Column.PHI_GAP: gap}
-    data = xr.Dataset({name: (("scene", "integrator", "sample"), [[[0.0, value]]]) for name, value in columns.items()},
-                      coords={"scene": ["spheroid"], "integrator": ["midpoint"]})  # fmt: skip
+    data = xr.Dataset({name: (("scene", "variant", "sample"), [[[0.0, value]]]) for name, value in columns.items()},
+                      coords={"scene": ["spheroid"], "variant": ["midpoint"]})  # fmt: skip
     said = words.same_map(data)
     assert f"differ by up to {gap:.1e} rad in 10000 steps, {judged} the 1e-11 rad that rounding may reach." in said
     assert said.endswith("change by up to 1.0e-15, relative.")

@@ -12,7 +12,7 @@ import symtop
 from symtop.judging.claims_order import measured_order
 from symtop.judging.findings import CLAIMS
 from symtop.measure.order import BESIDE, order_verdict
-from symtop.methods.framework.registry import integrator, methods, rows, split_name
+from symtop.methods.framework.registry import integrator, methods, split_name, variants
 from symtop.report import style
 from symtop.runner import store
 from symtop.runner.study import Case
@@ -34,14 +34,14 @@ def data():
 def test_every_chart_of_every_method_is_a_row_and_a_formula_is_none():
     names = {case.integrator for case in study.cases(False)}
     with_order = {name for name, one in methods().items() if one.control and not one.exact_steps}
-    assert names == {row.name for row in rows() if row.control is not None and not row.exact_steps}
+    assert names == {row.name for row in variants() if row.control is not None and not row.exact_steps}
     assert {split_name(name)[0] for name in names} == with_order
     assert not any(split_name(name)[0] == "exact" for name in names)
 
 
 def test_every_row_shows_the_axis_and_the_attitude_where_its_chart_does(data):
     for name in ROWS:
-        cell = data.sel(scene="goldstein", integrator=name)
+        cell = data.sel(scene="goldstein", variant=name)
         assert np.isfinite(cell["axis"]).any()
         assert bool(np.isfinite(cell["attitude"]).any()) is (split_name(name)[1] != "axis")
 
@@ -132,7 +132,7 @@ def test_the_energy_over_time_is_that_of_the_run_that_it_names():
 
 def test_the_work_of_an_error_constant_is_the_work_of_a_run_with_that_error(data):
     """error = C h^p: a target that some run met costs what that run cost; four times less error, twice the work."""
-    cell = data.sel(scene="goldstein", integrator="stormer-verlet[angles]")
+    cell = data.sel(scene="goldstein", variant="stormer-verlet[angles]")
     fit = tables.fits(data, "axis")["goldstein", "stormer-verlet[angles]"]
     k = np.flatnonzero(fit.used)[-1]
     error, work = float(cell["axis"][k]), float(tables.evaluations_a_nutation(cell, "goldstein")[k])
@@ -146,7 +146,7 @@ def test_the_work_of_an_error_constant_is_the_work_of_a_run_with_that_error(data
 
 
 def test_work_is_counted_per_nutation(data):
-    cell = data.sel(scene="goldstein", integrator="stormer-verlet[angles]")
+    cell = data.sel(scene="goldstein", variant="stormer-verlet[angles]")
     work = tables.evaluations_a_nutation(cell, "goldstein")
     period = symtop.scene("goldstein").nutation_period
     good = np.isfinite(work)

@@ -25,12 +25,12 @@ def histories():
     both |= {"nutations": np.full((5, 2), 100.0), "steps_a_nutation": np.full((5, 2), 118.0)}
     both |= {"tolerance": np.full((5, 2), np.nan), "own_tolerance": np.zeros((5, 2))}
     data = xr.Dataset(
-        {key: (("integrator", "scene"), values) for key, values in both.items()},
-        coords={"integrator": NAMES, "scene": ["spheroid", "goldstein"]},
+        {key: (("variant", "scene"), values) for key, values in both.items()},
+        coords={"variant": NAMES, "scene": ["spheroid", "goldstein"]},
     )
     times = np.broadcast_to(np.linspace(0.0, 1.0, 3), (5, 2, 3))
     return data.assign(
-        outcome=(("integrator", "scene"), np.full((5, 2), "ok")), sample_time=(("integrator", "scene", "sample"), times)
+        outcome=(("variant", "scene"), np.full((5, 2), "ok")), sample_time=(("variant", "scene", "sample"), times)
     )
 
 
@@ -54,10 +54,8 @@ def test_rows_are_grouped_by_the_constants_that_they_lose(histories):
     assert messages.sizes(histories) == (
         "2 of 5 methods hold the energy and both momenta, at rounding or with a bounded error; 3 lose at least one"
     )
-    assert messages.sizes(histories.sel(integrator=NAMES[:2])).endswith("with a bounded error")
-    ended = histories.assign(
-        outcome=histories["outcome"].where(histories["integrator"] != "strang[axis]", "left_chart")
-    )
+    assert messages.sizes(histories.sel(variant=NAMES[:2])).endswith("with a bounded error")
+    ended = histories.assign(outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart"))
     assert messages.lost(ended)[CONSTANTS] == ["strang[axis]"]
 
 
@@ -93,8 +91,8 @@ def test_what_grows_as_time_is_one_column_of_dots():
 
 
 def test_no_dot_of_the_phase_covers_another(histories):
-    many = xr.concat([histories.sel(integrator="strang[axis]")] * 40, "integrator")
-    many = many.assign_coords(integrator=[f"m{k}[axis]" for k in range(40)])
+    many = xr.concat([histories.sel(variant="strang[axis]")] * 40, "variant")
+    many = many.assign_coords(variant=[f"m{k}[axis]" for k in range(40)])
     figure = dot_figures.exponents(many).figure
     (dots,) = drawn(figure)
     figure.draw_without_rendering()

@@ -27,12 +27,8 @@ def measured():
         for name in names
     ]  # fmt: skip
     many = [study.measure(study.Case("population", name, {"members": 20, "seed": 1}, group="pop")) for name in names]
-    tops = xr.concat(by_row, "integrator", join="outer").assign_coords(
-        scene=list(tables.SCENES), integrator=list(names)
-    )
-    drawn = (
-        xr.concat(many, "integrator").expand_dims("scene").assign_coords(scene=["population"], integrator=list(names))
-    )
+    tops = xr.concat(by_row, "variant", join="outer").assign_coords(scene=list(tables.SCENES), variant=list(names))
+    drawn = xr.concat(many, "variant").expand_dims("scene").assign_coords(scene=["population"], variant=list(names))
     return xr.DataTree.from_dict({"tops": tops, "population": drawn})
 
 
@@ -159,7 +155,7 @@ def test_no_error_lies_outside_the_figure_of_costs(measured):
 
 
 def test_shares_count_tops_within_five_degrees(measured):
-    off = measured["population"]["off"].sel(scene="population", integrator="strang[axis]").values
+    off = measured["population"]["off"].sel(scene="population", variant="strang[axis]").values
     assert words.share(measured, "strang[axis]") == np.mean(np.degrees(off) <= 5.0)
     assert words.share(measured, "strang[axis]") > words.share(measured, "no-gyro[axis]")
 

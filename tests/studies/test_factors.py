@@ -41,7 +41,7 @@ from symtop_studies.factors.tables import (
 
 import symtop
 from symtop.measure import settings
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.runner.store import combine
 from symtop.runner.study import Case
 
@@ -68,7 +68,7 @@ def rows(measured):
 def test_the_loops_in_numpy_return_the_trajectory_of_the_compiled_ones(plain, name):
     for chart in plain.charts():
         plan = {"step_size": 0.01, "horizon": 4.0, "guard": False}
-        mine, theirs = (symtop.simulate("goldstein", row, **plan) for row in (plain.row(chart), f"{name}[{chart}]"))
+        mine, theirs = (symtop.simulate("goldstein", row, **plan) for row in (plain.variant(chart), f"{name}[{chart}]"))
         for quantity in ("axis", "energy", "p_phi", "p_psi"):
             np.testing.assert_allclose(mine[quantity], theirs[quantity], atol=1e-12)
         assert mine.attrs["force_evaluations"] == theirs.attrs["force_evaluations"]
@@ -79,7 +79,7 @@ def test_the_loops_in_numpy_return_the_trajectory_of_the_compiled_ones(plain, na
 
 def test_taylor_in_angles_solves_the_same_equations():
     hy = pytest.importorskip("heyoka")
-    from symtop.methods.taylor.taylor import equations
+    from symtop.methods.taylor.heyoka import equations
 
     scene = symtop.scene("goldstein")
     par, state = FORMULATIONS["angles"].prepare(scene.top, scene.start)
@@ -135,7 +135,7 @@ def test_the_search_ends_closer_to_the_target_if_asked():
 def test_languages_of_one_method_have_the_same_setting_and_the_same_work(measured):
     part = measured.isel(scene=0, horizon=0, target=0)
     for chart in ("angles", "axis", "attitude"):
-        trio = [part.sel(integrator=f"{name}[{chart}]") for name in ("rk45-compiled", "rk45", "rk45-numba")]
+        trio = [part.sel(variant=f"{name}[{chart}]") for name in ("rk45-compiled", "rk45", "rk45-numba")]
         assert len({float(one[Column.SETTING]) for one in trio}) == 1
         assert len({float(one[Column.FORCES]) for one in trio}) == 1
         np.testing.assert_allclose([float(one[Column.AXIS]) for one in trio], float(trio[0][Column.AXIS]), rtol=1e-3)
@@ -148,7 +148,7 @@ def test_what_is_not_within_the_budget_has_a_reason_and_no_time():
     assert [cell.language for cell in settled] == [COMPILED, NUMPY]
     assert list(settled.values())[1] == settings.BUDGET
     data = factorial(SCENE, ["Strang"], [goal._replace(languages=(COMPILED, NUMPY))], 1, 0.001, 10)
-    slow, fast = (data.sel(integrator=name, call=KERNEL).squeeze() for name in ("strang-numpy[axis]", "strang[axis]"))
+    slow, fast = (data.sel(variant=name, call=KERNEL).squeeze() for name in ("strang-numpy[axis]", "strang[axis]"))
     assert (str(slow[Column.REASON].values), bool(np.isnan(slow[Column.SECONDS]))) == (settings.BUDGET, True)
     assert (str(fast[Column.REASON].values), bool(np.isnan(fast[Column.SECONDS]))) == ("", False)
 
@@ -277,6 +277,6 @@ def test_figures_tables_and_sentences_come_from_the_dataset(measured):
     assert len(falls.rows) == len(waterfall(taken)) + len(waterfall(taken, call_first=True))
     assert {row[0] for row in effects.rows} == {"chart", "language", "call", "method"}
     assert len(charts.rows) == 2
-    assert len(everything.rows) == measured.sizes["integrator"]
+    assert len(everything.rows) == measured.sizes["variant"]
     for table in (scipy, families, falls, effects, charts, everything):
         assert all(len(row) == len(table.header) for row in table.rows)

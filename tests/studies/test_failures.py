@@ -37,7 +37,7 @@ from symtop.run.linear_stability import (
     trace,
     with_momenta,
 )
-from symtop.runner.grid import grid_rows
+from symtop.runner.grid import grid_variants
 
 STEADY = scenes.scene("steady-fast")  # I1, I3, mgl, theta, w3 = 2, 1, 2, 60 degrees, 20
 OMEGA = STEADY.top.nutation_frequency(STEADY.top.momenta(STEADY.start))
@@ -276,7 +276,7 @@ def test_methods_without_a_shift_keep_the_threshold(name):
 
 def test_every_row_of_fixed_step_is_scanned_for_sleep_but_those_that_are_left_out():
     left = {name for names in study.NOT_SLEEPING.values() for name in names}
-    fixed = {row.name for row in grid_rows("axis") if row.fixed_step}
+    fixed = {row.name for row in grid_variants("axis") if row.fixed_step}
     assert left < fixed  # a name that no row has would leave nothing out
     for quick in (True, False):
         assert {case.integrator for case in study.cases(quick) if case.scene == "sleeping"} == fixed - left

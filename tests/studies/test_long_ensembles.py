@@ -8,7 +8,7 @@ from symtop_studies.drift import study
 from symtop_studies.drift.long_runs import gauges_of, members, side_by_side
 from symtop_studies.drift.tables import ROUNDINGS
 
-from symtop.methods.framework.blocks import LEAST
+from symtop.methods.framework.many import LEAST
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import scene
 from symtop.run.long_run import QUANTITIES, long_run

@@ -22,7 +22,7 @@ from symtop_studies.notebook.tables import (
 import symtop
 from symtop.core.errors import SymtopError
 from symtop.measure.order import power_law
-from symtop.methods.framework.euler_lagrange import accelerations, momenta
+from symtop.methods.framework.angles import accelerations, momenta
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian.quadrature import RULES
 from symtop.run.modified_energy import modified_energy

@@ -13,18 +13,18 @@ from symtop_studies.notebook.tables import SOLVER, Column
 
 def test_the_notebook_study_names_discrete_methods_that_lose_their_momenta():
     sizes = np.array([[1e-15, 1e-15, 1e-6]])
-    coords = {"scene": ["spheroid"], "integrator": ["midpoint[angles]", "strang[axis]", SOLVER]}
-    data = xr.Dataset(dict.fromkeys(notebook_words.MOMENTA, (("scene", "integrator"), sizes)), coords=coords)
+    coords = {"scene": ["spheroid"], "variant": ["midpoint[angles]", "strang[axis]", SOLVER]}
+    data = xr.Dataset(dict.fromkeys(notebook_words.MOMENTA, (("scene", "variant"), sizes)), coords=coords)
     assert "With all 2 discrete Lagrangians and splittings" in notebook_words.momenta(data)
-    lost = data.assign({"p_phi_largest": (("scene", "integrator"), [[1e-15, 1e-9, 1e-6]])})
+    lost = data.assign({"p_phi_largest": (("scene", "variant"), [[1e-15, 1e-9, 1e-6]])})
     assert "With 1 of 2 discrete Lagrangians and splittings" in notebook_words.momenta(lost)
     assert "not with strang[axis]" in notebook_words.momenta(lost)
 
 
 def test_the_notebook_study_says_how_many_discrete_methods_have_a_smaller_error_than_the_solver():
-    coords = {"scene": ["spheroid"], "integrator": ["midpoint[angles]", "stormer-verlet[angles]", SOLVER]}
+    coords = {"scene": ["spheroid"], "variant": ["midpoint[angles]", "stormer-verlet[angles]", SOLVER]}
     data = xr.Dataset(coords=coords).assign({
-        "energy_largest": (("scene", "integrator"), [[3e-5, 1e-9, 1e-6]]),
+        "energy_largest": (("scene", "variant"), [[3e-5, 1e-9, 1e-6]]),
         Column.ENERGY_CHANGE: ("shadow_setting", [4e-4]),
         Column.MODIFIED_CHANGE: ("shadow_setting", [1e-5]),
     })  # fmt: skip
@@ -36,12 +36,12 @@ def test_the_notebook_study_says_how_many_discrete_methods_have_a_smaller_error_
 def long_runs(level, slope):
     """A discrete method of a level energy error beside a solver whose error grows with time, to t = 1000."""
     time = np.geomspace(1.0, 1000.0, 301)
-    coords = {"scene": ["spheroid"], "integrator": ["midpoint[angles]", SOLVER]}
+    coords = {"scene": ["spheroid"], "variant": ["midpoint[angles]", SOLVER]}
     return xr.Dataset({
-        Column.LONG_TIME: (("scene", "integrator", "long"), [[time, time]]),
-        Column.LONG_ENERGY: (("scene", "integrator", "long"), [[np.full(301, level), slope * time]]),
-        "energy_largest": (("scene", "integrator"), [[level, slope * 8.0]]),
-        Column.SAMPLE_TIME: (("scene", "integrator", "sample"), np.full((1, 2, 1), 8.0)),
+        Column.LONG_TIME: (("scene", "variant", "long"), [[time, time]]),
+        Column.LONG_ENERGY: (("scene", "variant", "long"), [[np.full(301, level), slope * time]]),
+        "energy_largest": (("scene", "variant"), [[level, slope * 8.0]]),
+        Column.SAMPLE_TIME: (("scene", "variant", "sample"), np.full((1, 2, 1), 8.0)),
     }, coords=coords)  # fmt: skip
 
 
@@ -69,7 +69,7 @@ def test_the_titles_of_the_notebook_say_where_the_discrete_method_is_the_worse_o
     )
     never = xr.concat([long_runs(3e-5, 1e-9), second], "scene")
     assert notebook_words.hope_message(never).endswith("by 1000 s it is not worse than all of them")
-    momenta = xr.DataArray([[1e-15, 2e-6]] * 2, dims=("scene", "integrator"))
+    momenta = xr.DataArray([[1e-15, 2e-6]] * 2, dims=("scene", "variant"))
     said = notebook_words.residuals_message(data.assign(p_phi_largest=momenta, p_psi_largest=momenta))
     assert said == (
         "Discrete methods keep both momenta to 10⁻¹⁵, lsoda to 2 × 10⁻⁶; the energy is worse than lsoda's with 1 of 1 "
@@ -82,7 +82,7 @@ def test_the_notebooks_path_is_turned_by_a_quarter_about_the_vertical():
     angles = {Column.SOLVER_THETA: 0.5 + phi, Column.SOLVER_PHI: phi, Column.TRUE_THETA: 0.5 + phi,
               Column.TRUE_PHI: phi}  # fmt: skip
     data = xr.Dataset(
-        {name: (("scene", "integrator", "path"), values[None, None]) for name, values in angles.items()},
-        coords={"scene": ["spheroid"], "integrator": [SOLVER]},
+        {name: (("scene", "variant", "path"), values[None, None]) for name, values in angles.items()},
+        coords={"scene": ["spheroid"], "variant": [SOLVER]},
     )
     assert notebook_words.turned(data, "spheroid") == pytest.approx(90.0)

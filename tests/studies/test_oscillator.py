@@ -137,9 +137,9 @@ def test_the_message_of_the_decay_tells_of_every_damping_that_is_drawn():
     """Without friction the midpoint rule is best, with it rk45: a title must not tell of one panel alone."""
     errors = {"undamped": (1e-13, 1e-3, 1e-4), "damping-0.1": (2e-2, 4e-3, 1e-3)}
     names = dict(zip(AGAINST_RK45, errors.values(), strict=True))
-    coords = {"scene": list(names), "integrator": ["midpoint", "trapezoidal", "rk45"]}
+    coords = {"scene": list(names), "variant": ["midpoint", "trapezoidal", "rk45"]}
     values = np.array(list(names.values()))[..., None]
-    said = words.decay_message(xr.Dataset({Column.ENERGY_ERROR: (("scene", "integrator", "sample"), values)}, coords))
+    said = words.decay_message(xr.Dataset({Column.ENERGY_ERROR: (("scene", "variant", "sample"), values)}, coords))
     assert "by midpoint with b = 0, undamped" in said
     assert "by rk45 with b = 0.1" in said
     assert "midpoint 0.02" in said
@@ -208,10 +208,10 @@ def test_the_title_of_the_orders_tells_the_slopes_at_critical_damping():
     errors = np.array([[steps**power for power in powers.values()]])
     data = xr.Dataset(
         {
-            Column.STEP: (("scene", "integrator", "setting"), np.broadcast_to(steps, errors.shape)),
-            Column.EXPONENT_ERROR: (("scene", "integrator", "setting"), errors),
+            Column.STEP: (("scene", "variant", "setting"), np.broadcast_to(steps, errors.shape)),
+            Column.EXPONENT_ERROR: (("scene", "variant", "setting"), errors),
         },
-        coords={"scene": ["damping-2"], "integrator": list(powers)},
+        coords={"scene": ["damping-2"], "variant": list(powers)},
     )
     assert words.orders_message(data) == (
         "At critical damping the rate of decay has order 1.0 only with trapezoidal and 0.5 with the force at one end; "

@@ -127,8 +127,8 @@ def test_step_times_number_is_exact():
 
 def test_the_diagram_says_which_rows_take_part():
     names = ["series[axis]", "midpoint[angles]", "gauss-8[axis]"]
-    ladders = xr.Dataset({"conserves_energy": (("scene", "integrator"), [[0.0, 0.0, 1.0]])},
-                         coords={"scene": ["spheroid"], "integrator": names})  # fmt: skip
+    ladders = xr.Dataset({"conserves_energy": (("scene", "variant"), [[0.0, 0.0, 1.0]])},
+                         coords={"scene": ["spheroid"], "variant": names})  # fmt: skip
     tree = xr.DataTree.from_dict({tables.LADDERS: ladders})
     said = words.part_sentence(tree)
     assert said.startswith("3 rows take part.")

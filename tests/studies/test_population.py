@@ -274,7 +274,7 @@ def test_runs_that_the_trial_of_the_guard_covers_are_no_forecasts(strang):
     assert 0.9 < np.nanmedian(ratio) < 1.1
     long = table_of(integrator("strang[axis]"), Tops.drawn(6, 3, 600.0), 1e6, 2)
     assert set(long["whole"].values[np.isfinite(long["foretold"].values)]) == {0.0}
-    data = xr.DataTree.from_dict({"short": strang.expand_dims(scene=["population"], integrator=["strang[axis]"])})
+    data = xr.DataTree.from_dict({"short": strang.expand_dims(scene=["population"], variant=["strang[axis]"])})
     scores, wrong = verdicts.scored(data, "short", "foretold", ["strang[axis]"])
     error, counted = strang["measured"].values, there & ~exact
     clear = counted & ((error <= EXPECTED) | (error > ladder.WRONG))
@@ -309,18 +309,18 @@ def tree(costs_by_row, price=None, met_at=None):
     names, table = list(costs_by_row), np.array(list(costs_by_row.values()))
     price = dict.fromkeys(names, (1.0, 1.0)) | (price or {})
     met = np.array([(met_at or {}).get(name, np.zeros(table.shape[1])) for name in names], dtype=np.uint8)
-    dims = "scene", "integrator", "quantity", "target", "member"
+    dims = "scene", "variant", "quantity", "target", "member"
     short = xr.Dataset(
         {name: (dims, values[np.newaxis, :, np.newaxis, np.newaxis])
          for name, values in (("cost", table), ("met_at", met))},
-        coords={"scene": ["population"], "integrator": names, "quantity": ["axis"], "target": [1e-3]},
+        coords={"scene": ["population"], "variant": names, "quantity": ["axis"], "target": [1e-3]},
     )  # fmt: skip
     about = xr.Dataset({"stratum_place": ("member", np.zeros(table.shape[1]))}, coords={"stratum": ["slow"]})
     halves = np.array([np.broadcast_to(price[name], (2, 2)) for name in names])  # rows, tolerances, halves
     prices = xr.Dataset(
-        {"alone_by": (("scene", "integrator", "priced_at"), halves.min(axis=2)[np.newaxis]),
-         "alone_by_half": (("scene", "integrator", "priced_at", "half"), halves[np.newaxis])},
-        coords={"scene": ["population"], "integrator": names, "priced_at": [1e-2, 1e-6]},
+        {"alone_by": (("scene", "variant", "priced_at"), halves.min(axis=2)[np.newaxis]),
+         "alone_by_half": (("scene", "variant", "priced_at", "half"), halves[np.newaxis])},
+        coords={"scene": ["population"], "variant": names, "priced_at": [1e-2, 1e-6]},
     )  # fmt: skip
     return xr.DataTree.from_dict({"short": short, "tops": about, "prices": prices})
 
@@ -330,11 +330,11 @@ def test_the_cheaper_of_two_processes_counts_and_both_must_agree():
     one, other = (
         xr.Dataset(
             {
-                "alone": ("integrator", [value, 3.0]),
-                "together": ("integrator", [value, 1.0]),
-                "spread": ("integrator", [0.02, 0.03]),
+                "alone": ("variant", [value, 3.0]),
+                "together": ("variant", [value, 1.0]),
+                "spread": ("variant", [0.02, 0.03]),
             },
-            coords={"integrator": ["a", "b"]},
+            coords={"variant": ["a", "b"]},
         )
         for value in (4.5, 3.6)
     )
@@ -346,8 +346,8 @@ def test_the_cheaper_of_two_processes_counts_and_both_must_agree():
     both = xr.concat([one, other], xr.Variable("scene", list(pricing.PROCESSES)))
     taken = pricing.of_processes(both)
     assert taken["alone"].values.tolist() == [3.6, 3.0]
-    assert taken["alone_half"].transpose("integrator", "half").values.tolist() == [[4.5, 3.6], [3.0, 3.0]]
-    assert taken["alone_by_half"].transpose("integrator", "priced_at", "half").values[0, 0].tolist() == [4.5, 3.6]
+    assert taken["alone_half"].transpose("variant", "half").values.tolist() == [[4.5, 3.6], [3.0, 3.0]]
+    assert taken["alone_by_half"].transpose("variant", "priced_at", "half").values[0, 0].tolist() == [4.5, 3.6]
     assert taken["spread"].values == pytest.approx([0.25, 0.03])
     alone = pricing.of_processes(both.isel(scene=[0]))
     assert alone["alone"].values.tolist() == [4.5, 3.0]  # the control: one process knows nothing of others
@@ -383,7 +383,7 @@ def test_a_call_that_is_dearer_makes_no_evaluation_dearer(name, monkeypatch):
     row = integrator(name)
     solver = row.solvers["axis"]
     plain = float(prices([name], 9, 2e-3)["alone"][0])
-    monkeypatch.setattr(pricing, "integrator", lambda _: dataclasses.replace(row, solvers={"axis": waiting}))
+    monkeypatch.setattr(pricing, "variant", lambda _: dataclasses.replace(row, solvers={"axis": waiting}))
     assert float(prices([name], 9, 2e-3)["alone"][0]) == pytest.approx(plain, rel=0.3)
 
 
@@ -599,7 +599,7 @@ def test_the_silent_runs_at_small_steps_are_told_by_kind_of_top(quick_results):
     share, group = words.hidden(data), data["short"].to_dataset().isel(scene=0)
     counts = dict.fromkeys(verdicts.strata(data), 0.0)
     for name in verdicts.judged_rows(data):
-        one = group.sel(integrator=name)
+        one = group.sel(variant=name)
         if str(one["control"].values) == "step_size":
             fine = one["silent"].isel(level=np.flatnonzero(one["setting"].values >= words.FINE))
             for kind, count in zip(counts, fine.sum("level").values, strict=True):

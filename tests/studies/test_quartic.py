@@ -153,14 +153,14 @@ def orbits():
     squares = {"exact-discrete": [0.0, 0.5, 0.0], "midpoint": [-0.1, 0.5, -0.1], "mcmillan": [9.0, 0.5, 9.0]}
     return xr.Dataset(
         {
-            CURVE_HERE: (("scene", "integrator", "quartic_shown", "curve"), np.tile(corners, (1, 3, 1, 1))),
-            CURVE_AHEAD: (("scene", "integrator", "quartic_shown", "curve"), np.tile(ahead, (1, 3, 1, 1))),
+            CURVE_HERE: (("scene", "variant", "quartic_shown", "curve"), np.tile(corners, (1, 3, 1, 1))),
+            CURVE_AHEAD: (("scene", "variant", "quartic_shown", "curve"), np.tile(ahead, (1, 3, 1, 1))),
             ORBIT: (
-                ("scene", "integrator", "quartic_shown", "quartic_point"),
+                ("scene", "variant", "quartic_shown", "quartic_point"),
                 np.array([list(squares.values())])[:, :, None],
             ),
         },
-        coords={"scene": ["planar"], "integrator": list(squares)},
+        coords={"scene": ["planar"], "variant": list(squares)},
     )
 
 
@@ -170,7 +170,7 @@ def test_distances_are_those_from_the_curve_not_from_its_nearest_corner(orbits):
 
 
 def test_a_point_with_one_value_outside_the_picture_is_counted_as_outside(orbits, monkeypatch):
-    monkeypatch.setattr(quartic_figures, "MAPS", tuple(orbits["integrator"].values))
+    monkeypatch.setattr(quartic_figures, "MAPS", tuple(orbits["variant"].values))
     cell = orbits.sel(scene="planar").isel(quartic_shown=-1)
     assert quartic_figures._outside(cell, -0.25, 1.25) == "mcmillan:\nall of 2\noutside"
 

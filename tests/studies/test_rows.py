@@ -14,7 +14,7 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.methods.framework.registry import integrators, methods, split_name
 from symtop.model.scenes import scenes
-from symtop.runner.grid import grid_rows
+from symtop.runner.grid import grid_variants
 
 STUDIES = (
     "population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction", "claims",
@@ -37,7 +37,7 @@ def without_a_chart(data: xr.Dataset) -> list[str]:
     if "chart" in data.variables:
         return []
     charts = {name: method.charts() for name, method in integrators().items()}
-    return [str(name) for name in data["integrator"].values if len(charts.get(str(name), ())) > 1]
+    return [str(name) for name in data["variant"].values if len(charts.get(str(name), ())) > 1]
 
 
 @pytest.mark.parametrize("study", STUDIES)
@@ -82,14 +82,14 @@ def test_a_caption_that_leaves_something_out_is_found(caption, lacks):
     ],
 )
 def test_a_name_that_leaves_the_chart_open_is_found(names, found):
-    data = xr.Dataset({"axis": ("integrator", np.zeros(len(names)))}, coords={"integrator": names})
+    data = xr.Dataset({"axis": ("variant", np.zeros(len(names)))}, coords={"variant": names})
     assert without_a_chart(data) == found
     assert without_a_chart(data.assign_coords(chart=["angles"])) == []
 
 
 def test_the_rows_of_a_grid_are_every_method_and_no_chart_that_repeats_another():
-    rows = [row.name for row in grid_rows("nutation")]
+    rows = [row.name for row in grid_variants("nutation")]
     assert {split_name(name)[0] for name in rows} == set(methods())
     assert {"rk4[angles]", "rk4[axis]", "strang[axis]", "exact[attitude]"} <= set(rows)
     assert "strang[attitude]" not in rows
-    assert "strang[attitude]" in [row.name for row in grid_rows("nutation", attitude=True)]
+    assert "strang[attitude]" in [row.name for row in grid_variants("nutation", attitude=True)]

@@ -39,11 +39,11 @@ def test_the_behaviour_of_a_quantity_is_that_on_its_worst_scene(sizes, exponents
 
 def test_runs_over_a_part_of_the_horizon_are_named():
     time = np.linspace(0.0, 1.0, 5) * np.array([1.0, 0.2, 0.5])[:, None]
-    data = xr.Dataset({"sample_time": (("scene", "integrator", "sample"), time[None])},
-                      coords={"scene": ["spheroid"], "integrator": ["rk4", "rk45", "radau"]})  # fmt: skip
+    data = xr.Dataset({"sample_time": (("scene", "variant", "sample"), time[None])},
+                      coords={"scene": ["spheroid"], "variant": ["rk4", "rk45", "radau"]})  # fmt: skip
     said = "radau, rk45 ran over 20% (rk45) to 50% of the horizon only, and are judged on that part."
     assert words.shortened(data).endswith(said)
-    assert words.shortened(data.sel(integrator=["rk4"])) == ""
+    assert words.shortened(data.sel(variant=["rk4"])) == ""
 
 
 def histories(**changes):
@@ -55,8 +55,8 @@ def histories(**changes):
         "nutations": [100.0] * 6, "steps_a_nutation": [118.0] * 4 + [np.nan] * 2,
         "tolerance": [np.nan] * 4 + [1e-8, 2.2e-18], "own_tolerance": [0.0] * 5 + [1.0],
     }  # fmt: skip
-    coords = {"scene": ["spheroid"], "integrator": names}
-    return xr.Dataset({key: (("scene", "integrator"), [values]) for key, values in per_row.items()}, coords=coords)
+    coords = {"scene": ["spheroid"], "variant": names}
+    return xr.Dataset({key: (("scene", "variant"), [values]) for key, values in per_row.items()}, coords=coords)
 
 
 def test_what_a_chart_does_is_not_said_of_the_method():
@@ -75,9 +75,7 @@ def test_every_tolerance_is_stated_and_a_default_says_that_it_is_one():
     said = rows.setting(histories())
     assert "100 nutations of spheroid, 118 steps a nutation or tolerance 1e-08 (rk45[angles])." in said
     assert said.endswith("taylor[axis] keeps its default tolerance, the rounding of the arithmetic.")
-    cells = [
-        histories().sel(scene="spheroid", integrator=name) for name in ("rk4[axis]", "rk45[angles]", "taylor[axis]")
-    ]
+    cells = [histories().sel(scene="spheroid", variant=name) for name in ("rk4[axis]", "rk45[angles]", "taylor[axis]")]
     assert [rows.used(cell) for cell in cells] == [
         "118.00 steps a nutation", "tolerance 1.0e-08", "tolerance 2.2e-18 (its default: rounding)",
     ]  # fmt: skip
@@ -135,18 +133,18 @@ def test_what_is_said_of_the_phase_follows_from_its_exponents():
     sizes = {"strang": 1.0, "rk4": 1.0, "taylor": 7e-10, "mixed": 1e-3, "exact": 1e-15}
     data = xr.Dataset(
         {
-            "phase_exponent": (("integrator", "scene"), list(exponents.values())),
-            "phase_exponent_interval": (("integrator", "scene"), np.full((5, 2), 0.15)),
-            "phase_largest": (("integrator", "scene"), [[size] * 2 for size in sizes.values()]),
+            "phase_exponent": (("variant", "scene"), list(exponents.values())),
+            "phase_exponent_interval": (("variant", "scene"), np.full((5, 2), 0.15)),
+            "phase_largest": (("variant", "scene"), [[size] * 2 for size in sizes.values()]),
         },
-        coords={"integrator": list(exponents), "scene": ["spheroid", "goldstein"]},
+        coords={"variant": list(exponents), "scene": ["spheroid", "goldstein"]},
     )
     said = behaviours.phase_sentence(data)
     assert said.startswith("The phase error grows as t with strang. It grows faster with rk4, taylor, and is largest")
     assert "largest with rk4 (t^2.09 and t^1.90, to 1 rad)." in said
     assert said.endswith("With mixed no one power fits all scenes. With 1 row none is seen.")
     assert "exact" not in said
-    lost = data.assign(phase_exponent=data["phase_exponent"].where(data["integrator"] != "mixed"))
+    lost = data.assign(phase_exponent=data["phase_exponent"].where(data["variant"] != "mixed"))
     assert behaviours.phase_sentence(lost).endswith("With 1 row none is seen. With 1 row no power was fitted.")
     groups = behaviours.phases(data)
     assert {word: [one.row for one in group] for word, group in groups.items()} == {
@@ -164,10 +162,10 @@ def fast_rows(**energy):
         "energy_exponent_interval": [0.05] * 3,
         "phase_largest": [1.0, 7e-10, 3e-6], "phase_exponent": [2.0] * 3, "phase_exponent_interval": [0.05] * 3,
     }  # fmt: skip
-    columns = {key: (("scene", "integrator"), [list(values)]) for key, values in per_row.items()}
+    columns = {key: (("scene", "variant"), [list(values)]) for key, values in per_row.items()}
     time = np.linspace(0.0, 1.0, 3) * np.array([[1.0], [1.0], [0.02]])
-    columns["sample_time"] = (("scene", "integrator", "sample"), time[None])
-    return xr.Dataset(columns, coords={"scene": ["spheroid"], "integrator": list(given)})
+    columns["sample_time"] = (("scene", "variant", "sample"), time[None])
+    return xr.Dataset(columns, coords={"scene": ["spheroid"], "variant": list(given)})
 
 
 def test_a_phase_that_grows_faster_is_not_laid_to_an_energy_that_does_not_drift():
@@ -196,9 +194,9 @@ def test_the_same_run_has_one_behaviour_in_every_study():
 
 def test_an_energy_error_that_no_sample_sees_is_below_rounding_and_no_ratio_of_a_floor():
     part = xr.Dataset(
-        {stability_words.Column.ENERGY_ONCE: ("integrator", [0.0, 5e-9, 2e-5, 1e-16]),
-         stability_words.Column.ENERGY_EVERY: ("integrator", [4.2e-8, 2.5e-4, 3e-5, 1e-15])},
-        coords={"integrator": ["yoshida-4", "stormer-verlet", "rkmk-se3-2", "gauss-4"]},
+        {stability_words.Column.ENERGY_ONCE: ("variant", [0.0, 5e-9, 2e-5, 1e-16]),
+         stability_words.Column.ENERGY_EVERY: ("variant", [4.2e-8, 2.5e-4, 3e-5, 1e-15])},
+        coords={"variant": ["yoshida-4", "stormer-verlet", "rkmk-se3-2", "gauss-4"]},
     )  # fmt: skip
     sentence = stability_words.sampling(part)
     assert "errors of 2 of 3 rows look more than 10 times too small" in sentence
@@ -222,7 +220,7 @@ def test_a_walk_of_rounding_is_held_against_one_half(power, agreeing):
 
 
 def test_the_shift_of_the_mean_energy_is_relative_to_its_band():
-    means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("integrator", "window"))
+    means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("variant", "window"))
     cells = xr.Dataset({"energy_mean": means, "modified_energy_mean": means * 1e-10,
                         "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
     sentence = words.moved(cells)
@@ -289,7 +287,7 @@ def test_the_share_of_the_solver_is_read_from_the_numbers(one, energy, momentum,
         "one_iteration_energy": one,
         "solver_energy": ("tolerance_setting", [energy, 1e-4]),
         "solver_momentum": ("tolerance_setting", [momentum, 1e-15]),
-    }).expand_dims(scene=["goldstein"], integrator=["midpoint"])  # fmt: skip
+    }).expand_dims(scene=["goldstein"], variant=["midpoint"])  # fmt: skip
     (said,) = stability_words.mechanism_sentences(data)
     for part in says:
         assert part in said
@@ -316,23 +314,23 @@ def test_the_truth_study_says_what_the_printed_values_test():
 def test_the_title_of_the_truth_study_has_a_number_whatever_was_run_longest():
     """An integration is not run as long as the closed form: its last error is that of its own longest time."""
     errors = [[[1e-15, 1e-13, np.nan], [3e-16, 4e-16, 5e-16]]]
-    coords = {"scene": ["spheroid"], "integrator": ["double, axis", "closed form"], "horizon": [8.0, 1e4, 1e6]}
-    data = xr.Dataset({truth_tables.ERROR: (("scene", "integrator", "horizon"), errors)}, coords=coords)
+    coords = {"scene": ["spheroid"], "variant": ["double, axis", "closed form"], "horizon": [8.0, 1e4, 1e6]}
+    data = xr.Dataset({truth_tables.ERROR: (("scene", "variant", "horizon"), errors)}, coords=coords)
     said = truth_words.message(data).replace("\N{NO-BREAK SPACE}", " ")
     assert "right to 5 × 10⁻¹⁶ rad" in said
     assert "off by up to 10⁻¹³ rad after 10⁴ s" in said
-    alone = truth_words.message(data.sel(integrator=["closed form"]))
+    alone = truth_words.message(data.sel(variant=["closed form"]))
     assert "nan" not in said + alone
 
 
 def test_the_truth_study_says_what_errors_are_measured_against_and_what_else_agrees():
     errors = [[[1e-31, 2e-31], [3e-16, 5e-16]]]
-    coords = {"scene": ["spheroid"], "integrator": ["quadruple, attitude", "closed form"], "horizon": [8.0, 1e2]}
-    data = xr.Dataset({truth_tables.ERROR: (("scene", "integrator", "horizon"), errors)}, coords=coords)
+    coords = {"scene": ["spheroid"], "variant": ["quadruple, attitude", "closed form"], "horizon": [8.0, 1e2]}
+    data = xr.Dataset({truth_tables.ERROR: (("scene", "variant", "horizon"), errors)}, coords=coords)
     said = truth_words.measured_against(data).replace("\N{NO-BREAK SPACE}", " ")
     assert "from the closed form in 45 digits" in said
     assert said.endswith("agrees with it to 2 × 10⁻³¹ rad.")
-    alone = truth_words.measured_against(data.sel(integrator=["closed form"]))
+    alone = truth_words.measured_against(data.sel(variant=["closed form"]))
     assert alone == "Error: the distance from the closed form in 45 digits."
 
 
@@ -352,13 +350,13 @@ def test_the_fates_of_all_rows_are_counted_in_a_sentence_and_listed_in_tables():
     for constant in conservation.CONSTANTS:
         for part, values in (("largest", [size for size, _ in sizes.values()]), ("exponent_interval", [0.01] * 4),
                              ("exponent", [power for _, power in sizes.values()])):  # fmt: skip
-            columns[f"{constant}_{part}"] = (("integrator", "scene"), np.array(values)[:, None])
+            columns[f"{constant}_{part}"] = (("variant", "scene"), np.array(values)[:, None])
     columns |= {
-        f"phase_{part}": (("integrator", "scene"), np.full((4, 1), value))
+        f"phase_{part}": (("variant", "scene"), np.full((4, 1), value))
         for part, value in (("largest", 1e-3), ("exponent", 1.0), ("exponent_interval", 0.01))
     }
-    data = xr.Dataset(columns, coords={"integrator": list(sizes), "scene": ["spheroid"]})
-    data = data.assign(outcome=(("integrator", "scene"), [["ok"]] * 4))
+    data = xr.Dataset(columns, coords={"variant": list(sizes), "scene": ["spheroid"]})
+    data = data.assign(outcome=(("variant", "scene"), [["ok"]] * 4))
     assert behaviours.constant_sentence(data, "p_phi") == (
         "Of 4 rows, the relative change of p_phi is no more than rounding with 2 (up to 2.0e-15), stays bounded over "
         "the run with 1 (up to 1.0e-04, verlet), and grows in time with 1 (up to 1.0e-02, rk4)."
@@ -369,5 +367,5 @@ def test_the_fates_of_all_rows_are_counted_in_a_sentence_and_listed_in_tables():
     zero = data.assign(p_phi_exponent=data["p_phi_exponent"] * math.nan)
     assert not any("nan" in text for row in behaviours.tables(zero)[1].rows for text in row)
     assert {len(row) for row in every.rows} == {len(every.header)}
-    ended = data.assign(outcome=data["outcome"].where(data["integrator"] != "rk4", "left_chart"))
+    ended = data.assign(outcome=data["outcome"].where(data["variant"] != "rk4", "left_chart"))
     assert behaviours.constant_sentence(ended, "energy").endswith("is unknown with 1 whose run ended early.")

@@ -81,11 +81,11 @@ def test_a_time_that_misses_its_forecast_by_a_quarter_is_taken_again(monkeypatch
     assert ("strang[axis]", 3) in again
     assert {name for name, _ in again} == {"strang[axis]"}  # its neighbours are foretold from it
     assert (rounds, batch) == (4, 0.005)
-    row = table.sel(integrator="strang[axis]")
+    row = table.sel(variant="strang[axis]")
     assert row["seconds"].values.tolist() == [9.0, 18.0, 27.0, 36.0, 45.0]  # the glitch is gone
     assert row["seconds_forecast"].values == pytest.approx(row["seconds"].values)
     assert row["seconds_samples"].isel(setting=3).values[:3].tolist() == [36.0 * 2.8] * 3
-    assert np.isnan(table["seconds_samples"].sel(integrator="rk4[axis]").values[:, 3:]).all()
+    assert np.isnan(table["seconds_samples"].sel(variant="rk4[axis]").values[:, 3:]).all()
     assert table["first_call"].values.tolist() == [7.0, 7.0]
     assert table["set_up_seconds"].isnull().all()
 
@@ -106,12 +106,12 @@ def timed_study():
 
 
 def test_the_cheapest_runs_of_each_method_have_a_time_and_no_other_run(timed_study):
-    assert list(timed_study["integrator"].values) == LEADERS
+    assert list(timed_study["variant"].values) == LEADERS
     ran = timed_study["outcome"] == "ok"
     least = [least_work(timed_study.transpose(..., "setting"), target) for target in TARGETS]
     place = xr.DataArray(np.stack(least), dims=("target", *timed_study["axis"].dims[:-1]))
     cheapest = (timed_study["setting"] == place).any("target")
-    compared = ran & (timed_study["integrator"] == "stormer-verlet[angles]") & (timed_study["horizon"] == 100.0)
+    compared = ran & (timed_study["variant"] == "stormer-verlet[angles]") & (timed_study["horizon"] == 100.0)
     expected, has_time = xr.broadcast(cheapest | compared, timed_study["seconds"].notnull())
     assert (expected == has_time).all()
     assert 0 < has_time.sum() < ran.sum()
@@ -128,10 +128,9 @@ def test_a_chart_shows_timed_runs_against_seconds_and_every_run_against_work(tim
         [[point for series in panel for point in series.points] for panel in chart.panels.values()]
         for chart in opening.charts(timed_study)
     )
-    ran = (timed_study["outcome"] == "ok").sum(["integrator", "setting"]).values.ravel()
+    ran = (timed_study["outcome"] == "ok").sum(["variant", "setting"]).values.ravel()
     assert (
-        list(map(len, seconds))
-        == timed_study["seconds"].notnull().sum(["integrator", "setting"]).values.ravel().tolist()
+        list(map(len, seconds)) == timed_study["seconds"].notnull().sum(["variant", "setting"]).values.ravel().tolist()
     )
     assert list(map(len, work)) == ran.tolist()
     assert all(any(f" {unit}," in words for unit in ("us", "ms")) for panel in seconds for *_, words in panel)
@@ -145,11 +144,11 @@ def test_a_crossing_of_two_power_laws_is_found_where_it_is():
     table = np.array([1e-3 / x, 1e-1 / x**2])  # equal at 100
     data = xr.Dataset(
         {
-            "seconds": (("integrator", "setting"), np.array([x, x])),
-            "energy": (("integrator", "setting"), table),
-            "outcome": (("integrator", "setting"), np.full((2, 9), "ok")),
+            "seconds": (("variant", "setting"), np.array([x, x])),
+            "energy": (("variant", "setting"), table),
+            "outcome": (("variant", "setting"), np.full((2, 9), "ok")),
         },
-        coords={"integrator": ["a", "b"], "scene": "x"},
+        coords={"variant": ["a", "b"], "scene": "x"},
     )
     crossing = energy.crossing(data, "a", "b")
     assert crossing.longest_won == pytest.approx(100.0, rel=0.06)
@@ -166,17 +165,17 @@ def test_energies_are_compared_within_a_chart():
     x = np.geomspace(1.0, 1e3, 9)
     data = xr.Dataset(
         {
-            "seconds": (("integrator", "setting"), np.tile(x, (6, 1))),
-            "energy": (("integrator", "setting"), np.array([x**-4.0, x**-2.0, 0.1 * x**-4.0, 1e-3 / x**4, x**-9.0, x])),
-            "steps": (("integrator", "setting"), np.tile(x, (6, 1))),
-            "force_evaluations": (("integrator", "setting"), np.array([4.0, 1, 4, 1, 20, 6])[:, None] * x),
-            "outcome": (("integrator", "setting"), np.full((6, 9), "ok")),
-            "control": ("integrator", ["step_size"] * 4 + ["tolerance"] * 2),
-            "chart": ("integrator", ["angles", "angles", "axis", "axis", "axis", "angles"]),
-            "structured": ("integrator", [0.0, 1, 0, 1, 0, 0]),
-            "implementation": ("integrator", ["compiled"] * 5 + ["python"]),
+            "seconds": (("variant", "setting"), np.tile(x, (6, 1))),
+            "energy": (("variant", "setting"), np.array([x**-4.0, x**-2.0, 0.1 * x**-4.0, 1e-3 / x**4, x**-9.0, x])),
+            "steps": (("variant", "setting"), np.tile(x, (6, 1))),
+            "force_evaluations": (("variant", "setting"), np.array([4.0, 1, 4, 1, 20, 6])[:, None] * x),
+            "outcome": (("variant", "setting"), np.full((6, 9), "ok")),
+            "control": ("variant", ["step_size"] * 4 + ["tolerance"] * 2),
+            "chart": ("variant", ["angles", "angles", "axis", "axis", "axis", "angles"]),
+            "structured": ("variant", [0.0, 1, 0, 1, 0, 0]),
+            "implementation": ("variant", ["compiled"] * 5 + ["python"]),
         },
-        coords={"integrator": names},
+        coords={"variant": names},
     ).expand_dims(scene=["x"]).expand_dims(horizon=[1.0])  # fmt: skip
     assert energy.in_chart(data, "axis") == (["rk4[axis]", "taylor[axis]"], ["strang[axis]"])
     assert energy.in_chart(data, "angles") == (["rk4[angles]"], ["midpoint[angles]"])
@@ -198,8 +197,8 @@ def test_energies_are_compared_within_a_chart():
         "Structure-preserving methods in the axis chart keep energy better at every run time in at least half of the "
         "comparisons with rk4 (100%), in less than half of the comparisons with taylor (0%)"
     )
-    with_gauss = xr.concat([data, data.sel(integrator=["strang[axis]"]).assign_coords(integrator=["gauss-4[axis]"])],
-                           "integrator", data_vars="minimal")  # fmt: skip
+    with_gauss = xr.concat([data, data.sel(variant=["strang[axis]"]).assign_coords(variant=["gauss-4[axis]"])],
+                           "variant", data_vars="minimal")  # fmt: skip
     assert energy.by_construction(with_gauss, "axis") == ["gauss-4[axis]"]  # and it changes no number
     assert energy.tallies(with_gauss, "axis") == energy.tallies(data, "axis")
     assert energy.message(with_gauss, "axis") == energy.message(data, "axis")
@@ -208,7 +207,7 @@ def test_energies_are_compared_within_a_chart():
     assert energy.timed(with_gauss) == [
         "rk4[axis]", "taylor[axis]", "strang[axis]", "gauss-4[axis]", "rk4[angles]", "midpoint[angles]",
     ]  # fmt: skip
-    error, work = energy.at_steps(data.isel(scene=0, horizon=0).sel(integrator="rk4[axis]"), 118.0)
+    error, work = energy.at_steps(data.isel(scene=0, horizon=0).sel(variant="rk4[axis]"), 118.0)
     assert (error, work) == (pytest.approx(0.1 * 118.0**-4), pytest.approx(4.0))
     assert "with strang[axis] (1)" in energy.at_equal_steps(data, ["rk4[axis]", "strang[axis]"], "x")
 
@@ -223,8 +222,8 @@ def test_a_share_that_is_neither_none_nor_all_does_not_read_as_such(share, said)
 def test_times_that_no_other_predicts_are_told_apart(timed_study):
     known = timed_study["seconds_forecast"].where(timed_study["seconds"].notnull())
     assert trust.trust(timed_study).forecast == int(known.notnull().sum())
-    lone = timed_study.assign(seconds_forecast=known.where(known["integrator"] != "taylor[axis]"))
-    least = int((timed_study["seconds"].sel(integrator="taylor[axis]").notnull()).sum())
+    lone = timed_study.assign(seconds_forecast=known.where(known["variant"] != "taylor[axis]"))
+    least = int((timed_study["seconds"].sel(variant="taylor[axis]").notnull()).sum())
     whole = int(timed_study["seconds"].notnull().sum())
     rest = int((timed_study["seconds"].notnull() & lone["seconds_forecast"].isnull()).sum())
     assert rest >= least > 0
@@ -280,7 +279,7 @@ def _both(case):
     if not case.timed:
         return _first(case)
     names = case.settings["integrators"]
-    return xr.Dataset({"later": ("integrator", [float(k) for k in range(len(names))])}, coords={"integrator": names})
+    return xr.Dataset({"later": ("variant", [float(k) for k in range(len(names))])}, coords={"variant": names})
 
 
 def test_a_study_may_have_a_second_round_made_from_the_first(tmp_path, monkeypatch):
@@ -288,7 +287,7 @@ def test_a_study_may_have_a_second_round_made_from_the_first(tmp_path, monkeypat
 
     def again(data):
         sizes.append(dict(data.sizes))
-        names = [str(name) for name in data["integrator"].values]
+        names = [str(name) for name in data["variant"].values]
         return [Case("spheroid", "together", {"integrators": names}, timed=True)]
 
     study = Study(
@@ -299,10 +298,10 @@ def test_a_study_may_have_a_second_round_made_from_the_first(tmp_path, monkeypat
     monkeypatch.setattr(runner, "load", lambda _: study)
     first = runner.run(study, tmp_path, quiet=True)
     assert first["computed"] == 3
-    assert sizes == [{"scene": 1, "integrator": 2, "setting": 2}]
+    assert sizes == [{"scene": 1, "variant": 2, "setting": 2}]
     data = xr.open_dataset(tmp_path / "stability.nc").load()
     assert data["later"].values.tolist() == [[0.0, 1.0]]
-    assert data["found"].sel(integrator="strang").values.tolist() == [[6.0, 1.0]]
+    assert data["found"].sel(variant="strang").values.tolist() == [[6.0, 1.0]]
     next((tmp_path / "cases" / "stability").glob("*together*")).unlink()
     (tmp_path / "stability.nc").unlink()
     assert runner.run(study, tmp_path, quiet=True)["computed"] == 1
@@ -331,12 +330,12 @@ def test_a_front_shows_the_runs_that_its_title_counts(quick_results):
 
 
 def test_the_title_of_slowdowns_names_the_fastest_before_the_one_that_fails_least():
-    table = xr.DataArray([[1.0, 1.0, np.nan], [50.0, 60.0, 70.0]], dims=("integrator", "problem"),
-                         coords={"integrator": ["quick", "sure"]})  # fmt: skip
+    table = xr.DataArray([[1.0, 1.0, np.nan], [50.0, 60.0, 70.0]], dims=("variant", "problem"),
+                         coords={"variant": ["quick", "sure"]})  # fmt: skip
     assert rankings.slowdown_message(table) == (
         "quick is the fastest in the median and meets 2 of 3 targets; sure meets 3, in 60 times the least time"
     )
-    assert rankings.slowdown_message(table.sel(integrator=["sure"])) == (
+    assert rankings.slowdown_message(table.sel(variant=["sure"])) == (
         "sure takes 60 times the least time in the median and meets 3 of 3 targets"
     )
     assert rankings.middles(table) == (3, [("quick", 2, 1.0), ("sure", 3, 60.0)])

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.measure.step_map import reversed_rates
-from symtop.methods.framework.formulations import Formulation, as_run
-from symtop.methods.framework.outcomes import NOT_FINITE, OK
-from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.equations import Formulation, as_run
+from symtop.methods.framework.plan import NOT_FINITE, OK, Array, Plan, Run
 from symtop.methods.framework.registry import Integrator, Solver
 from symtop.model.top import Angles, SymmetricTop
 

@@ -17,7 +17,7 @@ from symtop.judging.adapters.adapter import March, label_of
 from symtop.judging.adapters.python_step import LOOK, state_like
 from symtop.judging.adapters.tensors import double_precision, field_of, library, on_these_charts
 from symtop.judging.heartbeat import pulse
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Solver
 from symtop.model.top import SymmetricTop

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, label_of
 from symtop.judging.heartbeat import pulse
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Solver
 from symtop.model.top import SymmetricTop

@@ -18,7 +18,7 @@ from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, label_of
 from symtop.judging.adapters.python_step import LOOK, state_like
 from symtop.judging.heartbeat import pulse
-from symtop.methods.framework.formulations import FORMULATIONS, Formulation
+from symtop.methods.framework.equations import FORMULATIONS, Formulation
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Solver
 from symtop.methods.framework.space import ended_space, on_attitude

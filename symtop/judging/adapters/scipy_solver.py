@@ -14,7 +14,7 @@ from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, label_of
 from symtop.judging.adapters.python_step import Equations, Field, state_like
 from symtop.judging.heartbeat import pulse
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Solver
 from symtop.methods.library.scipy_ivp import solver as solver_of

@@ -19,7 +19,7 @@ from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March
 from symtop.judging.adapters.python_step import Guarded, Marks
 from symtop.methods.framework.angles import chart_outcome, reduced
-from symtop.methods.framework.formulations import Formulation
+from symtop.methods.framework.equations import Formulation
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Solver
 from symtop.model.effective import effective_force

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from symtop.core.errors import SymtopError
-from symtop.methods.framework.formulations import FORMULATIONS
+from symtop.methods.framework.equations import FORMULATIONS
 
 CHARTS = ("axis", "attitude")  # the angles have sines, which each library has for itself
 

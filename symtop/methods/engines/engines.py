@@ -12,18 +12,18 @@ the method, the second what rounding makes of it, and of a limit h -> 0 it claim
 from collections.abc import Callable
 from typing import Any
 
-from symtop.methods.engines import engine_kicks as kicks, engine_schemes as schemes, no_squish
-from symtop.methods.engines.engine_kicks import Substeps
-from symtop.methods.engines.engine_loop import (
+from symtop.methods.engines import maps, maps as kicks, maps as schemes
+from symtop.methods.engines.loop import (
     ANGULAR_MOMENTUM,
     VELOCITY,
     Carried,
+    Substeps,
+    acceleration,
     attitude_loop,
     axis_loop,
     nothing,
     single,
 )
-from symtop.methods.engines.engine_parts import acceleration
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.registry import ENGINE, Integrator
@@ -93,7 +93,7 @@ def built_in() -> list[Integrator]:
                 "ode lacoursiere-2006"),
         _engine("lammps-rigid", schemes.richardson, 2, "LAMMPS fix rigid: half kicks around an extrapolated rotation",
                 "lammps", "p_phi", carried=ANGULAR_MOMENTUM),
-        _entry("no-squish", {"attitude": no_squish.march}, 2, "LAMMPS fix rigid/nve: turns about the body's axes",
+        _entry("no-squish", {"attitude": maps.march_no_squish}, 2, "LAMMPS fix rigid/nve: turns about the body's axes",
                "miller-2002 lammps", "p_phi", carried=ANGULAR_MOMENTUM, symplectic=True),
         _engine("yade", schemes.fincham_at_start, 1, "YADE: rotational leapfrog with the axes of the start of a step",
                 "yade", "p_phi", carried=ANGULAR_MOMENTUM),

@@ -16,8 +16,7 @@ import numpy as np
 
 from symtop.core.parallel import heed
 from symtop.methods.framework.many import Many, Whole, refused
-from symtop.methods.framework.outcomes import LEFT_CHART, OK, OUT_OF_BUDGET, OUTCOMES
-from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.plan import LEFT_CHART, OK, OUT_OF_BUDGET, OUTCOMES, Array, Plan, Run
 from symtop.methods.framework.preparation import Requirement
 from symtop.model.top import Angles, SymmetricTop, flat
 

@@ -1,16 +1,27 @@
-"""The angles chart for kernels: state (theta, p_theta, phi, psi), parameters with both momenta.
+"""The two charts in angles for kernels. Both end at theta = 0 and pi.
 
-The chart ends at theta = 0 and pi. p_phi and p_psi enter as parameters, so every kernel of this chart must
+*Reduced*: state (theta, p_theta, phi, psi). p_phi and p_psi enter as parameters, so every kernel of this chart must
 show them again from the increments that it produced (`observe` in `loop`).
+
+*Unreduced*: state (theta, phi, psi, theta', phi', psi'), nothing eliminated; the Euler-Lagrange equations, solved for
+the accelerations:
+
+    theta'' = sin(theta) [phi' (I1 phi' cos(theta) - I3 w3) + mgl] / I1,     w3 = psi' + phi' cos(theta)
+    phi''   = theta' (I3 w3 - 2 I1 phi' cos(theta)) / (I1 sin(theta))
+    psi''   = theta' phi' sin(theta) - phi'' cos(theta)
+
+Energy, p_phi and p_psi are functions of this state, so that a drift shows. Source: Goldstein, Classical Mechanics, 5.7.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.outcomes import LEFT_CHART, NOT_FINITE, OK
-from symtop.methods.framework.preparation import Preparation, Requirement, conserved
+from symtop.core.sines import sincos
+from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, Array
+from symtop.methods.framework.preparation import Preparation, Requirement, Shown, conserved
 
 
 class ReducedTop(NamedTuple):
@@ -62,3 +73,70 @@ def _reduced(top: Any, at: Any) -> Any:
 
 
 reduced = Preparation(_reduced, 4, require_chart)
+
+
+LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws the line
+
+
+@register_jitable
+def accelerations(I1: Any, I3: Any, mgl: Any, theta: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any) -> Any:
+    """theta'', phi'' and psi'' on floats; NaN exactly at a pole. Plain Python as it stands, and compiles."""
+    s, c = sincos(theta)
+    if s == 0.0:  # the interpreter would raise where it divides, and lose the run
+        s = math.nan
+    spin = I3 * (psi_dot + phi_dot * c)
+    theta_ddot = s * (phi_dot * (I1 * phi_dot * c - spin) + mgl) / I1
+    phi_ddot = theta_dot * (spin - 2.0 * I1 * phi_dot * c) / (I1 * s)
+    return theta_ddot, phi_ddot, theta_dot * phi_dot * s - phi_ddot * c
+
+
+@register_jitable
+def field_angles(par: Any, y: Any) -> Any:
+    """Time derivative of the state."""
+    theta_ddot, phi_ddot, psi_ddot = accelerations(par.I1, par.I3, par.mgl, y[0], y[3], y[4], y[5])
+    return y[3], y[4], y[5], theta_ddot, phi_ddot, psi_ddot
+
+
+def _with_rates(top: Any, at: Any) -> Any:
+    """Kernel parameters and state of a start."""
+    state = (at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot)
+    return BareTop(top.I1, top.I3, top.mgl), state
+
+
+with_rates = Preparation(_with_rates, 6, require_chart)
+
+
+@register_jitable
+def momenta(par: Any, theta: Any, phi_dot: Any, psi_dot: Any) -> Any:
+    """p_phi and p_psi of angles and rates, floats or arrays."""
+    s, c = sincos(theta)
+    p_psi = par.I3 * (psi_dot + phi_dot * c)
+    return par.I1 * phi_dot * s * s + p_psi * c, p_psi
+
+
+def observe_angles(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+    """p_phi and p_psi of the state after the step."""
+    return momenta(par, before[0] + dstate[0], before[4] + dstate[4], before[5] + dstate[5])
+
+
+@register_jitable
+def ended_angles(y: Any) -> int:
+    """Is the state finite and theta a point of the chart?"""
+    # zero, or NaN where any of them is not finite: one question about theta then answers for all six, without a branch
+    nothing = 0.0 * (y[1] + y[2] + y[3] + y[4] + y[5])
+    outcome: int = chart_outcome(y[0] + nothing)
+    return outcome
+
+
+def sampled_momenta(par: Any, states: Array) -> tuple[Array, Array]:
+    """p_phi and p_psi of states, shape (samples, 6)."""
+    p_phi, p_psi = momenta(par, states[:, 0], states[:, 4], states[:, 5])
+    return p_phi, p_psi
+
+
+def _to_angles(par: Any, t: float, y: Any) -> Any:
+    """An unreduced state as (theta, p_theta, phi, psi), the angles chart of `simulate`."""
+    return y[0], par.I1 * y[3], y[1], y[2]
+
+
+to_angles = Shown(_to_angles, 4)

@@ -13,8 +13,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, door
 from symtop.core.signals import at_most
-from symtop.methods.framework.outcomes import OUTCOMES
-from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.plan import OUTCOMES, Array, Plan, Run
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import DIMENSIONS
 from symtop.model.top import Angles, SymmetricTop, flat

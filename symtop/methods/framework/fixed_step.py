@@ -9,11 +9,9 @@ import numpy as np
 
 from symtop.core.parallel import heed
 from symtop.methods.framework import loop as loops
-from symtop.methods.framework.blocks import Blocks
 from symtop.methods.framework.loop import Loop, March
-from symtop.methods.framework.many import GROUP, Many, Whole, groups, in_turn, members_of, refused
-from symtop.methods.framework.outcomes import LEFT_CHART, OUTCOMES
-from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.many import GROUP, Blocks, Many, Whole, groups, in_turn, members_of, refused
+from symtop.methods.framework.plan import LEFT_CHART, OUTCOMES, Plan, Run
 from symtop.methods.framework.preparation import (
     Later,
     Pack,

@@ -34,10 +34,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.core.jit import compile_kernel, register_jitable, set_item
-from symtop.methods.framework.blocks import Blocks
 from symtop.methods.framework.lanes import Lanes, marching as marching_lanes, preparing, showing
-from symtop.methods.framework.outcomes import OK
+from symtop.methods.framework.many import Blocks
+from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import Body, Start, as_it_steps, conserved
+from symtop.methods.vectors import accumulate, accumulate_plainly
 
 Array = NDArray[np.float64]
 Marks = NDArray[np.int64]
@@ -62,31 +63,6 @@ class March(NamedTuple):
     steps: int  # completed since the start of the run
     work: int  # force evaluations or solver iterations, as the family counts them
     outcome: int  # index into OUTCOMES
-
-
-@register_jitable
-def accumulate(state: Any, low: Any, dstate: Any) -> Any:
-    """(state + low) + dstate as a new pair of high and low parts; exact (Knuth's two-sum).
-
-    One loop for both tuples is too long for LLVM to unroll over the nine components of a frame; left as it is, it moves
-    both through memory at each of them, 34 ns a step.
-    """
-    total = state
-    for i in range(len(state)):
-        total = set_item(total, i, state[i] + (dstate[i] + low[i]))
-    for i in range(len(state)):
-        addend = dstate[i] + low[i]
-        virtual = total[i] - state[i]
-        low = set_item(low, i, (state[i] - (total[i] - virtual)) + (addend - virtual))
-    return total, low
-
-
-@register_jitable
-def accumulate_plainly(state: Any, low: Any, dstate: Any) -> Any:
-    """What everybody else's loop does: what a step rounds off is lost, if the kernel does not keep it. To compare."""
-    for i in range(len(state)):
-        state = set_item(state, i, state[i] + dstate[i])
-    return state, low
 
 
 @register_jitable

@@ -5,13 +5,14 @@ made by a family (`discrete_lagrangian`, `composition`, ...) from a table of num
 function ``solve(top, start, plan) -> Run``. Nothing is decided by an integrator's name: what a measurement needs to
 know of a method is a field of its record.
 
-A method in one of its charts is a *row* of a comparison, ``rk4[axis]``: method and chart are two factors, and a
-comparison of ``rk4[angles]`` with ``strang[axis]`` changes both. `rows` lists them; `integrator` knows them by name.
+A method in one of its charts is a *variant*, ``rk4[axis]``: method and chart are two factors, and a comparison of
+``rk4[angles]`` with ``strang[axis]`` changes both. `variants` lists them; `integrator` knows them by name.
 
 The maps of physics engines, family ``engine``, are registered, judged and run by name as every integrator is. They are
-what people are given, not what one would choose: `methods`, and so `rows` and every comparison, leaves them out.
+what people are given, not what one would choose: `methods`, and so `variants` and every comparison, leaves them out.
 """
 
+import functools
 import importlib
 import importlib.metadata
 import re
@@ -19,6 +20,7 @@ import threading
 import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
+from importlib import resources
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -39,7 +41,6 @@ from symtop.core.errors import (
     words_of,
 )
 from symtop.core.signals import is_of_user
-from symtop.methods.framework.about import paragraphs
 from symtop.methods.framework.plan import Plan, Run
 from symtop.model.charts import DIMENSIONS
 from symtop.model.top import Angles, Momenta, SymmetricTop
@@ -68,14 +69,14 @@ SMALLEST_FIRST = {  # the charts that show it, in order of preference
     "nutation": ("angles", "axis", "attitude"), "axis": ("axis", "angles", "attitude"),
     "attitude": ("angles", "attitude"),
 }  # fmt: skip
-_ROW = re.compile(r"(.+)\[(\w+)\]")
+_VARIANT = re.compile(r"(.+)\[(\w+)\]")
 _CLAIM = {True: "yes", False: "no", None: "unknown"}
 
 
 def split_name(name: str) -> tuple[str, str]:
-    """The method and the chart in the name of a row, ``rk4[axis]``; the chart is empty in any other name."""
-    row = _ROW.fullmatch(name) if isinstance(name, str) else None
-    return (row[1], row[2]) if row else (name, "")
+    """The method and the chart in the name of a variant, ``rk4[axis]``; the chart is empty in any other name."""
+    match = _VARIANT.fullmatch(name) if isinstance(name, str) else None
+    return (match[1], match[2]) if match else (name, "")
 
 
 class Setting(NamedTuple):
@@ -207,7 +208,7 @@ class Integrator:
         """The name without a chart."""
         return split_name(self.name)[0]
 
-    def row(self, chart: str) -> "Integrator":
+    def variant(self, chart: str) -> "Integrator":
         """The same integrator with nothing but its solver of one chart, named ``method[chart]``."""
         name = f"{self.method}[{one_of(f'chart of {self.method}', chart, self.solvers)}]"
         return self if name == self.name else replace(self, name=name, solvers={chart: self.solvers[chart]})
@@ -229,10 +230,11 @@ class Integrator:
 
 _BUILT_IN = (
     "lagrangian.discrete_lagrangian", "lagrangian.unreduced", "lagrangian.galerkin", "lagrangian.exact_discrete",
-    "lie_group.lie_variational", "splitting.splitting", "splitting.reversible_steps", "runge_kutta.runge_kutta",
-    "runge_kutta.dormand_prince", "runge_kutta.pairs", "runge_kutta.gauss", "runge_kutta.kahan", "lie_group.lie_runge_kutta",
-    "lie_group.energy_momentum", "lie_group.generalised_alpha", "runge_kutta.collective_gauss", "library.scipy_ivp",
-    "taylor.taylor", "taylor.series", "library.exact", "engines.engines",
+    "lie_group.variational", "splitting.composition", "splitting.reversible", "runge_kutta.explicit",
+    "runge_kutta.dormand_prince", "runge_kutta.pairs", "runge_kutta.gauss", "runge_kutta.kahan",
+    "lie_group.runge_kutta", "lie_group.energy_momentum", "lie_group.generalised_alpha",
+    "runge_kutta.collective_gauss", "library.scipy_ivp", "taylor.heyoka", "taylor.series", "library.exact",
+    "engines.engines",
 )  # fmt: skip
 ENTRY_POINTS = "symtop.integrators"  # an Integrator, or a function that returns several
 
@@ -279,7 +281,7 @@ def register(entry: Integrator, *, replace: bool = False) -> Integrator:
     if not isinstance(entry, Integrator):
         raise SymtopError(f"register needs an Integrator, not {entry!r}")
     if entry.method != entry.name:
-        raise SymtopError(f"register needs an integrator and not one of its rows, {entry.name!r}")
+        raise SymtopError(f"register needs an integrator and not one of its variants, {entry.name!r}")
     _load()
     if entry.name in _registry and not replace:
         raise SymtopError(f"integrator {entry.name!r} is already registered; choose another name or pass replace=True")
@@ -294,13 +296,13 @@ def is_built_in(name: str) -> bool:
 
 
 class _Integrators(dict[str, Integrator]):
-    """The registry as a dict; a notebook shows it as a table. A row is found under its name, too, but not listed."""
+    """The registry as a dict; a notebook shows it as a table. A variant is found by its name, too, but not listed."""
 
     def __missing__(self, name: str) -> Integrator:
         method, chart = _method_and_chart(name, self)
         if not chart or method not in self:
             raise KeyError(name)
-        return self[method].row(chart)
+        return self[method].variant(chart)
 
     def _repr_html_(self) -> str:
         import pandas as pd  # 0.2 s
@@ -339,7 +341,7 @@ def engines() -> dict[str, Integrator]:
 
 @by_name
 def integrator(name: "str | Integrator") -> Integrator:
-    """The integrator of that name, or the row: ``rk4[axis]`` works in no other chart, nor does ``rk4-axis``, the same.
+    """The integrator or variant of that name: ``rk4[axis]``, or ``rk4-axis``, works in no other chart.
 
     An Integrator is returned as is. Raises SymtopError for an unknown name, with the nearest ones, and for a chart that
     the method does not have.
@@ -351,12 +353,49 @@ def integrator(name: "str | Integrator") -> Integrator:
     if isinstance(method, str) and method in _missing:
         raise SymtopError(_missing[method])
     entry = _registry[one_of("integrator", method, _registry)]
-    return entry.row(chart) if chart else entry
+    return entry.variant(chart) if chart else entry
 
 
 @by_name
-def rows(observe: str | None = None) -> list[Integrator]:
+def variants(observe: str | None = None) -> list[Integrator]:
     """Each of `methods` in each of its charts, or in those that show the "nutation", the "axis" or the "attitude"."""
     showing = None if observe is None else SMALLEST_FIRST[one_of("observe", observe, SMALLEST_FIRST)]
     pairs = ((entry, chart) for entry in methods().values() for chart in entry.charts())
-    return [entry.row(chart) for entry, chart in pairs if showing is None or chart in showing]
+    return [entry.variant(chart) for entry, chart in pairs if showing is None or chart in showing]
+
+
+@functools.cache
+def bibliography() -> dict[str, str]:
+    """The text of every entry, by its key. An entry begins with @ in the first column and ends with } there."""
+    text = resources.files("symtop.methods").joinpath("citations.bib").read_text(encoding="utf-8")
+    return {
+        match["key"]: match[0]
+        for match in re.finditer(r"^@\w+\{(?P<key>[^,\s]+),$.*?^\}", text, re.MULTILINE | re.DOTALL)
+    }
+
+
+def citation_keys(method: Integrator) -> list[str]:
+    """The entries that an integrator's `reference` names; a reference may also be plain words."""
+    return [key for key in method.reference.replace(",", " ").split() if key in bibliography()]
+
+
+def citation(name: "str | Integrator") -> str:
+    """BibTeX of the source of an integrator, by its name.
+
+    Raises SymtopError for an unknown name, or if the integrator names no source that is known here.
+    """
+    method = integrator(name)
+    named = citation_keys(method)
+    if not named:
+        raise SymtopError(
+            f"integrator {method.name!r} names no source that is known here (its reference is {method.reference!r})"
+        )
+    return "\n\n".join(bibliography()[key] for key in named)
+
+
+@functools.cache
+def paragraphs() -> dict[str, str]:
+    """The text under each heading ``## NAME``, on one line."""
+    text = resources.files("symtop.methods").joinpath("about.md").read_text(encoding="utf-8")
+    _, *sections = re.split(r"^## (.+)$", text, flags=re.MULTILINE)
+    return {name: " ".join(body.split()) for name, body in zip(sections[::2], sections[1::2], strict=True)}

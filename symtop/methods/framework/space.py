@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.outcomes import NOT_FINITE, OK
+from symtop.methods.framework.plan import NOT_FINITE, OK
 from symtop.methods.framework.preparation import Preparation, Shown
 from symtop.model import charts
 

@@ -66,14 +66,20 @@ import numpy as np
 from symtop.core.jit import fused, register_jitable, set_item
 from symtop.core.jit_functions import two_product
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import accumulate_plainly, driver
-from symtop.methods.framework.one_loop_lanes import one_loop
+from symtop.methods.framework.lanes import Lanes, one_loop
+from symtop.methods.framework.loop import driver
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome
-from symtop.methods.lagrangian.exact_map import Map, numbers
-from symtop.methods.lagrangian.oscillators import OscillatorTop, attitude_state, axis_state, on_oscillators
+from symtop.methods.lagrangian.oscillators import (
+    Map,
+    OscillatorTop,
+    attitude_state,
+    axis_state,
+    numbers,
+    on_oscillators,
+)
+from symtop.methods.vectors import accumulate_plainly
 
 SHARE = 0.5  # of what breaks |chi| = 1 that a step takes off: all of it would feed on the rounding that the loop sums
 IDLE = 2e-15  # |chi|^2 may be off by as much: below that, what is seen of it is the rounding of |Z|^2

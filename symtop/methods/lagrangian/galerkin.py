@@ -39,9 +39,8 @@ from symtop.methods.framework.angles import ReducedTop, chart_outcome, reduced
 from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.lanes import Lanes
 from symtop.methods.framework.loop import driver
-from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton
-from symtop.methods.framework.newton_lanes import iterated
-from symtop.methods.framework.outcomes import NOT_CONVERGED
+from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
+from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.registry import Integrator
 
 

@@ -30,7 +30,7 @@ from symtop.methods.framework.angles import BareTop, chart_outcome, require_char
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.loop import driver
 from symtop.methods.framework.newton import Correction, newton
-from symtop.methods.framework.outcomes import NOT_CONVERGED
+from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.preparation import Preparation, Shown, conserved
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.discrete_lagrangian import built_in as reduced_methods, rule_of

@@ -25,11 +25,10 @@ Sources: Simo, Wong, Int. J. Numer. Methods Eng. 31 (1991) 19; Gonzalez, J. Nonl
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.engines.engine_parts import cross, dot, plus, scaled
-from symtop.methods.framework.outcomes import NOT_CONVERGED, OK
+from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.lie_iterated_lanes import iterated
-from symtop.methods.lie_group.lie_loop import SPUN, cayley, gravity, in_both_charts, lie_loop
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, inertia, iterated, lie_loop
+from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
 MOST = 30  # iterations of a step; 3 or 4 are the rule
 ENOUGH = 1e-9  # a correction of u whose square is below rounding, relative to 1 + |u|
@@ -39,20 +38,6 @@ class Midpoint(NamedTuple):
     """The parts that a step is composed of."""
 
     shares: tuple[float, ...] = (1.0,)
-
-
-@register_jitable
-def inertia(par: Any, e: Any, x: Any) -> Any:
-    """J x = I1 x + (I3 - I1)(e.x) e."""
-    return plus(scaled(par.I1, x), (par.I3 - par.I1) * dot(e, x), e)
-
-
-@register_jitable
-def solved(a: Any, b: Any, c: Any, y: Any) -> Any:
-    """x of M x = y for the matrix with columns a, b and c, by Cramer's rule."""
-    bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
-    inverse = 1.0 / dot(a, bc)
-    return inverse * dot(bc, y), inverse * dot(ca, y), inverse * dot(ab, y)
 
 
 @register_jitable
@@ -90,7 +75,7 @@ def _corrected(par: Any, e: Any, a: Any, quarter: float, u: Any) -> Any:
     first = _column(par, e, u, Ju, mean, pull, quarter, (1.0, 0.0, 0.0))
     second = _column(par, e, u, Ju, mean, pull, quarter, (0.0, 1.0, 0.0))
     third = _column(par, e, u, Ju, mean, pull, quarter, (0.0, 0.0, 1.0))
-    change = solved(first, second, third, rest)
+    change = solve3(first, second, third, rest)
     u = plus(u, 1.0, change)
     size = abs(change[0]) + abs(change[1]) + abs(change[2])
     return u, size <= ENOUGH * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2]))

@@ -22,13 +22,12 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, finite
 from symtop.core.jit import register_jitable
-from symtop.methods.engines.engine_parts import axis, cross, plus, scaled
-from symtop.methods.framework.outcomes import NOT_CONVERGED, OK
+from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.energy_momentum import inertia, solved
-from symtop.methods.lie_group.lie_iterated_lanes import iterated
-from symtop.methods.lie_group.lie_loop import SPUN, gravity, in_both_charts, lie_loop, moved
+from symtop.methods.framework.space import axis_of
+from symtop.methods.lie_group.loop import SPUN, gravity, in_both_charts, inertia, iterated, lie_loop, moved
 from symtop.methods.splitting.rotor import EXACT, near, rotor
+from symtop.methods.vectors import cross, plus, scaled, solve3
 
 MOST = 50  # iterations of a step; 4 to 6 are the rule
 ENOUGH = 1e-14  # a correction of W', relative to its parts, that is rounding
@@ -61,7 +60,7 @@ def _freely(par: Any, e: Any, w: Any) -> Any:
 @register_jitable
 def _begun(par: Any, state: Any) -> Any:
     """W' of the start, in space."""
-    e = axis((state[0], state[1], state[2], state[3]))
+    e = axis_of(state[0], state[1], state[2], state[3])
     w = _rates(par, e, (state[4], state[5], state[6]))
     return _rates(par, e, plus(gravity(par, e), -1.0, _freely(par, e, w)))
 
@@ -100,7 +99,7 @@ def _corrected(par: Any, e: Any, w: Any, m: float, v: Any, gain: Any, by: float,
     rest = plus(plus(torque, -1.0, free), -1.0, inertia(par, e, slope))
     x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     Jx, Jy, Jz = inertia(par, e, x), inertia(par, e, y), inertia(par, e, z)
-    change = solved(
+    change = solve3(
         plus(Jx, by, plus(cross(x, J), 1.0, cross(rate, Jx))),
         plus(Jy, by, plus(cross(y, J), 1.0, cross(rate, Jy))),
         plus(Jz, by, plus(cross(z, J), 1.0, cross(rate, Jz))),

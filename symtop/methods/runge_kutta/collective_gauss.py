@@ -29,12 +29,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
-from symtop.methods.engines.engine_parts import product
-from symtop.methods.framework.outcomes import NOT_CONVERGED, OK
+from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Array, Integrator
-from symtop.methods.lie_group.lie_loop import UNSPUN, in_both_charts, lie_loop
+from symtop.methods.lie_group.loop import UNSPUN, in_both_charts, lie_loop
 from symtop.methods.runge_kutta.gauss import ROUND_OFF, SWEEPS, gauss_rule, stage_weights
+from symtop.methods.vectors import product
 
 STAGES = (1, 2, 3)
 ORIGIN = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

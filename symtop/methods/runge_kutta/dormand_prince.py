@@ -24,12 +24,12 @@ import numpy as np
 
 from symtop.core.jit import compile_kernel, register_jitable, set_item
 from symtop.methods.framework.adaptive import Adaptive, Loop
-from symtop.methods.framework.euler_lagrange import LEAST_TOLERANCE
-from symtop.methods.framework.formulations import FORMULATIONS
-from symtop.methods.framework.outcomes import OK, STEP_TOO_SMALL
+from symtop.methods.framework.angles import LEAST_TOLERANCE
+from symtop.methods.framework.equations import FORMULATIONS
+from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import Body, Start, as_it_steps
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.runge_kutta.runge_kutta import add, later_stages, plus, store, weighted
+from symtop.methods.runge_kutta.explicit import add, later_stages, plus, store, weighted
 
 BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
 EVALUATIONS = 1_000_000_000  # a run's limit: about half a minute

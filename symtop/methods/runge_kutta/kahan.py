@@ -24,15 +24,13 @@ from typing import Any
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.engines.engine_parts import cross, dot, plus, scaled
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.loop import driver
-from symtop.methods.framework.outcomes import OUTCOMES
-from symtop.methods.framework.plan import Run
+from symtop.methods.framework.plan import OUTCOMES, Run
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome, frame_to_attitude, observe_axis, on_axis, on_frame
-from symtop.methods.lie_group.energy_momentum import solved
+from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 from symtop.model.top import Angles, SymmetricTop
 
 frame_sample = frame_to_attitude.sample
@@ -59,7 +57,7 @@ def _axis_step(par: Any, e: Any, L: Any, h: float) -> Any:
     first = _image(g, c, e, L, (1.0, 0.0, 0.0))
     second = _image(g, c, e, L, (0.0, 1.0, 0.0))
     third = _image(g, c, e, L, (0.0, 0.0, 1.0))
-    d = solved(first, second, third, right)
+    d = solve3(first, second, third, right)
     return d, (-c * (2.0 * e[1] + d[1]), c * (2.0 * e[0] + d[0]), 0.0)
 
 

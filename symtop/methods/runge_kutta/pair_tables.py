@@ -1,8 +1,8 @@
 """The coefficients of embedded explicit pairs of order 5, 8 and 9, as published; `tests` has their order conditions.
 
-    tsit5     Tsitouras, Comput. Math. Appl. 62 (2011) 770: 5(4), the last stage of a step is the first of the next
-    dop853    Hairer, Norsett, Wanner, Solving ODEs I, section II.5 and II.6: 8(5,3), samples of order 7
-    vern9     Verner, Numer. Algorithms 53 (2010) 383: 9(8), the "most efficient" one
+tsit5     Tsitouras, Comput. Math. Appl. 62 (2011) 770: 5(4), the last stage of a step is the first of the next
+dop853    Hairer, Norsett, Wanner, Solving ODEs I, section II.5 and II.6: 8(5,3), samples of order 7
+vern9     Verner, Numer. Algorithms 53 (2010) 383: 9(8), the "most efficient" one
 """
 
 from typing import NamedTuple

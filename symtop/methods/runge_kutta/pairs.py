@@ -11,7 +11,7 @@ The steps are chosen as SciPy chooses them (`dormand_prince`), |err| by the orde
 
 `dop853-compiled` accepts and rejects the steps of SciPy's `dop853` and takes as many f. Stages that are written out
 keep their slopes in registers: on the axis a step of order 8 takes a quarter of the time of a loop over the table.
-Explicit, neither symplectic nor symmetric; nothing is conserved but what is linear in the state (`formulations`).
+Explicit, neither symplectic nor symmetric; nothing is conserved but what is linear in the state (`equations`).
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, sections II.5 and II.6; `pair_tables`.
 """
 
@@ -23,14 +23,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
-from symtop.methods.framework.euler_lagrange import LEAST_TOLERANCE
+from symtop.methods.framework.angles import LEAST_TOLERANCE
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.formulations import FORMULATIONS
 from symtop.methods.framework.loop import Loop, driver
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.dormand_prince import Method, interpolate, nothing_more, rms, solver
+from symtop.methods.runge_kutta.explicit import Tableau, add, plus, row_of, store, weighted
 from symtop.methods.runge_kutta.pair_tables import DOP853, TSIT5, VERN9, Row, Table
-from symtop.methods.runge_kutta.runge_kutta import Tableau, add, plus, row_of, store, weighted
 
 
 @register_jitable
@@ -122,7 +122,9 @@ class Pair(NamedTuple):
             part = x * h
             return plus(state, total(zero(state), stages(par, state, row_of(slopes, 0, state), slopes, part), part))
 
-        parts = Method(attempt, nothing_more, polynomial if dense else shorter, cost + 1, cost, -1 / (self.estimate + 1))
+        parts = Method(
+            attempt, nothing_more, polynomial if dense else shorter, cost + 1, cost, -1 / (self.estimate + 1)
+        )
         return parts if not two else parts._replace(**_order_seven(table, field, cost))
 
     def adaptive(self) -> Integrator:

@@ -18,6 +18,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from symtop.methods.splitting.loop import exact_sum
+
 
 class Table(NamedTuple):
     """A symmetric composition: drifts a_1 .. a_n, kicks b_0 .. b_n and their force gradients c_0 .. c_n."""
@@ -32,18 +34,6 @@ def palindrome(outer: Sequence[float], *, odd: bool) -> tuple[float, ...]:
     """`outer`, then the middle one (or two equal ones) that close the sum to 1, then `outer` backwards."""
     half = math.fsum([0.5, *(-value for value in outer)])  # rounded once
     return (*outer, *((2.0 * half,) if odd else (half, half)), *reversed(outer))
-
-
-def exact_sum(values: Sequence[float], total: float = 1.0) -> tuple[float, ...]:
-    """The same coefficients with what is missing from `total` given to the middle one, or to the middle two equally."""
-    closed, n = list(values), len(values)
-    surplus = math.fsum((*closed, -total))
-    if n % 2:
-        closed[n // 2] -= surplus
-    else:
-        closed[n // 2 - 1] -= 0.5 * surplus
-        closed[n // 2] -= 0.5 * surplus
-    return tuple(closed)
 
 
 def strang_steps(order: int, outer: Sequence[float]) -> Table:
@@ -66,7 +56,7 @@ def drift_first(order: int, drift: Sequence[float], kick: Sequence[float]) -> Ta
 
 
 class Splitting(NamedTuple):
-    """A built-in method: the arguments of `symtop.methods.splitting.splitting.composition` beside its name."""
+    """A built-in method: the arguments of `symtop.methods.splitting.composition.composition` beside its name."""
 
     table: Table
     reference: str  # a key of citations.bib

@@ -19,8 +19,7 @@ from symtop.methods.framework.calling import solve
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import W
 from symtop.methods.framework.many import Many, members_of
-from symtop.methods.framework.outcomes import LEFT_CHART, NOT_FINITE, OK, OUTCOMES
-from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUTCOMES, Plan
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
 from symtop.model import charts

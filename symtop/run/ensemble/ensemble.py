@@ -19,7 +19,7 @@ from symtop.core import cluster, netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, place, positive, shown, truth, whole
 from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import beating
-from symtop.methods.framework.outcomes import OUTCOMES
+from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.exact.motion_samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of

@@ -21,8 +21,7 @@ import math
 from typing import NamedTuple
 
 from symtop.core.numbers import EPSILON
-from symtop.methods.framework.outcomes import sentence
-from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.plan import Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.guard.forecast import Forecast, Landmarks, forecast, landmarks

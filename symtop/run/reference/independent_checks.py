@@ -22,7 +22,7 @@ from symtop.core.errors import SymtopError, door
 from symtop.core.multiprecision import context
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
-from symtop.methods.taylor import taylor
+from symtop.methods.taylor import heyoka
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
@@ -48,9 +48,9 @@ def integrate(scene: Scene, times: charts.Array, precision: str, chart: str = "a
 
     Raises SymtopError if it does not reach the last time, as where mgl/I1 is 1e60.
     """
-    tolerance = taylor.arithmetic(precision).epsilon / 100.0
+    tolerance = heyoka.arithmetic(precision).epsilon / 100.0
     with door(f"heyoka's integration of {scene.name} in {precision}"):
-        flight = taylor.propagate(chart, precision, tolerance, scene.top, scene.start, times)
+        flight = heyoka.propagate(chart, precision, tolerance, scene.top, scene.start, times)
     if len(flight.states) < times.size:
         reached = float(times[len(flight.states) - 1]) if len(flight.states) else 0.0
         raise SymtopError(

@@ -25,7 +25,7 @@ from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, one_of
 from symtop.core.numbers import EPSILON, TINY, real_numbers
 from symtop.core.over_time import over_time
-from symtop.methods.taylor import taylor
+from symtop.methods.taylor import heyoka
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.disk_cache import kept, place
@@ -167,7 +167,7 @@ def _integration(scene: Scene, times: charts.Array, precision: str) -> xr.Datase
 def judged_integration(scene: Scene, times: charts.Array, precision: str, run: Flown) -> xr.Dataset:
     """Values, low halves and bounds at the times of a run, increasing and distinct, as `reference` has them."""
     values, checks = integrated(scene, run)
-    grain = 8.0 * max(taylor.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
+    grain = 8.0 * max(heyoka.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
     columns: dict[str, charts.Array] = {}
     for name, (high, low) in {name: _split(value) for name, value in values.items()}.items():
         columns |= {name: high, f"{name}_lo": low}

@@ -6,9 +6,9 @@ import symtop
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.loop import driver
 from symtop.methods.framework.space import observe_axis, on_axis
-from symtop.methods.splitting import splitting_space as family
+from symtop.methods.splitting import space as family
 from symtop.methods.splitting.coefficients import STRANG
-from symtop.methods.splitting.splitting_loop import Stages
+from symtop.methods.splitting.loop import Stages
 
 
 def increment(par, rule, state, carry, h):

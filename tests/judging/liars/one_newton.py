@@ -10,7 +10,7 @@ from symtop.methods.framework.angles import chart_outcome, reduced
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.loop import driver
 from symtop.methods.lagrangian import discrete_lagrangian as family
-from symtop.methods.lagrangian.node_sums import forces, node_sums, opening
+from symtop.methods.lagrangian.discrete_lagrangian import forces, node_sums, opening
 
 
 def increment(par, rule, state, carry, h):

@@ -4,7 +4,7 @@ import symtop
 from symtop.methods.framework.angles import chart_outcome, reduced
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.loop import driver
-from symtop.methods.splitting import splitting_angles
+from symtop.methods.splitting import angles
 
 
 def begin(par, rule, state, h):
@@ -15,9 +15,9 @@ def begin(par, rule, state, h):
 def increment(par, rule, state, carry, h):
     """theta += v h^2/2 + a h, where v h + a h^2/2 is meant."""
     zero = (0.0, 0.0, 0.0, 0.0)
-    slope, precession, turn = splitting_angles.force_angles(par, state, zero)
+    slope, precession, turn = angles.force_angles(par, state, zero)
     move = (0.5 * h * h * state[1] - h * slope) / par.I1
-    after, precession_after, turn_after = splitting_angles.force_angles(par, state, (move, 0.0, 0.0, 0.0))
+    after, precession_after, turn_after = angles.force_angles(par, state, (move, 0.0, 0.0, 0.0))
     kick = -0.5 * h * (slope + after)
     wheel = 0.5 * h * (precession + precession_after)
     return (

@@ -33,13 +33,12 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.engines.engine_parts import cross, dot, plus, scaled
 from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.outcomes import NOT_CONVERGED, OK
+from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.lie_iterated_lanes import iterated
-from symtop.methods.lie_group.lie_loop import SPUN, cayley, gravity, in_both_charts, lie_loop, moved
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, iterated, lie_loop, moved
 from symtop.methods.splitting.coefficients import SUZUKI_4
+from symtop.methods.vectors import cross, dot, plus, scaled
 
 MOST = 60  # iterations of a step; 2 to 5 are the rule
 ENOUGH = 1e-10  # a relative correction whose square is below rounding

@@ -1,31 +1,78 @@
-"""field(): the top's equations y' = f(t, y) for anybody's solver, in NumPy or compiled.
+"""The top's equations as a library for differential equations wants them: one right-hand side y' = f(y) a chart.
 
-    chart      y                                                         shape    ends
-    angles     theta, phi, psi, theta', phi', psi'                        (6,)     at theta = 0 and pi (NaN)
-    axis       e_x, e_y, e_z, L_x, L_y, L_z                               (6,)     nowhere
-    attitude   q_w, q_x, q_y, q_z, L_x, L_y, L_z                          (7,)     nowhere
+    chart      y                                       multiplications, divisions   sines, cosines   ends
+    angles     (theta, phi, psi, theta', phi', psi')                           16                2   theta = 0 and pi
+    axis       (e, L)                                                          12                0   nowhere
+    attitude   (q, L)                                                          29                0   nowhere
 
-Angles are in radians and rates in radians per unit time. e is the unit vector along the axis of the top, q the unit
-quaternion from body to space (the body's third axis is the top's), L the angular momentum about the fixed point in the
-space frame, whose z points up; L has the units of I1 times a rate. Any consistent units will do; time does not occur.
-The equations are those of every Runge-Kutta method here (`symtop.methods.framework.formulations`).
+(see `angles` and `space`). In each of the three, energy and momenta are functions of the state, so that whatever a
+method does to them shows. Every Runge-Kutta method, compiled or a library's, takes f from here, so that method and
+chart can be varied one at a time; `field` gives it to anybody's solver. A Runge-Kutta method keeps what is linear in
+its state, and no explicit one keeps more: p_phi = L_z in the space frame, nothing in angles.
 """
 
 import functools
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.core.errors import SymtopError, one_of
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.numbers import real_numbers
-from symtop.methods.framework.angles import BareTop
-from symtop.methods.framework.euler_lagrange import field_angles
-from symtop.methods.framework.formulations import FORMULATIONS
-from symtop.methods.framework.plan import Array
+from symtop.methods.framework import angles, space
+from symtop.methods.framework.angles import BareTop, field_angles
+from symtop.methods.framework.plan import OUTCOMES, Array, Run
 from symtop.methods.framework.space import SpaceTop, field_attitude, field_axis
 from symtop.model.charts import CHARTS
 from symtop.model.top import Angles, SymmetricTop
+from symtop.model.view import space_momenta
+
+
+class Formulation(NamedTuple):
+    """The equations in one chart. `field`, `ended` and `observe` are plain Python on tuples and compile as they are."""
+
+    field: Callable[[Any, Any], Any]  # (par, state) -> time derivative
+    ended: Callable[[Any], int]  # outcome of a state: OK, or how the chart was left
+    observe: Callable[..., Any]  # (par, rule, before, dstate, h) -> p_phi and p_psi after a step
+    prepare: Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]  # parameters and state of a start
+    present: (
+        Callable[[Any, Array, Array], Array] | None
+    )  # (par, times, states) -> states of the chart that `simulate` shows, where they differ
+    momenta: Callable[[Any, Array], tuple[Array, Array]]  # (par, states) -> p_phi and p_psi of samples
+
+
+def _axis_momenta(par: Any, states: Array) -> tuple[Array, Array]:
+    return space_momenta("axis", states)
+
+
+def _attitude_momenta(par: Any, states: Array) -> tuple[Array, Array]:
+    return space_momenta("attitude", states)
+
+
+FORMULATIONS = {
+    "angles": Formulation(
+        angles.field_angles,
+        angles.ended_angles,
+        angles.observe_angles,
+        angles.with_rates,
+        angles.to_angles,
+        angles.sampled_momenta,
+    ),
+    "axis": Formulation(space.field_axis, space.ended_space, space.observe_axis, space.on_axis, None, _axis_momenta),
+    "attitude": Formulation(
+        space.field_attitude, space.ended_space, space.observe_attitude, space.on_attitude, None, _attitude_momenta
+    ),
+}
+
+
+def as_run(
+    form: Formulation, par: Any, times: Array, states: Array, steps: int, evaluations: int, outcome: int, reached: float
+) -> Run:
+    """Samples of the state that was integrated, shape (samples, dimension), with both momenta recomputed from it."""
+    p_phi, p_psi = form.momenta(par, states)
+    shown = states if form.present is None else form.present(par, times, states)
+    return Run(shown, p_phi, p_psi, steps, evaluations, 0, OUTCOMES[outcome], reached)
 
 
 @register_jitable

@@ -21,8 +21,7 @@ from symtop.methods.framework.angles import ReducedTop, chart_outcome
 from symtop.methods.framework.lanes import Lanes
 from symtop.methods.framework.loop import driver
 from symtop.methods.framework.registry import Array
-from symtop.methods.splitting.splitting_lanes import composed
-from symtop.methods.splitting.splitting_loop import Composition, compose, stages
+from symtop.methods.splitting.loop import Composition, compose, composed, stages
 from symtop.model.effective import half_angle_force
 from symtop.model.top import Momenta
 from symtop.model.view import View

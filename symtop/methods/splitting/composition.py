@@ -22,20 +22,20 @@ from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.framework.registry import Integrator, ModifiedEnergy
 from symtop.methods.framework.space import on_attitude, on_axis
-from symtop.methods.splitting import splitting_angles, splitting_space
+from symtop.methods.splitting import angles, space
 from symtop.methods.splitting.coefficients import METHODS
+from symtop.methods.splitting.loop import Composition, closed, packed
 from symtop.methods.splitting.rotor import ROTATIONS, TUNED
-from symtop.methods.splitting.splitting_loop import Composition, closed, packed
 
 _KERNELS: dict[str, dict[str, tuple[Loop, Prepare]]] = {
-    "angles": {"angles": (splitting_angles.march, reduced)},
-    "space": {"axis": (splitting_space.march_axis, on_axis), "attitude": (splitting_space.march_attitude, on_attitude)},
+    "angles": {"angles": (angles.march, reduced)},
+    "space": {"axis": (space.march_axis, on_axis), "attitude": (space.march_attitude, on_attitude)},
 }
 # the modified energy and the sleeping threshold of kick-drift-kick, by chart and rotation
 _KICK_DRIFT_KICK: dict[tuple[str, str], tuple[ModifiedEnergy, Callable[[float], float] | None]] = {
-    ("angles", "exact"): (splitting_angles.verlet_energy, None),
-    ("space", "exact"): (splitting_space.strang_energy, splitting_space.strang_sleeps_from),
-    ("space", "cayley"): (splitting_space.cayley_correction, splitting_space.cayley_sleeps_from),
+    ("angles", "exact"): (angles.verlet_energy, None),
+    ("space", "exact"): (space.strang_energy, space.strang_sleeps_from),
+    ("space", "cayley"): (space.cayley_correction, space.cayley_sleeps_from),
 }
 
 
@@ -67,9 +67,9 @@ def composition(
         )
     table = rule._replace(turn=ROTATIONS.index(rotation), processor=boost)
     if chart == "angles":
-        stages = Scaled(table, splitting_angles.scale, packed)
+        stages = Scaled(table, angles.scale, packed)
     else:
-        stages = Scaled(table, splitting_space.tuned if table.turn == TUNED else splitting_space.scale, packed)
+        stages = Scaled(table, space.tuned if table.turn == TUNED else space.scale, packed)
     one_drift = bare and rule.drift == (1.0,)
     closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if one_drift and rule.kick == (0.5, 0.5) else None
     modified, sleeps = closed_forms or (None, None)

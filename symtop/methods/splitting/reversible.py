@@ -27,12 +27,11 @@ import numpy as np
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import chart_outcome, reduced
-from symtop.methods.framework.loop import accumulate
-from symtop.methods.framework.outcomes import LEFT_CHART, NOT_FINITE, OK, OUT_OF_BUDGET, OUTCOMES
-from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUT_OF_BUDGET, OUTCOMES, Array, Plan, Run
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.splitting.splitting_angles import drift_angles, force_angles, kick_angles, observe
-from symtop.methods.splitting.splitting_loop import Stages, compose
+from symtop.methods.splitting.angles import drift_angles, force_angles, kick_angles, observe
+from symtop.methods.splitting.loop import Stages, compose
+from symtop.methods.vectors import accumulate
 from symtop.model.top import Angles, SymmetricTop
 
 BLOCK, STEPS, SHARE = 5_000_000, 200_000_000, 10_000  # steps between returns to Python, of a run (10 s), for one asked

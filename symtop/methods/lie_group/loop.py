@@ -1,0 +1,338 @@
+"""The loop around maps that make a step as a rotation in space: Lie-group methods, on the attitude (q, L).
+
+A map sees the axis and the momentum, since nothing of a symmetric top hangs on more, and returns a rotation as a
+quaternion less one, (m, v) = p - 1, and the change of L:
+
+    turn(par, rule, e, L, carry, h) -> (m, v, dL, work, outcome),      q <- p q,   e <- p e p*,   L <- L + dL
+
+`rule.shares` are the parts that a step is composed of, in units of h: (1,) for the map itself, and five of Suzuki's for
+order 4. The axis chart shows (e, L) of the same run: one kernel, and its attitude has the bits of its axis.
+
+A map in the frame that turns with L/I1 leaves the spin of the body out (`UNSPUN`): where L.e is kept exactly, that spin
+is a constant rate and is added at samples, as in `splitting.space`. A map of the body itself (`SPUN`) turns it in the
+step, with an error that grows with the spin.
+
+p - 1 in place of p keeps increments free of cancellation. What |q| lacks is added to m in every step.
+
+In lanes the shares stand outside and the lanes inside. A family writes what stands between, as one loop over the lanes
+or several (`stepped`), or as the parts of an iteration (`iterated`). The table holds the numbers of the top, those of
+the rule and, share by share, what a share is made of: one kernel for compositions of any length, and for both charts,
+which differ in what is shown of a sample. An iteration runs until no lane is live; a lane that has ended keeps its x. A
+lane that is live after half of the passes that a run alone may make is given up, and so is one whose equation cannot be
+solved: alone, it goes on or fails.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from symtop.core.jit import register_jitable
+from symtop.core.simd import wide_vectors
+from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
+from symtop.methods.framework.loop import Loop, driver
+from symtop.methods.framework.plan import OK
+from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it_steps
+from symtop.methods.framework.space import (
+    SpaceTop,
+    axis_of,
+    finite_outcome,
+    momentum_parts,
+    observe_attitude,
+    on_attitude,
+    quaternion_parts,
+    with_spin,
+)
+from symtop.methods.vectors import accumulate, cross, dot, plus, scaled
+
+
+def _on_body(top: Any, at: Any) -> Any:
+    """The numbers of the top and the state (q, L) of a start."""
+    momentum = momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
+    return Body(top.I1, top.I3, top.mgl), (*quaternion_parts(math, at.theta, at.phi, at.psi), *momentum)
+
+
+def _axis_shown(par: Any, t: float, y: Any) -> Any:
+    """(e, L) of (q, L)."""
+    return (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6])
+
+
+def _spin_shown(par: Any, t: float, y: Any) -> Any:
+    """(q, L) with the spin of the time t."""
+    return with_spin(par, y, t)
+
+
+class Carried(NamedTuple):
+    """How the body's spin is stepped: what a kernel starts from, and how the attitude is shown."""
+
+    prepare: Preparation
+    present: Shown | None
+    top: Any  # the NamedTuple of the numbers of the top
+
+
+UNSPUN = Carried(on_attitude, Shown(_spin_shown, 7), SpaceTop)
+SPUN = Carried(Preparation(_on_body, 7), None, Body)
+_AXIS = Shown(_axis_shown, 6)
+STILL = (0.0,) * 7  # no increment
+
+
+@register_jitable
+def gravity(par: Any, e: Any) -> Any:
+    """The torque mgl k x e."""
+    return -par.mgl * e[1], par.mgl * e[0], 0.0
+
+
+@register_jitable
+def moved(m: float, v: Any, x: Any) -> Any:
+    """How far the rotation p = (1 + m, v) moves a vector: p x p* - x."""
+    c = cross(v, x)
+    return scaled(2.0, plus(cross(v, c), 1.0 + m, c))
+
+
+@register_jitable
+def cayley(u: Any) -> Any:
+    """The rotation of a Cayley vector, by 2 arctan |u| about u."""
+    square = dot(u, u)
+    root = math.sqrt(1.0 + square)
+    return -square / (root * (1.0 + root)), scaled(1.0 / root, u)
+
+
+@register_jitable
+def reached(state: Any, step: Any) -> Any:
+    """The quaternion and the momentum that an increment leads to."""
+    q = state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3]
+    return q, (state[4] + step[4], state[5] + step[5], state[6] + step[6])
+
+
+@register_jitable
+def composed(step: Any, q: Any, m: float, v: Any, dL: Any) -> Any:
+    """The increment with one more rotation, of the quaternion q that it has led to."""
+    a, b, c, d, X, Y, Z = step
+    w, x, y, z = q
+    m += 0.5 * (1.0 + m) * (1.0 - (w * w + x * x + y * y + z * z))
+    a += m * w - (v[0] * x + v[1] * y + v[2] * z)
+    b += m * x + (v[0] * w + v[1] * z - v[2] * y)
+    c += m * y + (v[1] * w + v[2] * x - v[0] * z)
+    d += m * z + (v[2] * w + v[0] * y - v[1] * x)
+    return a, b, c, d, X + dL[0], Y + dL[1], Z + dL[2]
+
+
+@register_jitable
+def ended(step: Any) -> int:
+    """The outcome of a step that was solved."""
+    a, b, c, d, X, Y, Z = step
+    outcome: int = finite_outcome(a + b + c + d + X + Y + Z)
+    return outcome
+
+
+def _nothing(par: Any, rule: Any, state: Any, h: float) -> Any:
+    """A step depends on its start alone."""
+    return 0.0
+
+
+def _alone(rule: Any) -> None:
+    return None
+
+
+def lie_loop(
+    turn: Callable[..., Any], begin: Callable[..., Any] = _nothing, lanes: Callable[[Any], Lanes | None] = _alone
+) -> Loop:  # fmt: skip
+    """The loop on (q, L) around a map; `lanes` is how it steps many, by its rule (`lie_lanes`)."""
+    register_jitable(turn)
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        step = STILL
+        effort = outcome = 0
+        for share in rule.shares:
+            q, L = reached(state, step)
+            m, v, dL, work, outcome = turn(par, rule, axis_of(*q), L, carry, h * share)
+            effort += work
+            if outcome != OK:
+                break
+            step = composed(step, q, m, v, dL)
+        if outcome == OK:
+            outcome = ended(step)
+        return step, carry, effort, outcome
+
+    return driver(begin, increment, observe_attitude, lanes=lanes)
+
+
+def shown_in(carried: Carried) -> Callable[..., None]:
+    """A sample of either chart, by how many numbers it has: ``(par, t, state, out)``, for a kernel of both."""
+    axis, attitude = _AXIS, carried.present
+    sample = as_it_steps if attitude is None else attitude.sample
+    small, large = showing(axis.sample), showing(sample)
+    size = axis.size
+
+    def show(par, t, state, out):  # type: ignore[no-untyped-def]
+        if len(out) == size:
+            small(par, t, state, out)
+        else:
+            large(par, t, state, out)
+
+    return show
+
+
+def in_both_charts(
+    loop: Loop, rule: Any, carried: Carried, evaluations: int, *, implicit: bool
+) -> dict[str, FixedStep]:  # fmt: skip
+    """Solvers on the axis and on the attitude; `evaluations` is the force evaluations of one unit of work."""
+    return {
+        "axis": FixedStep(loop, rule, carried.prepare, evaluations, implicit=implicit, present=_AXIS),
+        "attitude": FixedStep(loop, rule, carried.prepare, evaluations, implicit=implicit, present=carried.present),
+    }
+
+
+@register_jitable
+def inertia(par: Any, e: Any, x: Any) -> Any:
+    """J x = I1 x + (I3 - I1)(e.x) e."""
+    return plus(scaled(par.I1, x), (par.I3 - par.I1) * dot(e, x), e)
+
+
+SIZE = len(STILL)
+LOW, STEP, FLAG, WORK, CARRY = SIZE, 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE + 2
+
+
+@register_jitable
+def _empty_carry(par: Any, rule: Any, state: Any, h: float) -> Any:
+    """A step depends on its start alone, and an empty tuple has no type of entry."""
+    return (0.0,)
+
+
+@register_jitable
+def entered(block: Any, j: int) -> Any:
+    """The quaternion that lane j has come to, its axis, and the momentum."""
+    q, L = reached(column(block, 0, j, STILL), column(block, STEP, j, STILL))
+    return q, axis_of(*q), L
+
+
+@register_jitable
+def left(block: Any, j: int, q: Any, m: float, v: Any, dL: Any) -> None:
+    """Add the rotation of a share to the step of lane j."""
+    put(block, STEP, j, composed(column(block, STEP, j, STILL), q, m, v, dL))
+
+
+@register_jitable
+def give_up(block: Any, j: int, when: bool) -> None:
+    """Have lane j run alone, by selection."""
+    block[FLAG * W + j] = 1.0 if when else block[FLAG * W + j]
+
+
+def _read(numbers: Any) -> Any:
+    """What `observe` and `present` see of the rule, who ask for nothing."""
+    return 0.0
+
+
+def stepped(
+    part: Callable[..., None], lay: Callable[..., None], fields: int, each: int, *,
+    carried: Carried, carry: int = 1, begin: Callable[..., Any] = _empty_carry, room: int = 0,
+    effort: Callable[[Any], int] = lambda _: 0,
+) -> Lanes:  # fmt: skip
+    """A map in lanes: ``part(block, table, row)`` is one share of all lanes, whose own numbers begin with `row`.
+
+    ``lay(par, rule, h, numbers)`` writes `fields` numbers of the rule, then `each` for every share.
+    """
+    shares_at = len(carried.top._fields) + fields
+    register_jitable(part)
+
+    def step(block, table):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        for j in range(W):
+            put(block, STEP, j, STILL)
+        for share in range((len(table) // W - shares_at) // each):
+            part(block, table, table[(shares_at + share * each) * W :])
+        for j in range(W):
+            state, step = column(block, 0, j, STILL), column(block, STEP, j, STILL)
+            give_up(block, j, ended(step) != OK)
+            moved, low = accumulate(state, column(block, LOW, j, STILL), step)
+            put(block, 0, j, moved)
+            put(block, LOW, j, low)
+
+    def size(rule: Any) -> int:
+        return fields + each * len(rule.shares)
+
+    show = shown_in(carried)
+    return Lanes(step, lay, _read, size, carried.top, SIZE, carry, effort, lambda _: room, begin, show)
+
+
+@register_jitable
+def no_numbers(rule: Any) -> Any:
+    """Of a rule that is nothing but shares."""
+    return (0.0,)
+
+
+def iterated(  # noqa: C901  (the loops of one step, read in one piece)
+    start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
+    opened: int, unknowns: int, numbers: Callable[..., Any] = no_numbers, count: int = 1,
+    begin: Callable[..., Any] = _empty_carry, carry: int = 1,
+) -> Lanes:  # fmt: skip
+    """An iterated map of a body in lanes, from the parts of which its `turn` is made.
+
+        numbers(rule) -> rule                                        `count` numbers of it, as the others take them
+        start(par, rule, e, L, carry, h) -> (opened, x)              what no pass changes, and the first guess
+        again(par, rule, carry, h, opened, x) -> (x, ended, lost)    one pass; a lane that is lost runs alone
+        close(par, rule, carry, h, opened, x) -> (m, v, dL, carry)   the rotation and the next carry
+
+    `opened`, x and the carry are flat tuples. A run alone makes at most `most` passes.
+    """
+    body, top_of = SPUN.top, reading(len(SPUN.top._fields))
+    tops, first = len(body._fields), CARRY + carry
+    x_at, live_at = first + opened, first + opened + unknowns
+    rule_of, carried, opens, unknown = reading(count), reading(carry), reading(opened), reading(unknowns)
+    for function in (start, again, close, numbers):
+        register_jitable(function)
+
+    @register_jitable
+    def given(block, table, row, j):  # type: ignore[no-untyped-def]
+        return body(*top_of(table, 0, j)), rule_of(table, tops, j), carried(block, CARRY, j), row[j]
+
+    @register_jitable
+    def begun(block, table, row, j):  # type: ignore[no-untyped-def]
+        par, rule, carry, h = given(block, table, row, j)
+        _, e, L = entered(block, j)
+        fixed, x = start(par, rule, e, L, carry, h)
+        put(block, first, j, fixed)
+        put(block, x_at, j, x)
+        block[live_at * W + j] = 1.0 - block[FLAG * W + j]
+
+    @register_jitable
+    def passed(block, table, row, j):  # type: ignore[no-untyped-def]
+        par, rule, carry, h = given(block, table, row, j)
+        x, live = unknown(block, x_at, j), block[live_at * W + j]
+        after, ended, lost = again(par, rule, carry, h, opens(block, first, j), x)
+        for i in range(unknowns):
+            block[(x_at + i) * W + j] = after[i] if live != 0.0 else x[i]
+        block[FLAG * W + j] = max(block[FLAG * W + j], live if lost else 0.0)
+        block[WORK * W + j] += live
+        block[live_at * W + j] = 0.0 if ended or lost else live
+
+    @register_jitable
+    def closed(block, table, row, j):  # type: ignore[no-untyped-def]
+        par, rule, carry, h = given(block, table, row, j)
+        m, v, dL, after = close(par, rule, carry, h, opens(block, first, j), unknown(block, x_at, j))
+        left(block, j, entered(block, j)[0], m, v, dL)
+        put(block, CARRY, j, after)
+        give_up(block, j, block[live_at * W + j] != 0.0)
+
+    def part(block, table, row):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        for j in range(W):
+            begun(block, table, row, j)
+        for _ in range(most // 2):
+            for j in range(W):
+                passed(block, table, row, j)
+            if none_left(block, live_at):
+                break
+        for j in range(W):
+            closed(block, table, row, j)
+
+    def lay(par, rule, h, out):  # type: ignore[no-untyped-def]
+        values, i = numbers(rule), count
+        for q in range(count):
+            out[q] = values[q]
+        for share in rule.shares:
+            out[i] = h * share
+            i += 1
+
+    room = live_at + 1 - first
+    return stepped(part, lay, count, 1, carried=SPUN, carry=carry, begin=begin, room=room)

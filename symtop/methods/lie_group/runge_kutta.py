@@ -1,0 +1,291 @@
+"""Runge-Kutta methods on the group SE(3), whose coadjoint orbits the top moves on: RKMK, Crouch-Grossman, CF4.
+
+The vector field on (e, L) is at each point that of an element (w, f) of the algebra se(3),
+
+    e' = w x e,   L' = w x L + f x e,        w = L/I1,  f = mgl k,
+
+and with w and f held fixed its flow over a unit of time is known, the action of exp(w, f):
+
+    e <- R e,   L <- R L + b x R e,      R = exp(w),   b = (1 + B w x + C w x w x) f,      a = |w|
+    B = (1 - cos a)/a^2 = 2 s^2,   C = (a - sin a)/a^3,      the quaternion of R = (1 + m, s w).
+
+s, m and C are functions of the square of half the angle alone: series where that is less than 1, sine and cosine
+beyond. Every such flow keeps |e| and L.e, the Casimirs of se(3)*, whatever w and f are. So does a method that is made
+of them; p_phi = L_z and the energy drift. With F_j the algebra element at stage j:
+
+    Crouch-Grossman   y_i = exp(h a_i,i-1 F_i-1) ... exp(h a_i1 F_1) y            one exponential a coefficient
+    commutator-free   y_i = ... exp(h sum_j w_2j F_j) exp(h sum_j w_1j F_j) y     few exponentials of sums
+    Munthe-Kaas       y_i = exp(U_i) y,  U_i = h sum_j a_ij K_j,  K_i = F_i - [U_i, F_i]/2 + [U_i, [U_i, F_i]]/12
+
+The last is a method for the element U that the solution is the exponential of, U' = dexp^-1_U F; of dexp^-1 two
+brackets suffice for order 4. A table is rows of weights, one row an exponential, so that one kernel steps all three.
+The engines' `rkmk4` acts with SO(3) x R^3 on body rates instead: another group, which keeps |e| and L.e for that body
+alone and turns the spin in its stages.
+
+In lanes a kernel compiles for each shape of a table: how many exponentials each stage has, and whether slopes are bent
+back (Munthe-Kaas). The weights are numbers in the table, and those that are 0 are carried out too, in the order of the
+kernel for one. Lanes take the series; one that turns by more than two radians is given up.
+Sources: Crouch, Grossman, J. Nonlinear Sci. 3 (1993) 1; Munthe-Kaas, Appl. Numer. Math. 29 (1999) 115; Celledoni,
+Marthinsen, Owren, Future Gener. Comput. Syst. 19 (2003) 341; Engo, Faltinsen, SIAM J. Numer. Anal. 39 (2001) 128 (heavy
+top on coadjoint orbits).
+"""
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.core.jit import register_jitable
+from symtop.core.simd import wide_vectors
+from symtop.methods.framework.lanes import Lanes, W, column
+from symtop.methods.framework.plan import OK
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.lie_group.loop import UNSPUN, entered, give_up, in_both_charts, left, lie_loop, moved, stepped
+from symtop.methods.splitting.rotor import COSINE, SINE, series
+from symtop.methods.vectors import cross, dot, plus, scaled
+
+CUBIC = tuple(1.0 / math.factorial(2 * k + 3) for k in range(9))  # C in powers of -a^2
+NOUGHT = (0.0, 0.0, 0.0)
+
+
+@register_jitable
+def half_square(w: Any) -> float:
+    """The square of half the angle of exp(w, f)."""
+    square: float = 0.25 * dot(w, w)
+    return square
+
+
+@register_jitable
+def near(square: float) -> Any:
+    """s, m and C of an exponential that turns by less than two radians, of the square of half the angle."""
+    s, m = 0.5 * series(square, SINE), -square * series(square, COSINE)
+    return s, m, series(4.0 * square, CUBIC)
+
+
+@register_jitable
+def any_angle(square: float) -> Any:
+    """The same of any angle."""
+    if square < 1.0:
+        return near(square)
+    x = math.sqrt(square)
+    half = math.sin(0.5 * x)
+    s, m = 0.5 * math.sin(x) / x, -2.0 * half * half
+    return s, m, (1.0 - 2.0 * s * (1.0 + m)) / (4.0 * square)
+
+
+@register_jitable
+def acted(so_far: Any, L: Any, w: Any, f: Any, turned: Any) -> Any:
+    """A product of exponentials with one more, exp(w, f) of s, m and C: its rotation, the axis and the change of L."""
+    (total, v, x, dL), (s, m, cubic) = so_far, turned
+    u, bent = scaled(s, w), cross(w, f)
+    b = plus(plus(f, 2.0 * s * s, bent), cubic, cross(w, bent))
+    x = plus(x, 1.0, moved(m, u, x))
+    dL = plus(plus(dL, 1.0, moved(m, u, plus(L, 1.0, dL))), 1.0, cross(b, x))
+    mixed = total + m + total * m - dot(u, v)
+    return mixed, plus(plus(scaled(1.0 + m, v), 1.0 + total, u), 1.0, cross(u, v)), x, dL
+
+
+@register_jitable
+def _bracket(w: Any, f: Any, x: Any, g: Any) -> Any:
+    """[(w, f), (x, g)] = (w x x, w x g + f x x)."""
+    return cross(w, x), plus(cross(w, g), 1.0, cross(f, x))
+
+
+@register_jitable
+def bent_back(w: Any, f: Any, slope: Any, g: Any) -> Any:
+    """dexp^-1 of (w, f), two brackets of it, on an element of the algebra."""
+    once, once_f = _bracket(w, f, slope, g)
+    twice, twice_f = _bracket(w, f, once, once_f)
+    return plus(plus(slope, -0.5, once), 1.0 / 12.0, twice), plus(plus(g, -0.5, once_f), 1.0 / 12.0, twice_f)
+
+
+Part = Callable[..., Any]
+TOP: Any = UNSPUN.top
+NUMBERS = (0.0,) * len(TOP._fields)
+
+
+def lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
+    """The weights times the step, share by share."""
+    i = 0
+    for share in rule.shares:
+        for weight in rule.weights:
+            numbers[i] = (h * share) * weight
+            i += 1
+
+
+def _sum(terms: int, first: int) -> Part:
+    """``(slopes, row, j)`` to the sum of so many slopes, whose weights begin at this number of the row."""
+    if terms == 0:
+
+        def summed(slopes, row, j):  # type: ignore[no-untyped-def]
+            return NOUGHT, NOUGHT
+    else:
+        before, last, at = _sum(terms - 1, first), terms - 1, first + terms - 1
+
+        def summed(slopes, row, j):  # type: ignore[no-untyped-def]
+            (w, f), weight = before(slopes, row, j), row[at * W + j]
+            return plus(w, weight, slopes[last][0]), plus(f, weight, slopes[last][1])
+
+    registered: Part = register_jitable(summed)
+    return registered
+
+
+def _product(count: int, terms: int, first: int, stages: int) -> Part:
+    """``(e, L, slopes, row, j)`` to the product of so many exponentials, the last of them, and whether all are near."""
+    if count == 0:
+
+        def made(e, L, slopes, row, j):  # type: ignore[no-untyped-def]
+            return (0.0, NOUGHT, e, NOUGHT), NOUGHT, NOUGHT, 0.0
+    else:
+        before, summed = _product(count - 1, terms, first, stages), _sum(terms, first + (count - 1) * stages)
+
+        def made(e, L, slopes, row, j):  # type: ignore[no-untyped-def]
+            so_far, _, _, far = before(e, L, slopes, row, j)
+            w, f = summed(slopes, row, j)
+            square = half_square(w)
+            return acted(so_far, L, w, f, near(square)), w, f, far if square < 1.0 else 1.0
+
+    registered: Part = register_jitable(made)
+    return registered
+
+
+def _stages(counts: tuple[int, ...], stages: int, bent: bool) -> Part:
+    """``(par, e, L, row, j)`` to the slopes of the stages, one more than there are counts, and whether all are near."""
+    if not counts:
+
+        def slopes(par, e, L, row, j):  # type: ignore[no-untyped-def]
+            return ((scaled(1.0 / par.I1, L), (0.0, 0.0, par.mgl)),), 0.0
+    else:
+        before = _stages(counts[:-1], stages, bent)
+        made = _product(counts[-1], len(counts), sum(counts[:-1]) * stages, stages)
+
+        def slopes(par, e, L, row, j):  # type: ignore[no-untyped-def]
+            known, far = before(par, e, L, row, j)
+            so_far, w, f, too_far = made(e, L, known, row, j)
+            slope, g = scaled(1.0 / par.I1, plus(L, 1.0, so_far[3])), (0.0, 0.0, par.mgl)
+            if bent:
+                slope, g = bent_back(w, f, slope, g)
+            return (*known, (slope, g)), max(far, too_far)
+
+    registered: Part = register_jitable(slopes)
+    return registered
+
+
+@functools.cache
+def _of_shape(counts: tuple[int, ...], bent: bool) -> Lanes:
+    stages = len(counts)
+    slopes = _stages(counts[:-1], stages, bent)
+    whole = _product(counts[-1], stages, sum(counts[:-1]) * stages, stages)
+
+    def part(block, table, row):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        for j in range(W):
+            par, (q, e, L) = TOP(*column(table, 0, j, NUMBERS)), entered(block, j)
+            known, far = slopes(par, e, L, row, j)
+            (m, v, _, dL), _, _, too_far = whole(e, L, known, row, j)
+            left(block, j, q, m, v, dL)
+            give_up(block, j, max(far, too_far) != 0.0)
+
+    each = sum(counts) * stages
+    return stepped(part, lay, 0, each, carried=UNSPUN, effort=_evaluations)
+
+
+def _evaluations(rule: Any) -> int:
+    return len(rule.counts) * len(rule.shares)
+
+
+def in_lanes(rule: Any) -> Lanes:
+    """The lanes of a table."""
+    return _of_shape(tuple(int(count) for count in rule.counts), rule.bent != 0.0)
+
+
+class LieTable(NamedTuple):
+    """Rows of weights, each of an exponential: those of the stages from the second on, then those of the step."""
+
+    weights: tuple[float, ...]  # row by row, one entry a stage
+    counts: tuple[float, ...]  # exponentials of each stage from the second on, and of the step
+    bent: float = 0.0  # 1 for Munthe-Kaas
+    shares: tuple[float, ...] = (1.0,)
+
+
+@register_jitable
+def _store(slopes: Any, i: int, w: Any, f: Any) -> None:
+    """Write an element of the algebra into row i."""
+    for k in range(3):
+        slopes[i, k], slopes[i, 3 + k] = w[k], f[k]
+
+
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+    """Working space for the elements of the stages."""
+    return np.empty((len(rule.counts), 6))
+
+
+def turn(par: Any, rule: Any, e: Any, L: Any, slopes: Any, h: float) -> Any:
+    """One step; the work counted is the number of force evaluations."""
+    stages, row = len(rule.counts), 0
+    f0 = 0.0, 0.0, par.mgl
+    _store(slopes, 0, scaled(1.0 / par.I1, L), f0)
+    made = 0.0, NOUGHT, e, NOUGHT
+    for i in range(1, stages + 1):
+        made = 0.0, NOUGHT, e, NOUGHT
+        w, f = NOUGHT, NOUGHT
+        for _ in range(int(rule.counts[i - 1])):
+            w, f = NOUGHT, NOUGHT
+            for j in range(i):
+                weight = h * rule.weights[row + j]
+                w = plus(w, weight, (slopes[j, 0], slopes[j, 1], slopes[j, 2]))
+                f = plus(f, weight, (slopes[j, 3], slopes[j, 4], slopes[j, 5]))
+            row += stages
+            made = acted(made, L, w, f, any_angle(half_square(w)))
+        if i < stages:
+            slope, g = scaled(1.0 / par.I1, plus(L, 1.0, made[3])), f0
+            if rule.bent != 0.0:
+                slope, g = bent_back(w, f, slope, g)
+            _store(slopes, i, slope, g)
+    return made[0], made[1], made[3], stages, OK
+
+
+march = lie_loop(turn, begin, in_lanes)
+
+
+def lie_runge_kutta(
+    name: str, rows: Sequence[Sequence[Sequence[float]]], order: int, summary: str, reference: str, *,
+    bent: bool = False,
+) -> Integrator:  # fmt: skip
+    """A method from its table: for each stage from the second on, and for the step, the weights of its exponentials."""
+    stages = len(rows)
+    weights = [value for part in rows for row in part for value in (*row, *[0.0] * (stages - len(row)))]
+    rule = LieTable(tuple(weights), tuple(float(len(part)) for part in rows), float(bent))
+    return Integrator(
+        name=name, family="lie-group", summary=summary, reference=reference, order=order, explicit=True,
+        symplectic=False, symmetric=False, conserves=frozenset({"p_psi", "axis_length"}),
+        solvers=in_both_charts(march, rule, UNSPUN, 1, implicit=False),
+    )  # fmt: skip
+
+
+def built_in() -> list[Integrator]:
+    """Two methods of Munthe-Kaas, Crouch-Grossman's and the commutator-free one."""
+    munthe_kaas = "munthe-kaas-1999 engo-faltinsen-2001"
+    return [
+        lie_runge_kutta(
+            "rkmk-se3-2", (((0.5,),), ((0.0, 1.0),)), 2,
+            "Runge-Kutta-Munthe-Kaas on coadjoint orbits, the midpoint tableau", munthe_kaas, bent=True,
+        ),
+        lie_runge_kutta(
+            "rkmk-se3-4", (((0.5,),), ((0.0, 0.5),), ((0.0, 0.0, 1.0),), ((1 / 6, 1 / 3, 1 / 3, 1 / 6),)), 4,
+            "Runge-Kutta-Munthe-Kaas on coadjoint orbits, Kutta's tableau", munthe_kaas, bent=True,
+        ),
+        lie_runge_kutta(
+            "crouch-grossman-3",
+            (((3 / 4,),), ((119 / 216,), (0.0, 17 / 108)), ((13 / 51,), (0.0, -2 / 3), (0.0, 0.0, 24 / 17))), 3,
+            "Crouch-Grossman: a product of exponentials, one for each coefficient", "crouch-grossman-1993",
+        ),
+        lie_runge_kutta(
+            "commutator-free-4",
+            (((0.5,),), ((0.0, 0.5),), ((0.5,), (-0.5, 0.0, 1.0)),
+             ((1 / 4, 1 / 6, 1 / 6, -1 / 12), (-1 / 12, 1 / 6, 1 / 6, 1 / 4))), 4,
+            "commutator-free Lie-group method, two exponentials for the step", "celledoni-marthinsen-owren-2003",
+        ),
+    ]  # fmt: skip
