@@ -172,7 +172,9 @@ def loop(chart: str, pair: Any = DORMAND_PRINCE) -> Loop:  # noqa: C901
     attempt, refine, between, stages, cost, power = method
     clock, last = 2 * size, method.evaluations
 
-    def march(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
+    def march(  # type: ignore[no-untyped-def]  # noqa: C901
+        numbers, tolerance, times, budget, seen, place, states, momenta
+    ):
         par, state = prepare(Body(*numbers[:3]), Start(*numbers[3:]))
         slopes, nothing, end = np.empty((stages, size)), state, times[-1]
         for m in range(size):

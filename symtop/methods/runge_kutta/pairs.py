@@ -1,13 +1,13 @@
 """Explicit pairs of order 5 to 9 with a tolerance, and the same tables with fixed steps, their stages written out.
 
-    k_i = f(y + h sum_{j<i} a_ij k_j),  y+ = y + h sum_i b_i k_i     each sum without the terms whose coefficient is zero
+    k_i = f(y + h sum_{j<i} a_ij k_j),  y+ = y + h sum_i b_i k_i    each sum without the terms whose coefficient is zero
 
 The steps are chosen as SciPy chooses them (`dormand_prince`), |err| by the order of the estimate:
 
-    name              order   f a step   |err|                                                   samples between steps
-    tsit5             5       6          rms(err_4)                                              order 4, no further f
-    dop853-compiled   8       12         rms(err_5)^2 / sqrt(rms(err_5)^2 + rms(err_3)^2/100)    order 7, three f a step
-    vern9             9       16         rms(err_8)                                              a shorter step, 15 f each
+    name              order   f a step   |err|, e_p = rms(err of order p)   samples between steps
+    tsit5             5       6          e_4                                order 4, no further f
+    dop853-compiled   8       12         e_5^2 / sqrt(e_5^2 + e_3^2/100)    order 7, three f for all of a step
+    vern9             9       16         e_8                                by a shorter step, 15 f each
 
 `dop853-compiled` accepts and rejects the steps of SciPy's `dop853` and takes as many f. Stages that are written out
 keep their slopes in registers: on the axis a step of order 8 takes a quarter of the time of a loop over the table.
@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.jit import register_jitable, set_item
+from symtop.core.jit import combined, register_jitable, set_item
 from symtop.methods.framework.angles import LEAST_TOLERANCE
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.fixed_step import FixedStep
@@ -48,17 +48,10 @@ def _forget(slopes: Any, i: int, slope: Any) -> None:
 
 def _sum(weights: Sequence[float]) -> Callable[..., Any]:
     """``(place, made, h)`` to place + h sum_j w_j k_j, term by term, of a tuple of slopes."""
-    *before, j = [j for j, weight in enumerate(weights) if weight] or [None]
-
-    def nothing(place, made, h):  # type: ignore[no-untyped-def]
-        return place
-
-    if j is None:
-        return register_jitable(nothing)
-    others, weight = _sum([weights[i] if i in before else 0.0 for i in range(len(weights))]), float(weights[j])
+    used = tuple(float(weight) if weight else None for weight in weights)
 
     def added(place, made, h):  # type: ignore[no-untyped-def]
-        return add(others(place, made, h), made[j], h * weight)
+        return combined(place, made, used, h)
 
     return register_jitable(added)
 
